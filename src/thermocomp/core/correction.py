@@ -1,0 +1,90 @@
+"""Deviation, correction and what a correction may never do."""
+
+import math
+from dataclasses import dataclass
+
+from thermocomp.core.exceptions import InputError
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Actual minus commanded tool point along one axis, at a position and a slope over the travel.
+
+    Parameters
+    ----------
+    offset : float
+        Deviation at the reference position [um].
+    slope : float
+        Change of the deviation along the axis [um/m].
+    reference_position : float
+        Where `offset` holds [mm].
+    """
+
+    offset: float
+    slope: float = 0.0
+    reference_position: float = 0.0
+
+    def at(self, position: float) -> float:
+        """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
+        return self.offset + self.slope * 1e-3 * (position - self.reference_position)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a controller adds along one axis: minus the deviation.
+
+    ``K(T, P) = K0(T) + tan b(T) (P - P0)`` is the form that Siemens, Beckhoff/ISG and in effect Heidenhain take.
+
+    Parameters
+    ----------
+    offset : float
+        K0 [um].
+    slope : float
+        tan b [um/m].
+    reference_position : float
+        P0 [mm].
+    """
+
+    offset: float
+    slope: float = 0.0
+    reference_position: float = 0.0
+
+    @classmethod
+    def opposing(cls, deviation: Deviation) -> "Correction":
+        """Return the correction that cancels `deviation`: the only change of sign in the house."""
+        # "0.0 -" rather than a bare minus: a zero deviation must not become -0.0 in a journal or a controller
+        return cls(0.0 - deviation.offset, 0.0 - deviation.slope, deviation.reference_position)
+
+    def at(self, position: float) -> float:
+        """Correction [um] at a position [mm]."""
+        return self.offset + self.slope * 1e-3 * (position - self.reference_position)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a correction may never do.
+
+    Parameters
+    ----------
+    magnitude : float
+        Largest correction in either direction [um].
+    rate : float
+        Fastest change of the correction [um/s].
+    dead_band : float
+        A new target closer than this to the correction in force changes nothing [um].
+    reading_age : float
+        A reading older than this is not used [s].
+    """
+
+    magnitude: float = 500.0
+    rate: float = 1.0
+    dead_band: float = 0.0
+    reading_age: float = 60.0
+
+    def __post_init__(self) -> None:
+        for name in ("magnitude", "rate", "reading_age"):
+            value = getattr(self, name)
+            if not value > 0:  # also refuses nan
+                raise InputError(f"limit {name} = {value}: must be positive")
+        if not (self.dead_band >= 0 and math.isfinite(self.dead_band)):
+            raise InputError(f"limit dead_band = {self.dead_band}: must be finite and not negative")

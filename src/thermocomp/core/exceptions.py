@@ -1,0 +1,49 @@
+"""The one exception tree: whatever thermocomp raises on purpose is a `ThermocompError`."""
+
+
+class ThermocompError(Exception):
+    """Base of all errors thermocomp raises on purpose; its text says what was found and what to do."""
+
+
+class InputError(ThermocompError):
+    """Something handed in cannot be used: a file, a column, an option, a channel name."""
+
+
+class RecordingError(InputError):
+    """A recording, or the file it comes from, cannot be used."""
+
+
+class UnitError(InputError):
+    """A unit is unknown, or does not belong to the quantity it stands for."""
+
+
+class ModelFileError(InputError):
+    """A model file is damaged, of an unknown version, or not a model file."""
+
+
+class FitError(ThermocompError):
+    """A model cannot be fitted to this data."""
+
+
+class ReadingError(ThermocompError):
+    """A live reading cannot be used; the correction is held, never moved."""
+
+
+class MissingExtraError(ThermocompError):
+    """A command needs an optional dependency that is not installed.
+
+    Parameters
+    ----------
+    extra : str
+        Name of the extra, such as ``"study"``.
+    missing : str
+        The module that could not be imported.
+    """
+
+    def __init__(self, extra: str, missing: str) -> None:
+        super().__init__(
+            f"this command needs the extra '{extra}' (module '{missing}' is not installed); "
+            f"install it with: pip install 'thermocomp[{extra}]'"
+        )
+        self.extra = extra
+        self.missing = missing

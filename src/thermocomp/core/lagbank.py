@@ -1,0 +1,56 @@
+"""First-order lags, one step at a time or over a whole recording: the same lines of code for both."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def decay(dt: float | FloatArray, time_constants: FloatArray) -> FloatArray:
+    """Return 1 - exp(-dt / tau): the share of a step that a first-order lag follows within `dt`."""
+    return -np.expm1(-dt / time_constants)
+
+
+def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: FloatArray) -> FloatArray:
+    """Advance a bank of first-order lags, the signal being constant over the step.
+
+    Parameters
+    ----------
+    memory : ndarray of shape (..., n_lags)
+    signals : ndarray of shape (..., n_lags)
+        What each lag follows, at the end of the step.
+    dt : float
+        [s]
+    time_constants : ndarray of shape (n_lags,)
+        [s]
+
+    Returns
+    -------
+    ndarray of shape (..., n_lags)
+    """
+    return memory + decay(dt, time_constants) * (signals - memory)
+
+
+def run(signals: FloatArray, dt: FloatArray, time_constants: FloatArray) -> FloatArray:
+    """Run a bank of lags over a recording that starts at rest.
+
+    Parameters
+    ----------
+    signals : ndarray of shape (n_rows, n_lags)
+    dt : ndarray of shape (n_rows,)
+        Time since the previous row [s]. A value of ``inf`` starts anew, at rest: the first row of each test.
+    time_constants : ndarray of shape (n_lags,)
+        [s]
+
+    Returns
+    -------
+    ndarray of shape (n_rows, n_lags)
+    """
+    out = np.empty_like(signals)
+    steps, where = np.unique(dt, return_inverse=True)
+    shares = decay(steps[:, None], time_constants)  # few distinct steps even in a long recording
+    memory = signals[0]
+    for k in range(len(signals)):
+        memory = memory + shares[where[k]] * (signals[k] - memory)
+        out[k] = memory
+    return out

@@ -1,0 +1,103 @@
+"""LinearDynamic family: a bank of first-order lags and a linear read-out."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite, signed_sum
+from thermocomp.core.terms import Term, TermTable, Variable
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearDynamic(ErrorModel):
+    """Deviation = intercept + direct . s + lagged . x, with tau dx/dt = s - x.
+
+    ``s`` are signals: products of the inputs (mostly the inputs themselves, or the square of the spindle speed); each
+    lag follows one signal with its own time constant. The bank starts at rest in the first reading.
+
+    Parameters
+    ----------
+    signals : tuple of tuple of int
+        Each the indices of the inputs it multiplies.
+    direct : tuple of float
+        Read-out of each signal.
+    lag_signals : tuple of int
+        Which signal each lag follows.
+    time_constants : tuple of float
+        Of each lag [s].
+    lagged : tuple of float
+        Read-out of each lag.
+    intercept : float
+        Deviation at the reference state.
+    """
+
+    family: ClassVar[str] = "linear-dynamic"
+
+    signals: tuple[Term, ...]
+    direct: tuple[float, ...]
+    lag_signals: tuple[int, ...]
+    time_constants: tuple[float, ...]
+    lagged: tuple[float, ...]
+    intercept: float = 0.0
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        if len(self.direct) != len(self.signals):
+            raise InputError(f"{owner}: {len(self.signals)} signals but {len(self.direct)} direct coefficients")
+        if not len(self.lag_signals) == len(self.time_constants) == len(self.lagged):
+            raise InputError(
+                f"{owner}: {len(self.lag_signals)} lag signals, {len(self.time_constants)} time constants and "
+                f"{len(self.lagged)} lag coefficients: must be equally many"
+            )
+        if any(not 0 <= i < len(self.signals) for i in self.lag_signals):
+            raise InputError(f"{owner}: a lag follows a signal beyond the {len(self.signals)} given")
+        if any(not tau > 0 for tau in self.time_constants):
+            raise InputError(f"{owner}: time constants must be positive, found {self.time_constants}")
+        check_finite(
+            owner, direct=self.direct, time_constants=self.time_constants, lagged=self.lagged, intercept=self.intercept
+        )
+        self._table  # noqa: B018 - refuses indices that point nowhere
+
+    @cached_property
+    def _table(self) -> TermTable:
+        singles = tuple(Variable.single(x.name, i) for i, x in enumerate(self.inputs))
+        return TermTable(len(self.inputs), singles, self.signals)
+
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray]:
+        return (
+            np.array(self.direct, dtype=np.float64),
+            np.array(self.lag_signals, dtype=np.intp),
+            np.array(self.time_constants, dtype=np.float64),
+            np.array(self.lagged, dtype=np.float64),
+        )
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return self._table.evaluate(change)[..., self._arrays[1]]
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        direct, follows, tau, lagged = self._arrays
+        signals = self._table.evaluate(change)
+        memory = lagbank.advance(memory, signals[..., follows], dt, tau)
+        return memory, signals @ direct + memory @ lagged + self.intercept
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+        active = {k for k, c in enumerate(self.direct) if c != 0}
+        active |= {k for k, c in zip(self.lag_signals, self.lagged, strict=True) if c != 0}
+        used = {i for k in active for i in self._table.inputs_of(k)}
+        return tuple(self.inputs[i].name for i in sorted(used))
+
+    def formula(self) -> str:
+        """Return the model as one line of text; ``lag(s, 20 min)`` is a first-order lag."""
+        names = self._table.names()
+        parts = list(zip(self.direct, names, strict=True))
+        for k, tau, c in zip(self.lag_signals, self.time_constants, self.lagged, strict=True):
+            parts.append((c, f"lag({names[k]}, {tau / 60:.4g} min)"))
+        return signed_sum(parts, self.intercept)

@@ -1,0 +1,318 @@
+"""`ErrorModel`: plain numbers with ``init`` and ``step``; where the training wing and the running wing meet.
+
+Estimators freeze into one of the families (`thermocomp.core.polynomial`, `thermocomp.core.lineardynamic`). The same
+object is evaluated live, replayed in every assessment and written as JSON. State in, state out: nothing hides in it.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError, ReadingError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Input:
+    """One input of a model, with the range it was trained in.
+
+    Parameters
+    ----------
+    name : str
+        Channel name.
+    quantity, unit : str
+        What it measures, in house units.
+    reference : float
+        Value that counts as zero [unit].
+    rezero : bool
+        True: the first reading after a start (or a re-zeroing) replaces `reference`, as the temperatures of a drift
+        test are counted from its start; False: `reference` is absolute, as for a spindle speed.
+    low, high : float
+        Trained range of value minus reference [unit].
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    reference: float
+    rezero: bool
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.high:
+            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
+
+
+@dataclass(frozen=True)
+class Support:
+    """What a model does outside its trained range.
+
+    Inputs are always clipped to the trained range widened by `margin`; on top of that
+
+    - ``clip``: nothing, the deviation at the clipped inputs is given,
+    - ``hold``: the last deviation from inside the range is given until all inputs are back,
+    - ``fade``: the deviation is faded to zero, linearly, over `fade_over` beyond the range.
+
+    Parameters
+    ----------
+    policy : {'clip', 'hold', 'fade'}
+    margin : float
+        Share of each input's trained span that is still taken as inside.
+    fade_over : float
+        Share of each input's trained span over which ``fade`` reaches zero.
+    """
+
+    policy: Literal["clip", "hold", "fade"] = "clip"
+    margin: float = 0.1
+    fade_over: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.margin >= 0 or not self.fade_over > 0:
+            raise InputError(f"support: margin {self.margin} must be >= 0 and fade_over {self.fade_over} > 0")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a model comes from.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method, such as ``dynamic``.
+    parameters : dict of str to str
+        Its settings, as text.
+    data_sha256 : tuple of str
+        Hashes of the recordings it was fitted to.
+    cycles : tuple of str
+        Thermal cycles it was fitted to.
+    rows : int
+        Number of rows it was fitted to.
+    version : str
+        thermocomp version that fitted it.
+    source : str
+        A publication, for models taken from one.
+    """
+
+    method: str
+    parameters: dict[str, str] = field(default_factory=dict)
+    data_sha256: tuple[str, ...] = ()
+    cycles: tuple[str, ...] = ()
+    rows: int = 0
+    version: str = ""
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class HonestError:
+    """Error on thermal cycles that the method had not seen.
+
+    Parameters
+    ----------
+    protocol : str
+        How the unseen cycles were chosen.
+    mae, rms, max_abs : float
+        Of the residual over all unseen cycles [unit of the model].
+    none_mae, none_rms : float
+        The same without compensation.
+    cycles : dict of str to float
+        RMS of the residual per unseen cycle.
+    verdict : {'accepted', 'refused'}
+        Of the do-no-harm gate.
+    reason : str
+        Why, in words.
+    """
+
+    protocol: str
+    mae: float
+    rms: float
+    max_abs: float
+    none_mae: float
+    none_rms: float
+    cycles: dict[str, float]
+    verdict: Literal["accepted", "refused"]
+    reason: str
+
+
+class State(NamedTuple):
+    """All that a model remembers between two steps.
+
+    Leading axes, if any, are a batch of independent runs.
+    """
+
+    reference: FloatArray  #: (..., n_inputs), what counts as zero
+    memory: FloatArray | None  #: (..., n_memory); None before the first reading
+    deviation: FloatArray  #: (...,), last deviation given
+    outside: BoolArray  #: (..., n_inputs), inputs beyond the trained range
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorModel(ABC):
+    """Frozen model of one error component.
+
+    Parameters
+    ----------
+    target : str
+        Displacement channel (or error component) it predicts.
+    unit : str
+        Unit of the deviation it gives: um, urad, um/m.
+    inputs : tuple of Input
+        What it wants to know, in this order.
+    support : Support
+        What it does outside its trained range.
+    provenance : Provenance or None
+        Where it comes from.
+    honest_error : HonestError or None
+        Error on unseen cycles; None if it was never judged.
+    """
+
+    family: ClassVar[str]
+
+    target: str
+    unit: str
+    inputs: tuple[Input, ...]
+    support: Support = Support()
+    provenance: Provenance | None = None
+    honest_error: HonestError | None = None
+
+    def __post_init__(self) -> None:
+        names = [i.name for i in self.inputs]
+        if len(set(names)) != len(names):
+            raise InputError(f"model of {self.target}: an input is named twice in {names}")
+        self._check()
+
+    # -- what a family fills in --------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def _check(self) -> None:
+        """Raise `InputError` if the numbers do not fit together."""
+
+    @abstractmethod
+    def _begin(self, change: FloatArray) -> FloatArray:
+        """Return the memory of a machine resting in the state `change`."""
+
+    @abstractmethod
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
+
+    @abstractmethod
+    def formula(self) -> str:
+        """Return the model as one line of text."""
+
+    @property
+    @abstractmethod
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+
+    # -- the one way in ----------------------------------------------------------------------------------------------
+
+    def init(self, reference: ArrayLike | None = None) -> State:
+        """Return the state of a machine that has just been zeroed.
+
+        Parameters
+        ----------
+        reference : array-like of shape (n_inputs,), optional
+            Values that count as zero. Without it the first reading decides for inputs with ``rezero``, and the
+            reference in the model for the others.
+
+        Returns
+        -------
+        State
+        """
+        if reference is None:
+            zero = self._reference.copy()
+        else:
+            zero = np.asarray(reference, dtype=np.float64)
+            if zero.shape != (len(self.inputs),) or not np.isfinite(zero).all():
+                raise InputError(f"reference of the model of {self.target}: want {len(self.inputs)} finite numbers")
+        return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
+
+    def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
+        """Take one reading in and give the deviation at its instant.
+
+        Parameters
+        ----------
+        state : State
+            From `init` or the previous `step`.
+        inputs : ndarray of shape (..., n_inputs)
+            Values in the order of `inputs` [their units]. Leading axes are a batch of independent runs.
+        dt : float
+            Time since the previous reading [s]; without meaning in the first step.
+
+        Returns
+        -------
+        state : State
+        deviation : ndarray of shape (...,)
+            [unit]
+
+        Raises
+        ------
+        ReadingError
+            An input is not finite, or `dt` is negative or not finite.
+        """
+        reference = state.reference
+        memory = state.memory
+        if memory is None:
+            reference = np.where(np.isnan(reference), inputs, reference)
+        change = inputs - reference
+        if not np.isfinite(change).all() or not 0.0 <= dt < np.inf:
+            raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
+        low, high = self._bounds
+        clipped = np.minimum(np.maximum(change, low), high)
+        outside = clipped != change
+        if memory is None:
+            memory = self._begin(clipped)
+        memory, deviation = self._advance(memory, clipped, dt)
+        if self.support.policy != "clip" and outside.any():
+            if self.support.policy == "hold":
+                deviation = np.where(outside.any(axis=-1), state.deviation, deviation)
+            else:
+                excess = np.abs(change - clipped) / self._fade_span
+                deviation = deviation * np.clip(1.0 - excess.max(axis=-1), 0.0, 1.0)
+        return State(reference, memory, deviation, outside), deviation
+
+    # -- derived numbers ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _reference(self) -> FloatArray:
+        """Reference of each input; nan where the first reading decides."""
+        return np.array([np.nan if i.rezero else i.reference for i in self.inputs])
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        low = np.array([i.low for i in self.inputs])
+        high = np.array([i.high for i in self.inputs])
+        margin = self.support.margin * (high - low)
+        return low - margin, high + margin
+
+    @cached_property
+    def _fade_span(self) -> FloatArray:
+        span = np.array([i.high - i.low for i in self.inputs]) * self.support.fade_over
+        return np.where(span > 0, span, np.finfo(np.float64).tiny)
+
+    @property
+    def accepted(self) -> bool:
+        """True if the do-no-harm gate has let this model pass."""
+        return self.honest_error is not None and self.honest_error.verdict == "accepted"
+
+
+def signed_sum(parts: list[tuple[float, str]], intercept: float) -> str:
+    """Write ``coefficient * name`` parts as a sum a person can read."""
+    text = f"{intercept:.6g}" if intercept else ""
+    for coefficient, name in parts:
+        sign = "-" if coefficient < 0 else "+"
+        text += f" {sign} {abs(coefficient):.6g} {name}"
+    return text.removeprefix(" + ").strip() or "0"
+
+
+def check_finite(owner: str, **numbers: Any) -> None:
+    """Raise `InputError` if one of the named number sequences holds a nan or an infinity."""
+    for name, values in numbers.items():
+        if not np.isfinite(np.asarray(values, dtype=np.float64)).all():
+            raise InputError(f"{owner}: {name} must be finite numbers, found {values}")

@@ -1,0 +1,66 @@
+"""Polynomial family: squares, products, differences; no memory."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite, signed_sum
+from thermocomp.core.terms import Term, TermTable, Variable
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polynomial(ErrorModel):
+    """Deviation = intercept + sum of coefficient * product of variables (Chen 1996, Eq. 4; C-09).
+
+    Parameters
+    ----------
+    variables : tuple of Variable
+        Linear combinations of the inputs (C-12).
+    terms : tuple of tuple of int
+        Each the indices of the variables it multiplies.
+    coefficients : tuple of float
+        One per term.
+    intercept : float
+        Deviation at the reference state; zero in Chen's form (C-09).
+    """
+
+    family: ClassVar[str] = "polynomial"
+
+    variables: tuple[Variable, ...]
+    terms: tuple[Term, ...]
+    coefficients: tuple[float, ...]
+    intercept: float = 0.0
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        if len(self.terms) != len(self.coefficients):
+            raise InputError(f"{owner}: {len(self.terms)} terms but {len(self.coefficients)} coefficients")
+        check_finite(owner, coefficients=self.coefficients, intercept=self.intercept)
+        self._table  # noqa: B018 - refuses indices that point nowhere
+
+    @cached_property
+    def _table(self) -> TermTable:
+        return TermTable(len(self.inputs), self.variables, self.terms)
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        return np.array(self.coefficients, dtype=np.float64)
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return np.empty((*change.shape[:-1], 0))
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        return memory, self._table.evaluate(change) @ self._coefficients + self.intercept
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+        used = {i for k, c in enumerate(self.coefficients) if c != 0 for i in self._table.inputs_of(k)}
+        return tuple(self.inputs[i].name for i in sorted(used))
+
+    def formula(self) -> str:
+        """Return the model as one line of text."""
+        return signed_sum(list(zip(self.coefficients, self._table.names(), strict=True)), self.intercept)

@@ -1,0 +1,23 @@
+"""What the shop floor says at one instant."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One synchronised sample of a machine's sensors.
+
+    Parameters
+    ----------
+    time : float
+        When it was taken [s]; any clock that only moves forward.
+    values : mapping of str to float
+        Channel name to value in house units: temperatures [degC], spindle speed [1/min].
+    positions : mapping of str to float
+        Axis letter to position [mm].
+    """
+
+    time: float
+    values: Mapping[str, float]
+    positions: Mapping[str, float] = field(default_factory=dict)

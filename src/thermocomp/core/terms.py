@@ -1,0 +1,140 @@
+"""Variables and terms: the alphabet of the polynomial families.
+
+A *variable* is a linear combination of inputs, such as T2 or T6-T7 (C-12: differences are first-class variables). A
+*term* is a product of variables, written as a tuple of their indices: ``(1,)`` is the second variable, ``(1, 1)`` its
+square, ``(0, 1)`` a product.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+Term = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A linear combination of inputs.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``T6-T7``.
+    weights : tuple of (int, float)
+        Index of an input and its factor.
+    """
+
+    name: str
+    weights: tuple[tuple[int, float], ...]
+
+    @classmethod
+    def single(cls, name: str, index: int) -> "Variable":
+        """Return the variable that is one input itself."""
+        return cls(name, ((index, 1.0),))
+
+    @classmethod
+    def difference(cls, names: Sequence[str], plus: str, minus: str) -> "Variable":
+        """Return the difference of two of the inputs `names`."""
+        for name in (plus, minus):
+            if name not in names:
+                raise InputError(f"difference {plus}-{minus}: no input is named {name!r}; there are {', '.join(names)}")
+        return cls(f"{plus}-{minus}", ((names.index(plus), 1.0), (names.index(minus), -1.0)))
+
+    def written(self) -> str:
+        """Return the name, in brackets where a product needs them."""
+        return f"({self.name})" if len(self.weights) > 1 else self.name
+
+
+@dataclass(frozen=True)
+class TermTable:
+    """Evaluates terms for readings, one or many at once.
+
+    Parameters
+    ----------
+    n_inputs : int
+    variables : tuple of Variable
+    terms : tuple of Term
+    """
+
+    n_inputs: int
+    variables: tuple[Variable, ...]
+    terms: tuple[Term, ...]
+
+    def __post_init__(self) -> None:
+        for v in self.variables:
+            if any(not 0 <= i < self.n_inputs for i, _ in v.weights):
+                raise InputError(f"variable {v.name}: refers to an input beyond the {self.n_inputs} given")
+        for t in self.terms:
+            if not t or any(not 0 <= i < len(self.variables) for i in t):
+                raise InputError(f"term {t}: refers to a variable beyond the {len(self.variables)} given")
+
+    @cached_property
+    def _mixing(self) -> FloatArray | None:
+        """Matrix (n_inputs, n_variables), or None where the variables are the inputs themselves."""
+        if [v.weights for v in self.variables] == [((i, 1.0),) for i in range(self.n_inputs)]:
+            return None
+        matrix = np.zeros((self.n_inputs, len(self.variables)))
+        for column, v in enumerate(self.variables):
+            for row, weight in v.weights:
+                matrix[row, column] = weight
+        return matrix
+
+    @cached_property
+    def _is_identity(self) -> bool:
+        return self.terms == tuple((i,) for i in range(len(self.variables)))
+
+    @cached_property
+    def _factors(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Per degree: which terms reach it, and the variable they multiply by there."""
+        by_degree = []
+        for k in range(max((len(t) for t in self.terms), default=0)):
+            rows = [i for i, t in enumerate(self.terms) if len(t) > k]
+            by_degree.append((np.array(rows, dtype=np.intp), np.array([self.terms[i][k] for i in rows], dtype=np.intp)))
+        return by_degree
+
+    def evaluate(self, change: FloatArray) -> FloatArray:
+        """Return the terms' values.
+
+        Parameters
+        ----------
+        change : ndarray of shape (..., n_inputs)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (..., n_terms)
+        """
+        values = change if self._mixing is None else change @ self._mixing
+        if self._is_identity:
+            return values
+        out: FloatArray | None = None
+        for rows, factors in self._factors:
+            if out is None:
+                out = values[..., factors]
+            elif rows.size == out.shape[-1]:
+                out *= values[..., factors]
+            else:
+                out[..., rows] *= values[..., factors]
+        return np.empty((*change.shape[:-1], 0)) if out is None else out
+
+    def names(self) -> tuple[str, ...]:
+        """Return the terms as text, such as ``T2*(T6-T7)``."""
+        return tuple("*".join(self.variables[i].written() for i in t) for t in self.terms)
+
+    def inputs_of(self, term: int) -> set[int]:
+        """Return the indices of the inputs that a term needs."""
+        return {i for v in self.terms[term] for i, _ in self.variables[v].weights}
+
+
+def second_order_terms(n_variables: int) -> tuple[Term, ...]:
+    """Return every linear, square and product term of `n_variables` variables: n + n(n+1)/2 of them (C-09, C-10)."""
+    linear = [(i,) for i in range(n_variables)]
+    squares = [(i, i) for i in range(n_variables)]
+    products = [(i, j) for i in range(n_variables) for j in range(i + 1, n_variables)]
+    return (*linear, *squares, *products)

@@ -1,0 +1,119 @@
+"""Thermal cycles: a run of the spindle and the stop that follows it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import RecordingError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Rows ``start`` to ``stop - 1`` of a recording.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``2 (2500 1/min)``.
+    start, stop : int
+        First row, and the row after the last.
+    """
+
+    name: str
+    start: int
+    stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+
+def find_cycles(
+    time: FloatArray, speed: FloatArray, *, min_run: float = 300.0, min_stop: float = 300.0
+) -> tuple[Cycle, ...]:
+    """Split a test into thermal cycles by its spindle speed.
+
+    A cycle begins where the spindle starts after a stop; it ends where the next one begins. Rows before the first run
+    belong to the first cycle.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    speed : ndarray of shape (n_rows,)
+        [1/min]; nan counts as the last known speed.
+    min_run, min_stop : float
+        Shorter runs and stops (a tool change, a dropped reading) do not split [s].
+
+    Returns
+    -------
+    tuple of Cycle
+        One cycle that covers everything if the spindle never starts anew.
+    """
+    known = np.isfinite(speed)
+    if not known.any():
+        return whole(len(time))
+    last_known = np.maximum.accumulate(np.where(known, np.arange(len(speed)), 0))
+    filled = np.abs(np.nan_to_num(speed[last_known]))
+    top = filled.max()
+    if top == 0:
+        return whole(len(time))
+    turning = filled > 0.02 * top
+    turning = _drop_short(time, turning, state=False, shorter_than=min_stop)
+    turning = _drop_short(time, turning, state=True, shorter_than=min_run)
+    starts = [int(k) + 1 for k in np.flatnonzero(~turning[:-1] & turning[1:])]
+    if turning[0] or not starts:
+        starts.insert(0, 0)
+    starts[0] = 0
+    stops = [*starts[1:], len(time)]
+    cycles = []
+    for number, (a, b) in enumerate(zip(starts, stops, strict=True), start=1):
+        running = filled[a:b][turning[a:b]]
+        speeds = np.unique(np.round(running)) if running.size else np.array([0.0])
+        # a measured speed jitters: more than a handful of values is told as a range
+        text = (
+            f"{np.median(running):.0f}"
+            if running.size and np.ptp(running) <= 0.05 * top
+            else (f"{speeds.min():.0f}-{speeds.max():.0f}")
+        )
+        cycles.append(Cycle(f"{number} ({text} 1/min)", a, b))
+    return tuple(cycles)
+
+
+def whole(n_rows: int, name: str = "whole test") -> tuple[Cycle, ...]:
+    """Return one cycle that covers everything."""
+    return (Cycle(name, 0, n_rows),)
+
+
+def given_cycles(labels: Sequence[object]) -> tuple[Cycle, ...]:
+    """Split by a column of labels: each stretch of equal labels is a cycle.
+
+    Raises
+    ------
+    RecordingError
+        A label comes back after another one.
+    """
+    text = [f"{v:g}" if isinstance(v, float) else str(v) for v in labels]
+    starts = [0, *(k for k in range(1, len(text)) if text[k] != text[k - 1])]
+    names = [text[k] for k in starts]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise RecordingError(
+                f"cycle {name!r} comes back at row {starts[k]} after another cycle: rename one of them"
+            )
+    return tuple(Cycle(n, a, b) for n, a, b in zip(names, starts, [*starts[1:], len(text)], strict=True))
+
+
+def _drop_short(time: FloatArray, turning: NDArray[np.bool_], *, state: bool, shorter_than: float) -> NDArray[np.bool_]:
+    """Return `turning` with the stretches of `state` that are too short turned over; the first and last one stay."""
+    edges = np.flatnonzero(np.diff(turning)) + 1
+    bounds = [0, *edges.tolist(), len(turning)]
+    out = turning.copy()
+    for a, b in pairwise(bounds[1:-1]):
+        if turning[a] == state and time[b] - time[a] < shorter_than:
+            out[a:b] = not state
+    return out

@@ -1,0 +1,121 @@
+"""`Recording`: the synchronised table of one test, with units, roles and thermal cycles."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import PurePath
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.recording.cycles import Cycle
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One test: what the sensors and the displacement probes said, row by row.
+
+    Parameters
+    ----------
+    name : str
+        What the test is called; mostly the file's name without its ending.
+    time : ndarray of shape (n_rows,)
+        Seconds since the first row [s], strictly rising.
+    table : DataFrame of shape (n_rows, n_channels)
+        One float column per channel, in house units; nan where a value is missing.
+    channels : tuple of Channel
+        One per column of `table`, in its order.
+    cycles : tuple of Cycle
+        Thermal cycles; together they cover all rows. Several cycles or one.
+    source : str
+        File it was read from; empty if it never was in a file.
+    sha256 : str
+        Hash of that file.
+    start : str
+        ISO timestamp of the first row; empty if the file has only relative times.
+    aliases : mapping of str to str
+        Other names a channel answers to: the file's own heading, the name without its unit.
+    notes : tuple of str
+        What the reader did that a user should know.
+    """
+
+    name: str
+    time: FloatArray
+    table: pd.DataFrame
+    channels: tuple[Channel, ...]
+    cycles: tuple[Cycle, ...]
+    source: str = ""
+    sha256: str = ""
+    start: str = ""
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.time) != len(self.table):
+            raise RecordingError(f"{self.name}: {len(self.time)} times for {len(self.table)} rows")
+        if list(self.table.columns) != [c.name for c in self.channels]:
+            raise RecordingError(f"{self.name}: table columns and channels differ")
+        if len(self.time) > 1 and not (np.diff(self.time) > 0).all():
+            row = int(np.flatnonzero(~(np.diff(self.time) > 0))[0]) + 1
+            raise RecordingError(f"{self.name}: time does not rise at row {row}")
+        covered = [row for c in self.cycles for row in (c.start, c.stop)]
+        if covered != sorted(covered) or covered[:1] != [0] or covered[-1:] != [len(self.time)]:
+            raise RecordingError(f"{self.name}: cycles {self.cycles} do not cover the {len(self.time)} rows")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def of_quantity(self, quantity: str) -> tuple[Channel, ...]:
+        """Return the channels that measure `quantity`, in the order of the table."""
+        return tuple(c for c in self.channels if c.quantity == quantity)
+
+    @property
+    def temperatures(self) -> tuple[Channel, ...]:
+        """Temperature channels [degC]."""
+        return self.of_quantity("temperature")
+
+    @property
+    def displacements(self) -> tuple[Channel, ...]:
+        """Displacement channels [um]."""
+        return self.of_quantity("displacement")
+
+    @property
+    def speed(self) -> Channel | None:
+        """The spindle speed [1/min], if recorded."""
+        found = self.of_quantity("spindle_speed")
+        return found[0] if found else None
+
+    def channel(self, name: str) -> Channel:
+        """Find a channel by its name, the file's own heading, or its name without the unit.
+
+        Raises
+        ------
+        InputError
+            There is none; the message names the nearest.
+        """
+        wanted = self.aliases.get(name, name)
+        for c in self.channels:
+            if c.name == wanted:
+                return c
+        names = [c.name for c in self.channels]
+        near = get_close_matches(name, names, n=3, cutoff=0.4)
+        hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(names)}"
+        raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
+
+    def values(self, channels: Sequence[Channel]) -> FloatArray:
+        """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
+        return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
+
+    def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":
+        """Return the same recording, split into other cycles."""
+        return replace(self, cycles=tuple(cycles))
+
+    @property
+    def sampling_interval(self) -> float:
+        """Median time between two rows [s]; nan for a single row."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else float("nan")

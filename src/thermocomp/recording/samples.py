@@ -1,0 +1,201 @@
+"""`Samples`: several tests stacked into the arrays that models are fitted to and replayed on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.core.model import Input
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Rows of one or several tests.
+
+    Parameters
+    ----------
+    inputs : tuple of Channel
+        What models may use; never a displacement.
+    targets : tuple of Channel
+        What they shall predict.
+    values : ndarray of shape (n_rows, n_inputs)
+        Inputs as recorded, in house units.
+    deviations : ndarray of shape (n_rows, n_targets)
+        Targets, in house units.
+    time : ndarray of shape (n_rows,)
+        Seconds since the start of the row's test [s].
+    test, cycle, row : ndarray of int of shape (n_rows,)
+        Index into `test_names`, index into `cycle_names`, row in the file's table.
+    test_names, cycle_names : tuple of str
+    hashes : tuple of str
+        SHA-256 of each test's file.
+    rezero : bool
+        Temperatures are counted from the first row of each test.
+    """
+
+    inputs: tuple[Channel, ...]
+    targets: tuple[Channel, ...]
+    values: FloatArray
+    deviations: FloatArray
+    time: FloatArray
+    test: IntArray
+    cycle: IntArray
+    row: IntArray
+    test_names: tuple[str, ...]
+    cycle_names: tuple[str, ...]
+    hashes: tuple[str, ...]
+    rezero: bool = True
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def valid(self) -> BoolArray:
+        """Rows in which every input is a finite number."""
+        return np.asarray(np.isfinite(self.values).all(axis=1))
+
+    @property
+    def rezeroed(self) -> BoolArray:
+        """Inputs that are counted from the start of their test."""
+        return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
+
+    def reference(self) -> FloatArray:
+        """Return what counts as zero, (n_tests, n_inputs): each test's first complete row, or 0 for absolute inputs."""
+        zero = np.zeros((len(self.test_names), len(self.inputs)))
+        for k in range(len(self.test_names)):
+            rows = np.flatnonzero((self.test == k) & self.valid)
+            if rows.size == 0:
+                names = ", ".join(c.name for c in self.inputs)
+                raise RecordingError(f"{self.test_names[k]}: no row has a number in all of the inputs {names}")
+            zero[k] = np.where(self.rezeroed, self.values[rows[0]], 0.0)
+        return zero
+
+    def change(self) -> FloatArray:
+        """Return inputs minus their reference, (n_rows, n_inputs)."""
+        return self.values - self.reference()[self.test]
+
+    def dt(self) -> FloatArray:
+        """Return the time since the previous row of the same test [s]; inf in each test's first row."""
+        steps = np.diff(self.time, prepend=np.inf)
+        steps[np.flatnonzero(np.diff(self.test, prepend=-1))] = np.inf
+        return steps
+
+    def take(self, rows: BoolArray | IntArray) -> "Samples":
+        """Return some of the rows, in their order."""
+        return Samples(
+            self.inputs,
+            self.targets,
+            self.values[rows],
+            self.deviations[rows],
+            self.time[rows],
+            self.test[rows],
+            self.cycle[rows],
+            self.row[rows],
+            self.test_names,
+            self.cycle_names,
+            self.hashes,
+            self.rezero,
+        )
+
+    def model_inputs(self, columns: Sequence[int], rows: BoolArray | IntArray) -> tuple[Input, ...]:
+        """Describe inputs for a model fitted to `rows`: reference and trained range of each."""
+        change = self.change()[rows]
+        zero = self.reference()[int(self.test[rows][0])]
+        return tuple(
+            Input(
+                name=self.inputs[j].name,
+                quantity=self.inputs[j].quantity,
+                unit=self.inputs[j].unit,
+                reference=float(zero[j]),
+                rezero=bool(self.rezeroed[j]),
+                low=float(np.nanmin(change[:, j])),
+                high=float(np.nanmax(change[:, j])),
+            )
+            for j in columns
+        )
+
+    def frame(self) -> pd.DataFrame:
+        """Return inputs minus reference as a table with the inputs' names."""
+        return pd.DataFrame(self.change(), columns=[c.name for c in self.inputs])
+
+
+def stack(
+    recordings: Sequence[Recording],
+    targets: Sequence[str],
+    inputs: Sequence[str] | None = None,
+    *,
+    rezero: bool = True,
+) -> Samples:
+    """Stack recordings of one machine.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        The tests; each keeps its own zero.
+    targets : sequence of str
+        Displacement channels to predict.
+    inputs : sequence of str, optional
+        Channels models may use; all temperatures and the spindle speed if not given.
+    rezero : bool
+        True: temperatures are counted from the start of each test (ISO 230-3); False: they are absolute.
+
+    Returns
+    -------
+    Samples
+
+    Raises
+    ------
+    InputError
+        A channel is missing in one of the recordings, or a displacement is asked for as an input.
+    """
+    if not recordings:
+        raise InputError("no recording given")
+    first = recordings[0]
+    target_channels = tuple(first.channel(name) for name in dict.fromkeys(targets))
+    if not target_channels:
+        raise InputError("no target given: name at least one displacement channel")
+    for c in target_channels:
+        if c.quantity not in ("displacement", "angle"):
+            raise InputError(f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle")
+    if inputs is None:
+        speed = first.speed
+        input_channels = first.temperatures + ((speed,) if speed is not None else ())
+    else:
+        input_channels = tuple(first.channel(name) for name in dict.fromkeys(inputs))
+    for c in input_channels:
+        if c.quantity in ("displacement", "angle"):
+            raise InputError(f"input {c.name} is a {c.quantity}: a machine in production has no displacement probe")
+    if not input_channels:
+        raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
+    names = [r.name for r in recordings]
+    if len(set(names)) != len(names):
+        names = [f"{n}#{k}" for k, n in enumerate(names, start=1)]
+    cycle_names = [
+        c.name if len(recordings) == 1 else f"{n}: {c.name}"
+        for n, r in zip(names, recordings, strict=True)
+        for c in r.cycles
+    ]
+    cycle = [k for k, c in enumerate(c for r in recordings for c in r.cycles) for _ in range(len(c))]
+    return Samples(
+        inputs=input_channels,
+        targets=target_channels,
+        values=np.concatenate([r.values([r.channel(c.name) for c in input_channels]) for r in recordings]),
+        deviations=np.concatenate([r.values([r.channel(c.name) for c in target_channels]) for r in recordings]),
+        time=np.concatenate([r.time for r in recordings]),
+        test=np.repeat(np.arange(len(recordings)), [len(r) for r in recordings]),
+        cycle=np.array(cycle, dtype=np.intp),
+        row=np.concatenate([np.arange(len(r)) for r in recordings]),
+        test_names=tuple(names),
+        cycle_names=tuple(cycle_names),
+        hashes=tuple(r.sha256 for r in recordings),
+        rezero=rezero,
+    )
