@@ -31,8 +31,10 @@ def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: 
     return memory + decay(dt, time_constants) * (signals - memory)
 
 
-def run(signals: FloatArray, dt: FloatArray, time_constants: FloatArray) -> FloatArray:
-    """Run a bank of lags over a recording that starts at rest.
+def run(
+    signals: FloatArray, dt: FloatArray, time_constants: FloatArray, memory: FloatArray | None = None
+) -> FloatArray:
+    """Run a bank of lags over a recording.
 
     Parameters
     ----------
@@ -41,16 +43,21 @@ def run(signals: FloatArray, dt: FloatArray, time_constants: FloatArray) -> Floa
         Time since the previous row [s]. A value of ``inf`` starts anew, at rest: the first row of each test.
     time_constants : ndarray of shape (n_lags,)
         [s]
+    memory : ndarray of shape (n_lags,), optional
+        Of the row before the first; at rest in the first row without it.
 
     Returns
     -------
     ndarray of shape (n_rows, n_lags)
     """
     out = np.empty_like(signals)
+    if np.isinf(dt).all():  # every row at rest by itself
+        out[:] = signals
+        return out
     steps, where = np.unique(dt, return_inverse=True)
     shares = decay(steps[:, None], time_constants)  # few distinct steps even in a long recording
-    memory = signals[0]
+    current = signals[0] if memory is None else memory
     for k in range(len(signals)):
-        memory = memory + shares[where[k]] * (signals[k] - memory)
-        out[k] = memory
+        current = current + shares[where[k]] * (signals[k] - current)
+        out[k] = current
     return out

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite, signed_sum
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
 
@@ -32,8 +32,6 @@ class LinearDynamic(ErrorModel):
         Of each lag [s].
     lagged : tuple of float
         Read-out of each lag.
-    intercept : float
-        Deviation at the reference state.
     """
 
     family: ClassVar[str] = "linear-dynamic"
@@ -43,7 +41,6 @@ class LinearDynamic(ErrorModel):
     lag_signals: tuple[int, ...]
     time_constants: tuple[float, ...]
     lagged: tuple[float, ...]
-    intercept: float = 0.0
 
     def _check(self) -> None:
         owner = f"model of {self.target}"
@@ -94,10 +91,10 @@ class LinearDynamic(ErrorModel):
         used = {i for k in active for i in self._table.inputs_of(k)}
         return tuple(self.inputs[i].name for i in sorted(used))
 
-    def formula(self) -> str:
-        """Return the model as one line of text; ``lag(s, 20 min)`` is a first-order lag."""
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return the coefficient of each signal and each lag; ``lag(s, 20 min)`` is a first-order lag."""
         names = self._table.names()
-        parts = list(zip(self.direct, names, strict=True))
+        found = {n: c for n, c in zip(names, self.direct, strict=True) if c != 0}
         for k, tau, c in zip(self.lag_signals, self.time_constants, self.lagged, strict=True):
-            parts.append((c, f"lag({names[k]}, {tau / 60:.4g} min)"))
-        return signed_sum(parts, self.intercept)
+            found[f"lag({names[k]}, {tau / 60:.4g} min)"] = c
+        return found

@@ -164,6 +164,8 @@ class ErrorModel(ABC):
         Unit of the deviation it gives: um, urad, um/m.
     inputs : tuple of Input
         What it wants to know, in this order.
+    intercept : float
+        Deviation in the reference state [unit].
     support : Support
         What it does outside its trained range.
     provenance : Provenance or None
@@ -177,6 +179,7 @@ class ErrorModel(ABC):
     target: str
     unit: str
     inputs: tuple[Input, ...]
+    intercept: float = 0.0
     support: Support = Support()
     provenance: Provenance | None = None
     honest_error: HonestError | None = None
@@ -202,8 +205,8 @@ class ErrorModel(ABC):
         """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
 
     @abstractmethod
-    def formula(self) -> str:
-        """Return the model as one line of text."""
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return the coefficient of each term of `formula`."""
 
     @property
     @abstractmethod
@@ -296,19 +299,17 @@ class ErrorModel(ABC):
         span = np.array([i.high - i.low for i in self.inputs]) * self.support.fade_over
         return np.where(span > 0, span, np.finfo(np.float64).tiny)
 
+    def formula(self) -> str:
+        """Return the model as one line of text."""
+        text = f"{self.intercept:.6g}" if self.intercept else ""
+        for name, coefficient in self.coefficients_by_name().items():
+            text += f" {'-' if coefficient < 0 else '+'} {abs(coefficient):.6g} {name}"
+        return text.removeprefix(" + ").strip() or "0"
+
     @property
     def accepted(self) -> bool:
         """True if the do-no-harm gate has let this model pass."""
         return self.honest_error is not None and self.honest_error.verdict == "accepted"
-
-
-def signed_sum(parts: list[tuple[float, str]], intercept: float) -> str:
-    """Write ``coefficient * name`` parts as a sum a person can read."""
-    text = f"{intercept:.6g}" if intercept else ""
-    for coefficient, name in parts:
-        sign = "-" if coefficient < 0 else "+"
-        text += f" {sign} {abs(coefficient):.6g} {name}"
-    return text.removeprefix(" + ").strip() or "0"
 
 
 def check_finite(owner: str, **numbers: Any) -> None:

@@ -7,13 +7,15 @@ from typing import ClassVar
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite, signed_sum
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
 
 @dataclass(frozen=True, kw_only=True)
 class Polynomial(ErrorModel):
     """Deviation = intercept + sum of coefficient * product of variables (Chen 1996, Eq. 4; C-09).
+
+    Chen's form has no intercept: the deviation is zero in the reference state.
 
     Parameters
     ----------
@@ -23,8 +25,6 @@ class Polynomial(ErrorModel):
         Each the indices of the variables it multiplies.
     coefficients : tuple of float
         One per term.
-    intercept : float
-        Deviation at the reference state; zero in Chen's form (C-09).
     """
 
     family: ClassVar[str] = "polynomial"
@@ -32,7 +32,6 @@ class Polynomial(ErrorModel):
     variables: tuple[Variable, ...]
     terms: tuple[Term, ...]
     coefficients: tuple[float, ...]
-    intercept: float = 0.0
 
     def _check(self) -> None:
         owner = f"model of {self.target}"
@@ -61,6 +60,6 @@ class Polynomial(ErrorModel):
         used = {i for k, c in enumerate(self.coefficients) if c != 0 for i in self._table.inputs_of(k)}
         return tuple(self.inputs[i].name for i in sorted(used))
 
-    def formula(self) -> str:
-        """Return the model as one line of text."""
-        return signed_sum(list(zip(self.coefficients, self._table.names(), strict=True)), self.intercept)
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return the coefficient of each term."""
+        return dict(zip(self._table.names(), self.coefficients, strict=True))

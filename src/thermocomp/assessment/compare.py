@@ -1,0 +1,296 @@
+"""Compare methods on unseen blocks: train, replay, judge."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment import harm, metrics
+from thermocomp.assessment.diagnostics import Collinearity, collinearity, effective_sample_size
+from thermocomp.assessment.replay import replay
+from thermocomp.assessment.robustness import Robustness, pooled, stress
+from thermocomp.assessment.splits import Protocol, Split
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import ErrorModel, Support
+from thermocomp.models.training import train
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: name of the block that holds all unseen cycles together
+ALL = "all unseen cycles"
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How one model did for one target on one unseen block.
+
+    Parameters
+    ----------
+    model, target, block : str
+    measured, predicted : ndarray of shape (n_judged,)
+        Deviations [um].
+    row, test, cycle : ndarray of int of shape (n_judged,)
+        Where the rows stand in their file, which file, which thermal cycle.
+    verdict : Verdict
+        Of the do-no-harm gate.
+    sensors : tuple of str
+        Inputs with an influence.
+    fit_s : float
+        The fits took [s].
+    n_effective : float
+        Independent rows the residual is worth.
+    robustness : Robustness or None
+    frozen : ErrorModel or None
+        The model that was replayed; None for several blocks together, or if it could not be fitted.
+    failure : str
+        Why the method could not be fitted; empty if it could.
+    overall : bool
+        It is the last word on this model and target: all that was judged, not one cycle of it.
+    """
+
+    model: str
+    target: str
+    block: str
+    measured: FloatArray
+    predicted: FloatArray
+    row: IntArray
+    test: IntArray
+    cycle: IntArray
+    verdict: harm.Verdict
+    sensors: tuple[str, ...]
+    fit_s: float
+    n_effective: float
+    robustness: Robustness | None = None
+    frozen: ErrorModel | None = None
+    failure: str = ""
+    overall: bool = False
+
+    def metric(self, name: str) -> float:
+        """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
+        return metrics.METRICS[name](self.measured, self.predicted) if not self.failure else float("nan")
+
+    def none_metric(self, name: str) -> float:
+        """Return the metric without compensation."""
+        return metrics.METRICS[name](self.measured, np.zeros_like(self.measured))
+
+    @property
+    def accepted(self) -> bool:
+        """True if the gate let it pass."""
+        return not self.failure and self.verdict.accepted
+
+    @property
+    def reason(self) -> str:
+        """Why it was accepted or refused."""
+        return f"could not be fitted: {self.failure}" if self.failure else self.verdict.reason
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Several methods on the same unseen blocks.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    assessments : tuple of Assessment
+        Per target, method and block; with several blocks also one for all of them together.
+    collinearity : Collinearity
+        Of the temperatures.
+    """
+
+    protocol: Protocol
+    assessments: tuple[Assessment, ...]
+    collinearity: Collinearity
+
+    def overall(self) -> tuple[Assessment, ...]:
+        """Return one assessment per target and method: over all its blocks."""
+        return tuple(a for a in self.assessments if a.overall)
+
+    def best(self, target: str) -> Assessment | None:
+        """Return the accepted assessment with the smallest RMS for a target."""
+        fit = [a for a in self.overall() if a.target == target and a.accepted]
+        return min(fit, key=lambda a: a.metric("rms"), default=None)
+
+
+def compare(
+    samples: Samples,
+    methods: Sequence[str],
+    protocol: Protocol,
+    *,
+    support: Support = Support(),
+    robustness: bool = True,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Train every method for every target and judge it on what it has not seen.
+
+    Parameters
+    ----------
+    samples : Samples
+    methods : sequence of str
+    protocol : Protocol
+        What is learned from and what is judged.
+    support : Support
+        What the models do outside their trained range.
+    robustness : bool
+        Also replay with noise and lost sensors.
+    progress : callable
+        Called with a line of text before each piece of work; there are `n_jobs` of them.
+
+    Returns
+    -------
+    Comparison
+    """
+    found: list[Assessment] = []
+    for target in range(len(samples.targets)):
+        for name in dict.fromkeys(methods):
+            parts = []
+            for split in protocol.splits:
+                progress(f"{samples.targets[target].name} {name} {split.block}")
+                parts.append(_assess_method(samples, name, target, split, support, robustness))
+            found += parts if len(parts) > 1 else []
+            found.append(_together(parts))
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    values = samples.change()[samples.valid][:, temperatures]
+    names = tuple(samples.inputs[j].name for j in temperatures)
+    return Comparison(protocol, tuple(found), collinearity(values, names))
+
+
+def n_jobs(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:
+    """Return the number of pieces of work of `compare`."""
+    return len(samples.targets) * len(dict.fromkeys(methods)) * len(protocol.splits)
+
+
+def judge(
+    name: str, model: ErrorModel, samples: Samples, split: Split, *, fit_s: float = 0.0, robustness: bool = True
+) -> Assessment:
+    """Judge a frozen model on a block.
+
+    Parameters
+    ----------
+    name : str
+        What to call the model.
+    model : ErrorModel
+    samples : Samples
+        With all of the model's inputs, and its target.
+    split : Split
+        Only its block is looked at.
+    fit_s : float
+        The fit took [s].
+    robustness : bool
+        Also replay with noise and lost sensors.
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InputError
+        The target has no number in the block.
+    """
+    target = [c.name for c in samples.targets].index(model.target)
+    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    if not rows.any():
+        raise InputError(f"{split.block}: {model.target} has no number there to judge against")
+    measured = samples.deviations[rows, target]
+    stressed = stress(model, samples, measured, rows) if robustness else None
+    predicted = stressed.predicted if stressed else replay(model, samples, rows)[0]
+    return Assessment(
+        model=name,
+        target=model.target,
+        block=split.block,
+        measured=measured,
+        predicted=predicted,
+        row=samples.row[rows],
+        test=samples.test[rows],
+        cycle=samples.cycle[rows],
+        verdict=harm.judge(measured, predicted, list(_segments(samples, rows))),
+        sensors=model.sensors,
+        fit_s=fit_s,
+        n_effective=effective_sample_size(measured - predicted),
+        robustness=stressed.robustness if stressed else None,
+        frozen=model,
+    )
+
+
+def per_cycle(whole: Assessment) -> list[Assessment]:
+    """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
+    found = []
+    for verdict, k in zip(whole.verdict.cycles, np.unique(whole.cycle), strict=True):
+        rows = whole.cycle == k
+        measured, predicted = whole.measured[rows], whole.predicted[rows]
+        found.append(
+            replace(
+                whole,
+                block=f"cycle {verdict.cycle}",
+                measured=measured,
+                predicted=predicted,
+                row=whole.row[rows],
+                test=whole.test[rows],
+                cycle=whole.cycle[rows],
+                verdict=harm.Verdict((verdict,), whole.verdict.level),
+                n_effective=effective_sample_size(measured - predicted),
+                robustness=None,
+                overall=False,
+            )
+        )
+    return found
+
+
+def _assess_method(
+    samples: Samples, name: str, target: int, split: Split, support: Support, robustness: bool
+) -> Assessment:
+    try:
+        trained = train(name, samples, target, split.learn, support=support)
+    except FitError as e:
+        rows = split.judge & np.isfinite(samples.deviations[:, target])
+        measured = samples.deviations[rows, target]
+        return Assessment(
+            model=name,
+            target=samples.targets[target].name,
+            block=split.block,
+            measured=measured,
+            predicted=np.zeros_like(measured),
+            row=samples.row[rows],
+            test=samples.test[rows],
+            cycle=samples.cycle[rows],
+            verdict=harm.Verdict((), harm.LEVEL),
+            sensors=(),
+            fit_s=0.0,
+            n_effective=float("nan"),
+            failure=str(e),
+        )
+    return judge(name, trained.model, samples, split, fit_s=trained.seconds, robustness=robustness)
+
+
+def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
+    cycle = samples.cycle[rows]
+    for k in np.unique(cycle):
+        yield samples.cycle_names[k], cycle == k
+
+
+def _together(parts: Sequence[Assessment]) -> Assessment:
+    if len(parts) == 1:
+        return replace(parts[0], overall=True)
+    first = parts[0]
+    failures = [a.failure for a in parts if a.failure]
+    return replace(
+        first,
+        block=ALL,
+        measured=np.concatenate([a.measured for a in parts]),
+        predicted=np.concatenate([a.predicted for a in parts]),
+        row=np.concatenate([a.row for a in parts]),
+        test=np.concatenate([a.test for a in parts]),
+        cycle=np.concatenate([a.cycle for a in parts]),
+        verdict=harm.Verdict(tuple(c for a in parts for c in a.verdict.cycles), first.verdict.level),
+        sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
+        fit_s=sum(a.fit_s for a in parts),
+        n_effective=sum(a.n_effective for a in parts),
+        robustness=pooled([(a.robustness, len(a.measured)) for a in parts]),
+        frozen=None,
+        failure=failures[0] if failures else "",
+        overall=True,
+    )

@@ -1,0 +1,151 @@
+"""The do-no-harm gate: a model that is not surely better than no compensation is refused."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: a stretch shorter than this says nothing about a cycle
+MIN_ROWS = 5
+#: confidence of the bound
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class CycleVerdict:
+    """What the gate found in one unseen cycle (or the part of it that was judged).
+
+    Parameters
+    ----------
+    cycle : str
+    rms, none_rms : float
+        Of the residual, and without compensation [um].
+    ratio : float
+        RMS over RMS without compensation.
+    ratio_bound : float
+        Upper bound of the ratio by block bootstrap.
+    """
+
+    cycle: str
+    rms: float
+    none_rms: float
+    ratio: float
+    ratio_bound: float
+
+    @property
+    def passed(self) -> bool:
+        """True if the model is better than none even at the bound."""
+        return self.ratio_bound < 1.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The gate's decision over several cycles."""
+
+    cycles: tuple[CycleVerdict, ...]
+    level: float
+
+    @property
+    def accepted(self) -> bool:
+        """True if every cycle passed."""
+        return bool(self.cycles) and all(c.passed for c in self.cycles)
+
+    @property
+    def word(self) -> str:
+        """``accepted`` or ``refused``."""
+        return "accepted" if self.accepted else "refused"
+
+    @property
+    def reason(self) -> str:
+        """Why, in one sentence, by the worst cycle."""
+        if not self.cycles:
+            return "nothing was judged"
+        worst = max(self.cycles, key=lambda c: c.ratio_bound)
+        if not np.isfinite(worst.rms):
+            return f"fewer than {MIN_ROWS} rows of {worst.cycle} to judge on"
+        figures = f"RMS {worst.rms:.2f} um, {worst.none_rms:.2f} um without compensation"
+        if self.accepted:
+            return f"better than none in every unseen cycle; least in {worst.cycle}: {figures}"
+        if worst.ratio >= 1:
+            return f"worse than none in {worst.cycle}: {figures}"
+        return (
+            f"not surely better than none in {worst.cycle}: {figures}, "
+            f"ratio up to {worst.ratio_bound:.2f} at {self.level:.0%}"
+        )
+
+
+def judge(
+    measured: FloatArray,
+    predicted: FloatArray,
+    segments: Sequence[tuple[str, BoolArray]],
+    *,
+    level: float = LEVEL,
+    draws: int = 1000,
+    seed: int = 0,
+) -> Verdict:
+    """Decide whether a model may be used.
+
+    In every segment the ratio of the RMS with and without compensation is bounded from above by a circular block
+    bootstrap (Politis, Romano 1992): rows of a thermal cycle depend on each other, so whole stretches are drawn. The
+    stretches are as long as twice the correlation time of the squared residual, at most a fifth of the segment.
+
+    Parameters
+    ----------
+    measured, predicted : ndarray of shape (n_rows,)
+        Deviations [um].
+    segments : sequence of (name, ndarray of bool of shape (n_rows,))
+        The unseen cycles.
+    level : float
+        Confidence of the bound.
+    draws : int
+        Number of bootstrap draws.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    Verdict
+    """
+    found = []
+    for name, rows in segments:
+        if rows.sum() < MIN_ROWS:
+            # said, not skipped: so short a stretch proves nothing, and what is not proven is refused
+            found.append(CycleVerdict(name, float("nan"), float("nan"), float("nan"), float("inf")))
+            continue
+        residual, none = (measured - predicted)[rows] ** 2, measured[rows] ** 2
+        bound = _ratio_bound(residual, none, level, draws, np.random.default_rng(seed))
+        rms, none_rms = float(np.sqrt(residual.mean())), float(np.sqrt(none.mean()))
+        found.append(CycleVerdict(name, rms, none_rms, rms / none_rms if none_rms > 0 else np.inf, bound))
+    return Verdict(tuple(found), level)
+
+
+def _ratio_bound(residual: FloatArray, none: FloatArray, level: float, draws: int, rng: np.random.Generator) -> float:
+    n = len(residual)
+    length = _block_length(residual)
+    blocks = -(-n // length)
+    starts = rng.integers(0, n, (draws, blocks))
+    sums = []
+    for squares in (residual, none):
+        running = np.concatenate([[0.0], np.cumsum(np.concatenate([squares, squares[:length]]))])
+        sums.append((running[starts + length] - running[starts]).sum(axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.sqrt(sums[0] / sums[1])
+    ratios[~np.isfinite(ratios)] = np.inf
+    return float(np.quantile(ratios, level, method="higher"))
+
+
+def _block_length(squares: FloatArray) -> int:
+    """Return twice the lag at which the autocorrelation falls below 1/e, at most a fifth of the rows."""
+    n = len(squares)
+    centred = squares - squares.mean()
+    longest = max(1, n // 5)
+    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+    correlation = np.fft.irfft(power)[: longest + 1]
+    if correlation[0] <= 0:
+        return longest
+    below = np.flatnonzero(correlation < correlation[0] / np.e)
+    return min(longest, 2 * int(below[0])) if below.size else longest

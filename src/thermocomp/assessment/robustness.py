@@ -1,0 +1,153 @@
+"""What noise and a lost sensor do to a model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment.replay import replay
+from thermocomp.core.model import ErrorModel
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Errors of a model that is replayed with disturbed readings.
+
+    Parameters
+    ----------
+    noise : float
+        Noise on every temperature [degC].
+    noise_rms : dict of str to tuple of float
+        Per noise law: mean and largest RMS over the draws [um].
+    lost_rms : dict of str to float
+        RMS with one sensor cut off [um].
+    outside : float
+        Share of rows with an input outside the trained range.
+    outside_rms : float
+        RMS in these rows [um]; nan without any.
+    """
+
+    noise: float
+    noise_rms: dict[str, tuple[float, float]]
+    lost_rms: dict[str, float]
+    outside: float
+    outside_rms: float
+
+    @property
+    def worst_lost(self) -> tuple[str, float]:
+        """The sensor whose loss hurts most, and the RMS without it [um]."""
+        return max(self.lost_rms.items(), key=lambda item: item[1], default=("", float("nan")))
+
+
+def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
+    """Pool several blocks, each with its number of rows; None if one of them was not stressed.
+
+    RMS values are pooled as the root of the mean square; the largest over the draws stays the largest.
+    """
+    known = [(r, n) for r, n in parts if r is not None]
+    if not known or len(known) < len(parts):
+        return None
+
+    def mean_square(values: Sequence[float], weights: Sequence[float]) -> float:
+        total = sum(weights)
+        return float(np.sqrt(sum(w * v**2 for v, w in zip(values, weights, strict=True)) / total)) if total else np.nan
+
+    rows = [n for _, n in known]
+    first = known[0][0]
+    beyond = [(r.outside_rms, r.outside * n) for r, n in known if r.outside > 0]
+    return Robustness(
+        noise=first.noise,
+        noise_rms={
+            law: (
+                mean_square([r.noise_rms[law][0] for r, _ in known], rows),
+                max(r.noise_rms[law][1] for r, _ in known),
+            )
+            for law in first.noise_rms
+        },
+        lost_rms={
+            name: mean_square(
+                [r.lost_rms[name] for r, _ in known if name in r.lost_rms],
+                [n for r, n in known if name in r.lost_rms],
+            )
+            for name in dict.fromkeys(s for r, _ in known for s in r.lost_rms)
+        },
+        outside=sum(r.outside * n for r, n in known) / sum(rows),
+        outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
+    )
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A clean prediction and what disturbances make of it."""
+
+    predicted: FloatArray
+    outside: BoolArray
+    robustness: Robustness
+
+
+def stress(
+    model: ErrorModel,
+    samples: Samples,
+    measured: FloatArray,
+    rows: BoolArray,
+    *,
+    noise: float = 0.4,
+    draws: int = 100,
+    seed: int = 0,
+) -> Replayed:
+    """Replay a model once, clean and disturbed side by side.
+
+    - Noise on every temperature, independent from row to row (C-33). The paper gives a level and no law (E-C9), so both
+      are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
+    - Each sensor cut off: its change reads zero from the start on (C-34), the worst way to fail: nothing notices.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    measured : ndarray of shape (n_wanted,)
+        Deviations in `rows` [um].
+    rows : ndarray of bool of shape (n_rows,)
+        Rows to judge.
+    noise : float
+        [degC]
+    draws : int
+        Number of noise draws of each law.
+    seed : int
+        Of the noise.
+
+    Returns
+    -------
+    Replayed
+    """
+    temperatures = np.array([i.quantity == "temperature" for i in model.inputs])
+    lost = [k for k, i in enumerate(model.inputs) if i.name in model.sensors]
+    rng = np.random.default_rng(seed)
+    n_inputs = len(model.inputs)
+
+    def disturb(reading: FloatArray, reference: FloatArray) -> FloatArray:
+        batch = np.broadcast_to(reading, (1 + 2 * draws + len(lost), n_inputs)).copy()
+        batch[1 : 1 + draws, temperatures] += rng.uniform(-noise, noise, (draws, temperatures.sum()))
+        batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, noise, (draws, temperatures.sum()))
+        for variant, k in enumerate(lost, start=1 + 2 * draws):
+            batch[variant, k] = reference[k]
+        return batch
+
+    predicted, outside = replay(model, samples, rows, disturb)
+    squares = (measured[:, None] - predicted) ** 2
+    rms = np.sqrt(squares.mean(axis=0))
+    beyond = outside[:, 0]
+    laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
+    robustness = Robustness(
+        noise=noise,
+        noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
+        lost_rms={model.inputs[k].name: float(rms[1 + 2 * draws + i]) for i, k in enumerate(lost)},
+        outside=float(beyond.mean()),
+        outside_rms=float(np.sqrt(squares[beyond, 0].mean())) if beyond.any() else float("nan"),
+    )
+    return Replayed(predicted[:, 0], beyond, robustness)

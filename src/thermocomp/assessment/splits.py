@@ -1,0 +1,152 @@
+"""What is learned from and what is judged: rows, spans of time, thermal cycles or files, never at random."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.recording.samples import Samples
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """One training and the unseen block it is judged on.
+
+    Parameters
+    ----------
+    block : str
+        Name of the unseen block.
+    learn, judge : ndarray of bool of shape (n_rows,)
+    """
+
+    block: str
+    learn: BoolArray
+    judge: BoolArray
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How models are judged: one split or several.
+
+    Parameters
+    ----------
+    name : str
+        In words, for tables and reports.
+    splits : tuple of Split
+    """
+
+    name: str
+    splits: tuple[Split, ...]
+
+
+def by_rows(samples: Samples, train: float, test: float) -> Protocol:
+    """Learn from the first share of the rows, judge on the next.
+
+    Parameters
+    ----------
+    samples : Samples
+    train, test : float
+        Shares of all rows, such as 0.75 and 0.25.
+
+    Raises
+    ------
+    InputError
+        A share is not between 0 and 1, or their sum is above 1.
+    """
+    if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
+        raise InputError(f"split {train:g}/{test:g}: want two shares between 0 and 1 whose sum is at most 1")
+    n = len(samples)
+    first, stop = round(n * train), min(n, round(n * (train + test)))
+    return _consecutive(f"first {train:.0%} of the rows to learn, next {test:.0%} unseen", n, first, stop)
+
+
+def by_time(samples: Samples, train_s: float, test_s: float) -> Protocol:
+    """Learn from the first seconds of the recordings, judge on the next.
+
+    Time runs through the tests one after the other, without the breaks between them.
+
+    Parameters
+    ----------
+    samples : Samples
+    train_s, test_s : float
+        [s]
+    """
+    steps = samples.dt()
+    steps[np.isinf(steps)] = 0.0
+    elapsed = np.cumsum(steps)
+    first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
+    if not 0 < first < stop:
+        raise InputError(
+            f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last {elapsed[-1] / 3600:.2f} h in all"
+        )
+    name = f"first {train_s / 3600:g} h to learn, next {test_s / 3600:g} h unseen"
+    return _consecutive(name, len(samples), first, stop)
+
+
+def leave_one_cycle_out(samples: Samples) -> Protocol:
+    """Judge on each thermal cycle in turn, learn from all others.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two cycles.
+    """
+    n = len(samples.cycle_names)
+    if n < 2:
+        raise InputError(
+            "only one thermal cycle was found: leaving one out needs at least two. Give a spindle speed, a 'cycle' "
+            "column or several files; or judge by time with --split 0.75/0.25"
+        )
+    splits = [Split(f"cycle {samples.cycle_names[k]}", samples.cycle != k, samples.cycle == k) for k in range(n)]
+    return Protocol(f"leave one thermal cycle out ({n} cycles)", tuple(splits))
+
+
+def leave_one_file_out(samples: Samples) -> Protocol:
+    """Judge on each file in turn, learn from all others.
+
+    Raises
+    ------
+    InputError
+        There is only one file.
+    """
+    n = len(samples.test_names)
+    if n < 2:
+        raise InputError("leaving one file out needs at least two recordings")
+    splits = [Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k) for k in range(n)]
+    return Protocol(f"leave one file out ({n} files)", tuple(splits))
+
+
+def parse(text: str, samples: Samples) -> Protocol:
+    """Understand a split as written on the command line.
+
+    Parameters
+    ----------
+    text : str
+        Shares of the rows (``0.75/0.25``) or hours (``20h/8h``).
+    samples : Samples
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    parts = text.split("/")
+    try:
+        if len(parts) == 2 and all(p.strip().endswith("h") for p in parts):
+            hours = [float(p.strip().removesuffix("h")) for p in parts]
+            return by_time(samples, hours[0] * 3600, hours[1] * 3600)
+        if len(parts) == 2:
+            return by_rows(samples, float(parts[0]), float(parts[1]))
+    except ValueError:
+        pass
+    raise InputError(f"split {text!r}: write two shares of the rows such as 0.75/0.25, or hours such as 20h/8h")
+
+
+def _consecutive(name: str, n: int, first: int, stop: int) -> Protocol:
+    rows = np.arange(n)
+    if first < 1 or stop <= first:
+        raise InputError(f"{name}: leaves no row to learn from or none to judge on ({n} rows in all)")
+    return Protocol(name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop)),))

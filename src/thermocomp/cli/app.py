@@ -1,0 +1,63 @@
+"""The command line's door: one app, one place where errors become messages and exit codes."""
+
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App
+from rich.console import Console
+
+from thermocomp import __version__
+from thermocomp.cli import commands
+from thermocomp.core.exceptions import ThermocompError
+
+app = App(
+    name="thermocomp",
+    help="Thermal error compensation of machine tools: from temperature recordings to a validated model.",
+    version=__version__,
+    # every command returns its exit code; nothing but `main` leaves the process
+    result_action="return_value",
+)
+
+for command in (
+    commands.demo,
+    commands.simulate,
+    commands.check,
+    commands.fit,
+    commands.assess,
+    commands.compare,
+):
+    app.command(command)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        ``sys.argv[1:]`` if not given.
+
+    Returns
+    -------
+    int
+        0 done, 1 judged bad, 2 unusable input.
+    """
+    try:
+        code = app(None if arguments is None else list(arguments))
+    except ThermocompError as e:
+        Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {_plain(str(e))}", soft_wrap=True)
+        return 2
+    return code if isinstance(code, int) else 0
+
+
+def main() -> None:
+    """Entry point of the ``thermocomp`` command."""
+    sys.exit(run())
+
+
+def _plain(text: str) -> str:
+    return text.replace("[", r"\[")  # square brackets are markup to rich
+
+
+if __name__ == "__main__":
+    main()

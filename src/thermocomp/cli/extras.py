@@ -1,0 +1,28 @@
+"""Optional dependencies: a command whose extra is missing says what to install."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from thermocomp.core.exceptions import MissingExtraError
+
+#: top-level modules that each extra brings
+EXTRAS: dict[str, tuple[str, ...]] = {
+    "study": ("jinja2", "joblib", "matplotlib", "openpyxl", "pandas", "pyarrow", "scipy", "sklearn"),
+    "serve": ("fastapi", "uvicorn"),
+    "mqtt": ("aiomqtt",),
+    "opcua": ("asyncua",),
+    "onnx": ("onnx", "onnxruntime"),
+    "dask": ("dask", "distributed"),
+}
+
+
+@contextmanager
+def needs(extra: str) -> Iterator[None]:
+    """Turn a failing import of one of the extra's modules into a `MissingExtraError`."""
+    try:
+        yield
+    except ModuleNotFoundError as e:
+        missing = (e.name or "").split(".")[0]
+        if missing in EXTRAS[extra]:
+            raise MissingExtraError(extra, missing) from e
+        raise

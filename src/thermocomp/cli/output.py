@@ -1,0 +1,263 @@
+"""What the commands print: a table for people, JSON for machines."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from thermocomp.assessment.compare import Assessment, Comparison
+from thermocomp.assessment.study import Fitted, Judged
+from thermocomp.core.model import ErrorModel
+from thermocomp.recording.quality import Finding
+from thermocomp.recording.recording import Recording
+
+_SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
+
+
+def show_comparison(comparison: Comparison, report: Path | None, console: Console, *, as_json: bool) -> None:
+    """Print a comparison of methods on unseen blocks."""
+    if as_json:
+        content = {
+            "protocol": comparison.protocol.name,
+            "condition_number": comparison.collinearity.condition_number,
+            "results": [_result(a) for a in comparison.assessments],
+        }
+        _print_json(content, console)
+        return
+    console.print(f"Judged on: {comparison.protocol.name}")
+    console.print(_assessment_table(comparison.assessments))
+    for a in comparison.overall():
+        if not a.accepted:
+            console.print(f"[red]refused[/] {a.model} for {a.target}: {escape(a.reason)}")
+    for target in dict.fromkeys(a.target for a in comparison.assessments):
+        best = comparison.best(target)
+        if best is None:
+            console.print(f"[bold red]{target}: no model may be used[/]")
+        else:
+            console.print(
+                f"[bold green]{target}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
+                f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less)"
+            )
+    if report is not None:
+        console.print(f"Report: {report}")
+
+
+def show_fit(fitted: Fitted, path: Path, console: Console, *, as_json: bool) -> None:
+    """Print models that were fitted and written."""
+    if as_json:
+        models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
+        _print_json({"protocol": fitted.comparison.protocol.name, "file": str(path), "models": models}, console)
+        return
+    console.print(f"Judged on: {fitted.comparison.protocol.name}")
+    table = Table()
+    for heading in ("target", "sensors", "R2 of the fit", "unseen RMS [um]", "none RMS [um]", "verdict"):
+        table.add_column(heading, justify="left" if heading in ("target", "verdict") else "right")
+    for m, r2 in zip(fitted.models, fitted.r_squared, strict=True):
+        honest = m.honest_error
+        assert honest is not None
+        table.add_row(
+            m.target,
+            str(len(m.sensors)),
+            f"{r2:.4f}",
+            f"{honest.rms:.2f}",
+            f"{honest.none_rms:.2f}",
+            _verdict(honest.verdict),
+        )
+    console.print(table)
+    for m in fitted.models:
+        if m.honest_error is not None and not m.accepted:
+            console.print(f"[red]refused[/] {m.target}: {escape(m.honest_error.reason)}")
+    console.print(f"Model file: {path}")
+
+
+def show_assess(judged: Judged, console: Console, *, as_json: bool) -> None:
+    """Print how models did on recordings."""
+    if as_json:
+        _print_json({"seen_in_training": judged.seen, "results": [_result(a) for a in judged.assessments]}, console)
+        return
+    console.print(_assessment_table(judged.assessments))
+    table = Table(title="Robustness (RMS [um])")
+    for heading in ("target", "clean", "uniform noise", "normal noise", "worst lost sensor", "rows outside range"):
+        table.add_column(heading, justify="left" if heading == "target" else "right")
+    for a in judged.overall():
+        if a.robustness is not None:
+            name, lost = a.robustness.worst_lost
+            table.add_row(
+                a.target,
+                f"{a.metric('rms'):.2f}",
+                *(f"{a.robustness.noise_rms[law][0]:.2f}" for law in ("uniform", "normal")),
+                f"{lost:.2f} ({name})",
+                f"{100 * a.robustness.outside:.1f} %",
+            )
+    console.print(table)
+    for a in judged.overall():
+        console.print(f"{_verdict(_word(a))} {a.target}: {escape(a.reason)}")
+    if judged.seen:
+        console.print(f"[bold yellow]not an honest test:[/] a model was fitted to {', '.join(judged.seen)}")
+
+
+def show_check(
+    tests: Sequence[Recording], findings: Sequence[Sequence[Finding]], console: Console, *, as_json: bool
+) -> None:
+    """Print what recordings hold and what is wrong with them."""
+    if as_json:
+        content = [_recording(r, found) for r, found in zip(tests, findings, strict=True)]
+        _print_json({"recordings": content}, console)
+        return
+    for r, found in zip(tests, findings, strict=True):
+        hours = (r.time[-1] - r.time[0]) / 3600
+        console.print(
+            f"[bold]{escape(r.source or r.name)}[/]: {len(r)} rows, {hours:.2f} h, "
+            f"a row every {r.sampling_interval:g} s" + (f", from {r.start}" if r.start else "")
+        )
+        table = Table()
+        for heading in ("channel", "quantity", "unit", "smallest", "largest", "missing"):
+            table.add_column(heading, justify="right" if heading in ("smallest", "largest", "missing") else "left")
+        for c in r.channels:
+            values = r.table[c.name].to_numpy()
+            finite = values[np.isfinite(values)]
+            low, high = (f"{finite.min():.4g}", f"{finite.max():.4g}") if finite.size else ("", "")
+            table.add_row(escape(c.name), c.quantity, c.unit, low, high, str(len(values) - finite.size or ""))
+        console.print(table)
+        cycles = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
+        console.print(f"{len(r.cycles)} thermal cycle(s): {escape(cycles)}")
+        for note in r.notes:
+            console.print(f"[dim]note[/] {escape(note)}")
+        for f in found:
+            console.print(f"[{_SEVERITY[f.severity]}]{f.severity}[/] {escape(f.text)}")
+        if not found:
+            console.print("[green]nothing wrong found[/]")
+
+
+def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: Console, *, as_json: bool) -> None:
+    """Print what was recorded on the virtual machine."""
+    if as_json:
+        content = [{"file": str(p), **_recording(r, ())} for r, p in zip(tests, paths, strict=True)]
+        _print_json({"recordings": content}, console)
+        return
+    for r, p in zip(tests, paths, strict=True):
+        hours = (r.time[-1] - r.time[0]) / 3600
+        console.print(
+            f"{p}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
+            f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
+        )
+
+
+def _assessment_table(assessments: Sequence[Assessment]) -> Table:
+    table = Table()
+    left = ("target", "model", "unseen block", "verdict")
+    for heading in (*left[:3], "MAE", "RMS", "max", "none MAE", "none RMS", "less", "sensors", left[3]):
+        table.add_column(heading, justify="left" if heading in left else "right")
+    previous: Assessment | None = None
+    for a in assessments:
+        if previous is not None and (a.target, a.model) != (previous.target, previous.model):
+            table.add_section() if a.target != previous.target else None
+        table.add_row(
+            escape(a.target),
+            a.model,
+            escape(a.block),
+            *(f"{a.metric(m):.2f}" for m in ("mae", "rms", "max_abs")),
+            *(f"{a.none_metric(m):.2f}" for m in ("mae", "rms")),
+            f"{a.metric('reduction'):.0f} %",
+            str(len(a.sensors)),
+            _verdict(_word(a)),
+            style="bold"
+            if a.overall and assessments[0] is not a and previous is not None and not previous.overall
+            else "",
+        )
+        previous = a
+    table.caption = "MAE, RMS, max of the residual in um; 'none' is no compensation; 'less' is the fall of the RMS"
+    return table
+
+
+def _word(a: Assessment) -> str:
+    return "accepted" if a.accepted else "refused"
+
+
+def _verdict(word: str) -> str:
+    return f"[green]{word}[/]" if word == "accepted" else f"[red]{word}[/]"
+
+
+def _result(a: Assessment) -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "model": a.model,
+        "target": a.target,
+        "block": a.block,
+        "mae_um": a.metric("mae"),
+        "rms_um": a.metric("rms"),
+        "max_um": a.metric("max_abs"),
+        "peak_to_peak_um": a.metric("peak_to_peak"),
+        "none_mae_um": a.none_metric("mae"),
+        "none_rms_um": a.none_metric("rms"),
+        "none_peak_to_peak_um": a.none_metric("peak_to_peak"),
+        "reduction_pct": a.metric("reduction"),
+        "verdict": _word(a),
+        "reason": a.reason,
+        "sensors": list(a.sensors),
+        "n_sensors": len(a.sensors),
+        "fit_s": a.fit_s,
+        "n_rows": len(a.measured),
+        "n_effective": a.n_effective,
+    }
+    if a.robustness is not None:
+        r = a.robustness
+        content["robustness"] = {
+            "noise_degC": r.noise,
+            "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
+            "lost_sensor_rms_um": r.lost_rms,
+            "outside_range_pct": 100 * r.outside,
+            "outside_range_rms_um": r.outside_rms,
+        }
+    return content
+
+
+def _model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
+    honest = m.honest_error
+    return {
+        "target": m.target,
+        "unit": m.unit,
+        "family": m.family,
+        "formula": m.formula(),
+        "coefficients": m.coefficients_by_name(),
+        "intercept": m.intercept,
+        "r_squared": r_squared,
+        "sensors": list(m.sensors),
+        "unseen_rms_um": honest.rms if honest else None,
+        "none_rms_um": honest.none_rms if honest else None,
+        "verdict": honest.verdict if honest else None,
+        "reason": honest.reason if honest else None,
+    }
+
+
+def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
+    return {
+        "name": r.name,
+        "source": r.source,
+        "rows": len(r),
+        "sampling_interval_s": r.sampling_interval,
+        "channels": [{"name": c.name, "quantity": c.quantity, "unit": c.unit, "place": c.place} for c in r.channels],
+        "cycles": [{"name": c.name, "start": c.start, "stop": c.stop} for c in r.cycles],
+        "notes": list(r.notes),
+        "findings": [{"severity": f.severity, "kind": f.kind, "channel": f.channel, "text": f.text} for f in found],
+    }
+
+
+def _print_json(content: Any, console: Console) -> None:
+    # JSON has no nan and no infinity: what is not known is null
+    console.file.write(json.dumps(_nulled(content), indent=2, ensure_ascii=False) + "\n")
+
+
+def _nulled(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _nulled(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_nulled(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,360 @@
+"""`dynamic`: ridge regression on temperatures, their lagged copies and the lagged spindle speed."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core import lagbank
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.models import ridge
+from thermocomp.models.base import ThermalRegressor
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+MINUTE = 60.0
+
+#: sets of time constants that are tried for the copies of the temperatures [s]: none, one of minutes to hours, several
+TEMPERATURE_LAGS: tuple[tuple[float, ...], ...] = (
+    (),
+    (10 * MINUTE,),
+    (20 * MINUTE,),
+    (40 * MINUTE,),
+    (80 * MINUTE,),
+    (5 * MINUTE, 20 * MINUTE, 80 * MINUTE),
+    (10 * MINUTE, 40 * MINUTE, 160 * MINUTE),
+)
+#: the same for the spindle speed [s]
+SPEED_LAGS: tuple[tuple[float, ...], ...] = (
+    (10 * MINUTE,),
+    (30 * MINUTE,),
+    (90 * MINUTE,),
+    (5 * MINUTE, 20 * MINUTE, 80 * MINUTE),
+    (10 * MINUTE, 40 * MINUTE, 160 * MINUTE),
+    (3 * MINUTE, 10 * MINUTE, 30 * MINUTE, 100 * MINUTE, 300 * MINUTE),
+)
+#: ridge strengths that are tried, per row and in units of each feature's mean square
+STRENGTHS: tuple[float, ...] = tuple(float(10.0 ** (k / 2)) for k in range(-12, 5))
+
+_CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """One choice of time constants, and its columns in the table of all features."""
+
+    temperature_lags: tuple[float, ...]
+    speed_lags: tuple[float, ...]
+    columns: IntArray
+
+
+class DynamicRidge(ThermalRegressor):
+    """Ridge regression on temperatures, their lagged or high-passed copies, and the lagged spindle speed.
+
+    Temperature sensors and structure do not have the same time constants, and the heat at a bearing grows faster than
+    the speed; both are linear again in first-order lags of the temperatures, of the speed and of its square. Strength
+    of the ridge and the set of time constants are chosen by leaving out whole thermal cycles, one after the other,
+    inside the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
+    RMS is within one standard error of the smallest (the one-standard-error rule of Breiman et al. 1984).
+
+    Without `dt`, every row is taken to be a machine at rest in that state: all lags equal their signals.
+
+    Parameters
+    ----------
+    speed : sequence of str or int
+        Names (or indices) of the columns that are spindle speeds; the others are temperatures.
+    temperature_lags, speed_lags : sequence of sequence of float
+        Sets of time constants to choose from [s].
+    speed_powers : sequence of int
+        Powers of the speed that are lagged.
+    copies : {'high-passed', 'lagged'}
+        What the ridge shrinks: the temperature minus its lagged copy, or the lagged copy itself.
+    strengths : sequence of float
+        Ridge strengths to choose from.
+    rule : {'one-standard-error', 'minimum'}
+        How the strength is chosen.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+
+    Attributes
+    ----------
+    coef_ : ndarray of shape (n_features_used,)
+        Weights of the chosen features, see `feature_labels_`.
+    intercept_ : float
+    feature_labels_ : tuple of str
+    temperature_lags_, speed_lags_ : tuple of float
+        Chosen time constants [s].
+    strength_ : float
+        Chosen strength.
+    cv_rms_ : float
+        Mean over the cycles left out of their RMS, at the choice [unit of y].
+    chosen_by_ : str
+        What was left out to choose.
+    """
+
+    def __init__(
+        self,
+        *,
+        speed: Sequence[str | int] = (),
+        temperature_lags: Sequence[Sequence[float]] = TEMPERATURE_LAGS,
+        speed_lags: Sequence[Sequence[float]] = SPEED_LAGS,
+        speed_powers: Sequence[int] = (1, 2),
+        copies: Literal["high-passed", "lagged"] = "high-passed",
+        strengths: Sequence[float] = STRENGTHS,
+        rule: Literal["one-standard-error", "minimum"] = "one-standard-error",
+        fit_intercept: bool = False,
+    ) -> None:
+        self.speed = speed
+        self.temperature_lags = temperature_lags
+        self.speed_lags = speed_lags
+        self.speed_powers = speed_powers
+        self.copies = copies
+        self.strengths = strengths
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
+    ) -> "DynamicRidge":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        dt : array-like of shape (n_rows,), optional
+            Time since the previous row [s], ``inf`` in the first row of each test.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row. Rows with -1 drive the lags but are not learned from. Without it, five stretches
+            of equal length take the place of the cycles.
+
+        Returns
+        -------
+        DynamicRidge
+
+        Raises
+        ------
+        FitError
+            No row to learn from.
+        """
+        X, y = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        steps = _steps(dt, len(X))
+        folds, self.chosen_by_ = ridge.number_folds(cycle, len(X))
+        learn = folds >= 0
+        self.data_min_, self.data_max_ = X[learn].min(axis=0), X[learn].max(axis=0)
+        self._split_columns()
+        candidates = self._candidates()
+        moments = self._moments(X, y, steps, folds)
+        chosen, self.strength_, self.cv_rms_ = self._choose(candidates, moments)
+        self.temperature_lags_, self.speed_lags_ = chosen.temperature_lags, chosen.speed_lags
+        self._columns = chosen.columns
+        total = moments.sum(axis=0)
+        weights, intercepts = ridge.solve(ridge.part(total, chosen.columns), (self.strength_,), self.fit_intercept)
+        self.coef_, self.intercept_ = weights[:, 0], float(intercepts[0])
+        return self
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, dtype=np.float64, reset=False)
+        parts = [f[:, self._columns] @ self.coef_ + self.intercept_ for f in self._features(X, _steps(dt, len(X)))]
+        return np.concatenate(parts)
+
+    @property
+    def feature_labels_(self) -> tuple[str, ...]:
+        """Names of the features behind `coef_`."""
+        names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
+        labels = [names[i] for i in self._temperatures]
+        kind = "high-passed" if self.copies == "high-passed" else "lagged"
+        labels += [f"{names[i]} {kind} {tau / MINUTE:g} min" for tau in self._t_taus for i in self._temperatures]
+        labels += [
+            f"{names[i]}^{power} lagged {tau / MINUTE:g} min"
+            for tau in self._n_taus
+            for power in self.speed_powers
+            for i in self._speeds
+        ]
+        return tuple(labels[k] for k in self._columns)
+
+    def freeze(
+        self,
+        *,
+        target: str,
+        unit: str = "um",
+        inputs: Sequence[Input] | None = None,
+        support: Support = Support(),
+        provenance: Provenance | None = None,
+    ) -> LinearDynamic:
+        """Return the fitted model as plain numbers.
+
+        Parameters
+        ----------
+        target, unit : str
+            What it predicts.
+        inputs : sequence of Input, optional
+            One per feature; made from the training data if not given.
+        support : Support
+        provenance : Provenance, optional
+
+        Returns
+        -------
+        LinearDynamic
+        """
+        check_is_fitted(self)
+        n_inputs = self.n_features_in_
+        signals = [(i,) for i in range(n_inputs)]
+        direct = [0.0] * n_inputs
+        follows: list[int] = []
+        taus: list[float] = []
+        lagged: list[float] = []
+        weights = iter(self.coef_.tolist())
+        for i in self._temperatures:
+            direct[i] += next(weights)
+        for tau in self.temperature_lags_:
+            for i in self._temperatures:
+                w = next(weights)
+                if self.copies == "high-passed":
+                    direct[i] += w
+                    w = -w
+                follows.append(i)
+                taus.append(tau)
+                lagged.append(w)
+        for tau in self.speed_lags_:
+            for power in self.speed_powers:
+                for i in self._speeds:
+                    signal = (i,) * power
+                    if signal not in signals:
+                        signals.append(signal)
+                        direct.append(0.0)
+                    follows.append(signals.index(signal))
+                    taus.append(tau)
+                    lagged.append(next(weights))
+        return LinearDynamic(
+            target=target,
+            unit=unit,
+            inputs=self._inputs(inputs),
+            support=support,
+            provenance=provenance,
+            signals=tuple(signals),
+            direct=tuple(direct),
+            lag_signals=tuple(follows),
+            time_constants=tuple(taus),
+            lagged=tuple(lagged),
+            intercept=self.intercept_,
+        )
+
+    # -- features ------------------------------------------------------------------------------------------------------
+
+    def _split_columns(self) -> None:
+        names = [str(n) for n in getattr(self, "feature_names_in_", [])]
+        speeds = []
+        for s in self.speed:
+            if isinstance(s, str):
+                if s not in names:
+                    raise InputError(f"speed column {s!r}: the inputs are {', '.join(names) or 'not named'}")
+                speeds.append(names.index(s))
+            else:
+                speeds.append(int(s))
+        self._speeds = speeds
+        self._temperatures = [i for i in range(self.n_features_in_) if i not in speeds]
+        self._t_taus = tuple(sorted({float(t) for lags in self.temperature_lags for t in lags}))
+        self._n_taus = tuple(sorted({float(t) for lags in self.speed_lags for t in lags})) if speeds else ()
+
+    def _candidates(self) -> list[_Candidate]:
+        n_t, n_n = len(self._temperatures), len(self._speeds) * len(self.speed_powers)
+        found = []
+        for t_lags in self.temperature_lags if n_t else [()]:
+            for n_lags in self.speed_lags if n_n else [()]:
+                columns = list(range(n_t))
+                for tau in sorted(t_lags):
+                    start = n_t * (1 + self._t_taus.index(float(tau)))
+                    columns += range(start, start + n_t)
+                for tau in sorted(n_lags):
+                    start = n_t * (1 + len(self._t_taus)) + n_n * self._n_taus.index(float(tau))
+                    columns += range(start, start + n_n)
+                found.append(_Candidate(tuple(sorted(t_lags)), tuple(sorted(n_lags)), np.array(columns, dtype=np.intp)))
+        return found
+
+    def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[FloatArray]:
+        """Yield the table of all features, a chunk of rows at a time."""
+        memory = None
+        for start in range(0, len(X), _CHUNK):
+            rows = X[start : start + _CHUNK]
+            temperatures = rows[:, self._temperatures]
+            speeds = np.hstack([rows[:, self._speeds] ** power for power in self.speed_powers])
+            signals = np.hstack([temperatures] * len(self._t_taus) + [speeds] * len(self._n_taus) + [speeds[:, :0]])
+            taus = np.repeat(self._t_taus, temperatures.shape[1]).tolist()
+            taus += np.repeat(self._n_taus, speeds.shape[1]).tolist()
+            lags = lagbank.run(signals, dt[start : start + _CHUNK], np.array(taus), memory)
+            memory = lags[-1].copy()
+            copies = temperatures.shape[1] * len(self._t_taus)
+            if self.copies == "high-passed":
+                lags[:, :copies] = signals[:, :copies] - lags[:, :copies]
+            yield np.hstack([temperatures, lags])
+
+    def _moments(self, X: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray) -> FloatArray:
+        """Return the sums of products of [features, 1, y] per fold: all that ridge and its errors need."""
+        moments: Any = 0.0
+        n_folds = int(folds.max()) + 1
+        start = 0
+        for features in self._features(X, dt):
+            rows = slice(start, start + len(features))
+            table = np.column_stack([features, np.ones(len(features)), y[rows]])
+            part = np.zeros((n_folds, table.shape[1], table.shape[1]))
+            for k in range(n_folds):
+                mine = table[folds[rows] == k]
+                part[k] = mine.T @ mine
+            moments = moments + part
+            start += len(features)
+        return np.asarray(moments)
+
+    # -- choice --------------------------------------------------------------------------------------------------------
+
+    def _choose(self, candidates: list[_Candidate], moments: FloatArray) -> tuple[_Candidate, float, float]:
+        strengths = tuple(sorted(float(s) for s in self.strengths))
+        if len(candidates) * len(strengths) == 1 or len(moments) == 1:
+            return candidates[0], strengths[len(strengths) // 2], float("nan")
+        total = moments.sum(axis=0)
+        rms = np.empty((len(candidates), len(strengths), len(moments)))
+        for i, candidate in enumerate(candidates):
+            for k in range(len(moments)):
+                weights, intercepts = ridge.solve(
+                    ridge.part(total - moments[k], candidate.columns), strengths, self.fit_intercept
+                )
+                left_out = ridge.part(moments[k], candidate.columns)
+                full = np.vstack([weights, intercepts, -np.ones(len(strengths))])
+                squares = np.einsum("il,ij,jl->l", full, left_out, full, optimize=True)
+                rms[i, :, k] = np.sqrt(np.maximum(squares, 0.0) / left_out[-2, -2])
+        mean = rms.mean(axis=2)
+        i, j = (int(k) for k in np.unravel_index(np.argmin(mean), mean.shape))
+        if self.rule == "one-standard-error":
+            limit = mean[i, j] + rms[i, j].std(ddof=1) / np.sqrt(len(moments))
+            j = int(np.flatnonzero(mean[i] <= limit).max())
+        return candidates[i], strengths[j], float(mean[i, j])
+
+
+def _steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
+    if dt is None:
+        return np.full(n_rows, np.inf)
+    steps = np.asarray(dt, dtype=np.float64)
+    if steps.shape != (n_rows,) or not (steps >= 0).all():
+        raise InputError(f"dt: want {n_rows} time steps that are not negative")
+    return steps

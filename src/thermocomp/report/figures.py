@@ -1,0 +1,230 @@
+"""Figures of the report, as SVG text. Each answers one question; the question stands in its docstring."""
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from thermocomp.assessment.compare import Assessment, Comparison
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+#: colour-blind safe (Okabe, Ito 2008)
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
+SHADE = "#f1f1ee"
+POINTS = 1200  # of a curve: enough for the eye, light enough for a page
+
+_STYLE = {
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.2,
+}
+
+
+def measured(recording: Recording) -> str:
+    """Show what was measured in one test: speed, temperatures, displacements; thermal cycles shaded."""
+    hours = recording.time / 3600
+    speed = recording.speed
+    heights = ([1] if speed else []) + [2.2, 2.2]
+    with _style(recording.name):
+        figure = Figure(figsize=(9.6, 1.0 + 1.15 * sum(heights)), layout="constrained")
+        axes: list[Axes] = list(np.atleast_1d(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)))
+        for ax in axes:
+            _shade_cycles(ax, recording)
+        rest = list(axes)
+        if speed is not None:
+            ax = rest.pop(0)
+            ax.plot(*_thinned(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
+            ax.set_ylabel("1/min")
+            ax.set_title("spindle speed", pad=14)
+            for cycle in recording.cycles:
+                ax.text(
+                    hours[cycle.start],
+                    1.03,
+                    f" {cycle.name}",
+                    transform=ax.get_xaxis_transform(),
+                    fontsize=7,
+                    color="#666",
+                )
+        for ax, channels, unit, title in (
+            (rest[0], recording.temperatures, "degC", "temperatures"),
+            (rest[1], recording.displacements, "um", "displacements: what a part would be wrong by"),
+        ):
+            for k, c in enumerate(channels):
+                colour = COLOURS[k % len(COLOURS)]
+                style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
+                ax.plot(*_thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=c.name)
+            ax.set_ylabel(unit)
+            ax.set_title(title)
+            if channels:
+                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=1 + (len(channels) > 8), handlelength=1.4)
+        rest[-1].set_xlabel("time [h]")
+        rest[-1].margins(x=0)
+        return _svg(figure)
+
+
+def overview(comparison: Comparison) -> str:
+    """Show which model is best, and whether it is better than none: RMS on unseen blocks; hollow is refused."""
+    overall = comparison.overall()
+    targets = list(dict.fromkeys(a.target for a in overall))
+    models = list(dict.fromkeys(a.model for a in overall))
+    with _style("overview"):
+        figure = Figure(figsize=(9.6, 0.9 + 0.38 * len(targets)), layout="constrained")
+        ax = figure.subplots()
+        for k, model in enumerate(models):
+            colour = COLOURS[k % len(COLOURS)]
+            for a in overall:
+                if a.model == model and not a.failure:
+                    y = targets.index(a.target) + 0.13 * (k - (len(models) - 1) / 2)
+                    ax.plot(
+                        a.metric("rms"), y, "o", color=colour, mfc=colour if a.accepted else "white", ms=6, zorder=3
+                    )
+            ax.plot([], [], "o", color=colour, label=model)
+        for a in overall:
+            y = targets.index(a.target)
+            ax.plot([a.none_metric("rms")] * 2, [y - 0.4, y + 0.4], color=NONE, lw=2.5, zorder=2)
+        ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
+        ax.plot([], [], "o", color="#444", mfc="white", label="refused")
+        ax.set_xscale("log")
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter("{x:g}")
+        ax.tick_params(axis="x", which="minor", labelsize=7)
+        ax.set_yticks(range(len(targets)), targets)
+        ax.set_ylim(len(targets) - 0.5, -0.5)
+        ax.set_xlabel("RMS of the residual on unseen cycles [um], smaller is better")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return _svg(figure)
+
+
+def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Sequence[FloatArray]) -> str:
+    """Show how a model runs through each unseen block: measured, predicted and what is left.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        The model over all blocks.
+    blocks : sequence of Assessment
+        The blocks, one panel each.
+    time : sequence of ndarray
+        Times of each recording's rows [s].
+    """
+    columns = min(len(blocks), 3)
+    rows = -(-len(blocks) // columns)
+    with _style(assessment.target + assessment.model):
+        figure = Figure(figsize=(9.6, 0.5 + 2.6 * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        for ax in axes.flat[len(blocks) :]:
+            ax.set_visible(False)
+        for ax, block in zip(axes.flat, blocks, strict=False):
+            hours = _clock(block, time)
+            ax.axhline(0, color="#aaa", lw=0.8)
+            ax.plot(*_thinned(hours, block.measured), color=MEASURED, lw=1.8, label="measured = without compensation")
+            ax.plot(*_thinned(hours, block.predicted), color=PREDICTED, ls="--", label="predicted")
+            ax.plot(
+                *_thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
+            )
+            mark = "" if block.accepted else "  REFUSED"
+            ax.set_title(
+                f"{block.block}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
+                fontsize=8,
+                color="#222" if block.accepted else "#b00020",
+            )
+            ax.set_xlabel("time [h]")
+        for ax in axes[:, 0]:
+            ax.set_ylabel(f"{assessment.target.removesuffix('_um')} [um]")
+        handles, labels = axes.flat[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+        return _svg(figure)
+
+
+def robustness(comparison: Comparison, model: str) -> str:
+    """Show what noise and a lost sensor cost: RMS clean, with noise, and with each sensor cut off."""
+    found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
+    with _style("robustness" + model):
+        figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
+        ax = figure.subplots()
+        for k, a in enumerate(found):
+            r = a.robustness
+            assert r is not None
+            lost = list(r.lost_rms.values())
+            ax.plot(lost, [k] * len(lost), "|", color=RESIDUAL, ms=11, mew=1.3)
+            for law, marker in (("uniform", "s"), ("normal", "D")):
+                ax.plot(r.noise_rms[law][0], k, marker, color=COLOURS[2], mfc="white", ms=6, zorder=3)
+            ax.plot(a.metric("rms"), k, "o", color=PREDICTED, ms=6, zorder=4)
+            ax.plot([a.none_metric("rms")] * 2, [k - 0.4, k + 0.4], color=NONE, lw=2.5)
+            name, worst = r.worst_lost
+            if lost:
+                ax.annotate(name, (worst, k), xytext=(3, 5), textcoords="offset points", fontsize=7, color=RESIDUAL)
+        noise = found[0].robustness.noise if found and found[0].robustness else 0.0
+        ax.plot([], [], "o", color=PREDICTED, label="clean")
+        ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
+        ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
+        ax.plot([], [], "|", color=RESIDUAL, label="one sensor cut off")
+        ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
+        ax.set_xscale("log")
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter("")
+        ax.set_yticks(range(len(found)), [a.target for a in found])
+        ax.set_ylim(len(found) - 0.5, -0.5)
+        ax.set_xlabel(f"{model}: RMS of the residual on unseen cycles [um]")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return _svg(figure)
+
+
+def _clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
+    """Return hours since the block's first row; tests follow each other without a gap."""
+    seconds = np.array([time[t][r] for t, r in zip(block.test, block.row, strict=True)])
+    for k in np.flatnonzero(np.diff(block.test)) + 1:
+        seconds[k:] += seconds[k - 1] - seconds[k]
+    return np.asarray((seconds - seconds[0]) / 3600)
+
+
+def _shade_cycles(ax: Axes, recording: Recording) -> None:
+    hours = recording.time / 3600
+    for k, cycle in enumerate(recording.cycles):
+        if k % 2 == 0:
+            ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
+
+
+def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return at most about `POINTS` points, the extremes of each stretch among them."""
+    stretch = len(x) // (POINTS // 2)
+    if stretch < 2 or not np.isfinite(y).all():
+        return x, y
+    n = len(x) // stretch * stretch
+    parts = y[:n].reshape(-1, stretch)
+    first = np.arange(0, n, stretch)
+    picked = np.unique(np.concatenate([first + parts.argmin(axis=1), first + parts.argmax(axis=1), [0, len(x) - 1]]))
+    return x[picked], y[picked]
+
+
+@contextmanager
+def _style(salt: str) -> Iterator[None]:
+    # a salt of its own keeps the ids of several figures on one page apart, and the page the same from run to run
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+        yield
+
+
+def _svg(figure: Figure) -> str:
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]

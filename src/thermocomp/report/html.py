@@ -1,0 +1,72 @@
+"""Numbers, then a dict, then a template, then one offline HTML file."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+
+from thermocomp.assessment.compare import Comparison
+from thermocomp.recording.recording import Recording
+from thermocomp.report import figures
+from thermocomp.report.summary import summarise
+
+
+def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
+    """Return the report as one HTML page that needs no network.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    recordings : sequence of Recording
+        The tests behind it, in the order they were stacked.
+
+    Returns
+    -------
+    str
+    """
+    environment = Environment(
+        loader=PackageLoader("thermocomp.report"),
+        autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["um"] = _number
+    environment.filters["hours"] = lambda value: f"{value:.1f}"
+    times = [r.time for r in recordings]
+    overall = comparison.overall()
+    drawn = {}
+    for target in dict.fromkeys(a.target for a in overall):
+        shown = comparison.best(target)
+        if shown is None:  # nothing may be used: show the least bad, marked as refused
+            candidates = [a for a in overall if a.target == target and not a.failure]
+            shown = min(candidates, key=lambda a: a.metric("rms"), default=None)
+        if shown is not None:
+            blocks = [
+                a for a in comparison.assessments if (a.target, a.model) == (target, shown.model) and not a.overall
+            ]
+            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
+    stressed = dict.fromkeys(model for model, _ in drawn.values())
+    return environment.get_template("report.html").render(
+        **summarise(comparison, recordings),
+        measured=[figures.measured(r) for r in recordings],
+        overview=figures.overview(comparison),
+        predictions=drawn,
+        robustness={
+            m: figures.robustness(comparison, m)
+            for m in stressed
+            if any(a.model == m and a.robustness is not None for a in overall)
+        },
+    )
+
+
+def write(comparison: Comparison, recordings: Sequence[Recording], path: Path) -> None:
+    """Write the report; an existing file is replaced."""
+    path.write_text(render(comparison, recordings), encoding="utf-8")
+
+
+def _number(value: float | None) -> str:
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"

@@ -1,0 +1,156 @@
+"""A comparison as plain numbers and text: what the template prints."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from thermocomp import __version__
+from thermocomp.assessment.compare import Assessment, Comparison
+from thermocomp.assessment.metrics import METRICS
+from thermocomp.core.model import ErrorModel
+from thermocomp.models.training import METHODS
+from thermocomp.recording.quality import check
+from thermocomp.recording.recording import Recording
+
+#: metrics of the big table, in its order
+TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
+
+
+def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Return everything the report says in words and numbers.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    dict
+    """
+    targets = list(dict.fromkeys(a.target for a in comparison.assessments))
+    return {
+        "version": __version__,
+        "protocol": comparison.protocol.name,
+        "verdict": verdict(comparison),
+        "usable": [t for t in targets if comparison.best(t) is not None],
+        "targets": [_target(comparison, t) for t in targets],
+        "recordings": [_recording(r) for r in recordings],
+        "models": [{"name": m, "summary": METHODS[m].summary} for m in _models(comparison)],
+        "metrics": [METRICS[name] for name in TABLE],
+        "condition_number": comparison.collinearity.condition_number,
+        "vif": sorted(
+            zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True), key=lambda v: -v[1]
+        ),
+    }
+
+
+def verdict(comparison: Comparison) -> str:
+    """Return the verdict in one sentence."""
+    targets = list(dict.fromkeys(a.target for a in comparison.assessments))
+    best = {t: comparison.best(t) for t in targets}
+    usable = {t: a for t, a in best.items() if a is not None}
+    refused = [t for t in targets if t not in usable]
+    if not usable:
+        return (
+            f"No model may be used: none is surely better than no compensation for {_list(targets)} on unseen cycles."
+        )
+    by_model: dict[str, list[str]] = {}
+    for t, a in usable.items():
+        by_model.setdefault(a.model, []).append(t)
+    who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
+    with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
+    text = (
+        f"Use {who}: on thermal cycles that had not been seen the RMS falls from {_span(without)} to {_span(with_)} um"
+    )
+    if refused:
+        text += f"; leave {_list(refused)} without compensation, no model is surely better than none there"
+    return text + "."
+
+
+def _models(comparison: Comparison) -> list[str]:
+    return list(dict.fromkeys(a.model for a in comparison.assessments))
+
+
+def _target(comparison: Comparison, target: str) -> dict[str, Any]:
+    overall = [a for a in comparison.overall() if a.target == target]
+    none = overall[0]
+    best = comparison.best(target)
+    cycles = [c.cycle for c in max((a.verdict.cycles for a in overall), key=len)]
+    return {
+        "name": target,
+        "none": {m: none.none_metric(m) for m in TABLE if m != "reduction"},
+        "rows": [_row(a, best) for a in overall],
+        "cycles": cycles,
+        "per_cycle": [
+            {"model": a.model, "cells": [{c.cycle: c for c in a.verdict.cycles}.get(name) for name in cycles]}
+            for a in overall
+        ],
+        "best": best.model if best else None,
+        "formula": _formula(comparison, best),
+    }
+
+
+def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
+    r = a.robustness
+    return {
+        "model": a.model,
+        "values": {m: a.metric(m) for m in TABLE},
+        "accepted": a.accepted,
+        "reason": a.reason,
+        "best": best is not None and a.model == best.model,
+        "sensors": a.sensors,
+        "n_effective": a.n_effective,
+        "rows": len(a.measured),
+        "fit_s": a.fit_s,
+        "noise": {law: mean for law, (mean, _) in r.noise_rms.items()} if r else None,
+        "lost": r.worst_lost if r else None,
+        "outside": r.outside if r else None,
+    }
+
+
+def _formula(comparison: Comparison, best: Assessment | None) -> dict[str, Any] | None:
+    if best is None:
+        return None
+    models = [
+        a.frozen
+        for a in comparison.assessments
+        if a.target == best.target and a.model == best.model and a.frozen is not None
+    ]
+    model: ErrorModel = models[-1]
+    return {
+        "text": model.formula(),
+        "family": model.family,
+        "support": model.support,
+        "inputs": model.inputs,
+        "learned": model.provenance.cycles if model.provenance else (),
+        "of_several": len(models) > 1,
+    }
+
+
+def _recording(r: Recording) -> dict[str, Any]:
+    return {
+        "name": r.name,
+        "file": r.source.replace("\\", "/").rsplit("/", 1)[-1] or r.name,
+        "sha256": r.sha256,
+        "start": r.start,
+        "rows": len(r),
+        "hours": (r.time[-1] - r.time[0]) / 3600,
+        "interval": r.sampling_interval,
+        "temperatures": len(r.temperatures),
+        "displacements": [c.name for c in r.displacements],
+        "cycles": [
+            {"name": c.name, "rows": f"{c.start}-{c.stop - 1}", "hours": (r.time[c.stop - 1] - r.time[c.start]) / 3600}
+            for c in r.cycles
+        ],
+        "findings": check(r),
+        "notes": r.notes,
+    }
+
+
+def _list(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _span(values: Sequence[float]) -> str:
+    low, high = min(values), max(values)
+    return f"{low:.1f}" if f"{low:.1f}" == f"{high:.1f}" else f"{low:.1f}-{high:.1f}"
