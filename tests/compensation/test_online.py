@@ -1,0 +1,137 @@
+"""The online step: a dead, stale or absurd reading never moves an axis."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.compensation import online
+from thermocomp.compensation.limits import limited
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import Input
+from thermocomp.core.reading import Reading
+
+OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
+
+
+def model(target: str = "z", unit: str = "um") -> LinearDynamic:
+    return LinearDynamic(
+        target=target,
+        unit=unit,
+        inputs=(
+            Input("t", "temperature", "degC", 20.0, True, -50.0, 50.0),
+            Input("n", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0),
+        ),
+        signals=((0,), (1,)),
+        direct=(2.0, 0.0),
+        lag_signals=(1,),
+        time_constants=(600.0,),
+        lagged=(0.01,),
+    )
+
+
+def reading(time: float, t: float, n: float = 0.0) -> Reading:
+    return Reading(time, {"t": t, "n": n})
+
+
+def warmed() -> online.OnlineState:
+    state = online.start([model()])
+    for k in range(10):
+        state, result = online.step([model()], OPEN, state, reading(10.0 * k, 20.0 + k, 3000.0), 10.0 * k)
+        assert not result.rejected
+    return state
+
+
+def test_open_limits_give_minus_the_replayed_deviation() -> None:
+    """What is judged in a replay is what runs live, to the last bit."""
+    frozen, rng = model(), np.random.default_rng(3)
+    state, replayed = online.start([frozen]), frozen.init()
+    last = 0.0
+    for k in range(50):
+        time, t, n = 10.0 * k + rng.uniform(0, 5), 20 + rng.normal(), rng.uniform(0, 5000)
+        state, result = online.step([frozen], OPEN, state, reading(time, t, n), time)
+        replayed, deviation = frozen.step(replayed, np.array([t, n]), time - last if k else 0.0)
+        last = time
+        if k:
+            assert result.corrections["z"].offset == -float(deviation)
+
+
+bad_number = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -273.15, 850.0])
+
+
+@given(value=bad_number, channel=st.sampled_from(["t", "n", "time", "missing", "stale", "past", "same"]))
+def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) -> None:
+    state = warmed()
+    good = {"t": 25.0, "n": 1000.0}
+    time, now = 100.0, 100.0
+    if channel == "missing":
+        del good["t"]
+    elif channel == "stale":
+        now = time + 2e9
+    elif channel == "past":
+        time = 5.0
+    elif channel == "same":
+        time = state.time or 0.0
+    elif channel == "time":
+        time = value if not math.isfinite(value) else math.nan
+    else:
+        good[channel] = value if channel == "t" or not math.isfinite(value) else 1e9
+    after, result = online.step([model()], OPEN, state, Reading(time, good), now)
+    assert result.rejected
+    assert after is state
+    assert result.corrections["z"] == state.corrections[0]
+
+
+def test_the_reason_names_the_channel() -> None:
+    _, result = online.step([model()], OPEN, online.start([model()]), reading(0.0, math.nan), 0.0)
+    assert result.rejected == "t = nan degC is not plausible"
+
+
+@given(
+    target=st.floats(),
+    current=st.floats(-50, 50),
+    dt=st.floats(),
+    magnitude=st.floats(1, 100),
+    rate=st.floats(0.01, 10),
+    dead_band=st.floats(0, 5),
+)
+def test_limits_hold_for_any_number(
+    target: float, current: float, dt: float, magnitude: float, rate: float, dead_band: float
+) -> None:
+    limits = Limits(magnitude, rate, dead_band)
+    current = max(-magnitude, min(magnitude, current))
+    new = limited(target, current, dt, limits)
+    assert math.isfinite(new)
+    assert abs(new) <= magnitude
+    if not (math.isfinite(target) and math.isfinite(dt) and dt > 0):
+        assert new == current
+    else:
+        assert abs(new - current) <= rate * dt * (1 + 1e-9) + 1e-9
+        assert new == current or abs(max(-magnitude, min(magnitude, target)) - current) > dead_band
+
+
+def test_rate_limit_is_reached_over_time() -> None:
+    limits = Limits(magnitude=100.0, rate=0.1, reading_age=60.0)
+    state = online.start([model()])
+    state, _ = online.step([model()], limits, state, reading(0.0, 20.0), 0.0)
+    for k in range(1, 8):
+        state, result = online.step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
+        assert result.corrections["z"].offset == pytest.approx(-min(4.0, 1.0 * k))
+
+
+def test_outside_inputs_are_told() -> None:
+    state = online.start([model()])
+    state, _ = online.step([model()], OPEN, state, reading(0.0, 20.0), 0.0)
+    _, result = online.step([model()], OPEN, state, reading(1.0, 140.0), 1.0)
+    assert result.outside == ("t",)
+
+
+def test_start_refuses_what_it_cannot_correct() -> None:
+    with pytest.raises(InputError, match="two models for the same target"):
+        online.start([model(), model()])
+    with pytest.raises(InputError, match="predicts urad"):
+        online.start([model(unit="urad")])

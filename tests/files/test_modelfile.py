@@ -1,0 +1,125 @@
+"""Model files: bit-exact round trip; damaged and unknown files are refused."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import HonestError, Input, Provenance, Support
+from thermocomp.files import modelfile
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def model(coefficient: float = 1 / 3) -> LinearDynamic:
+    return LinearDynamic(
+        target="z_um",
+        unit="um",
+        inputs=(Input("t1_C", "temperature", "degC", 20.1, True, -1 / 3, 12.7),),
+        signals=((0,), (0, 0)),
+        direct=(coefficient, 0.0),
+        lag_signals=(1,),
+        time_constants=(600.0,),
+        lagged=(1e-7,),
+        support=Support("fade", 0.05, 0.3),
+        provenance=Provenance("dynamic", {"copies": "'lagged'"}, ("ab12",), ("1 (600 1/min)",), 810, "0.1.0"),
+        honest_error=HonestError("leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none"),
+    )
+
+
+@given(finite)
+def test_round_trip_keeps_every_bit(value: float) -> None:
+    assert modelfile.loads(modelfile.dumps([model(value)])) == (model(value),)
+
+
+def test_files(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    modelfile.write([model()], path)
+    assert modelfile.read(path) == (model(),)
+    with pytest.raises(InputError, match="exists already"):
+        modelfile.write([model(2.0)], path)
+    assert modelfile.read(path) == (model(),)
+    modelfile.write([model(2.0)], path, overwrite=True)
+    assert modelfile.read(path) == (model(2.0),)
+    assert [p.name for p in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(ModelFileError, match=r"nothing\.json: no such file"):
+        modelfile.read(tmp_path / "nothing.json")
+
+
+def test_binary_file(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(ModelFileError, match="cannot be read as a model file"):
+        modelfile.read(path)
+
+
+def test_cut_anywhere_is_told_and_never_half_used() -> None:
+    text = modelfile.dumps([model()])
+    for length in range(len(text) - 2):
+        with pytest.raises(ModelFileError):
+            modelfile.loads(text[:length])
+
+
+def test_cut_in_half_says_so() -> None:
+    text = modelfile.dumps([model()])
+    with pytest.raises(ModelFileError, match="ends in the middle"):
+        modelfile.loads(text[: len(text) // 2])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0.3333333333333333", "0.3333333333333334", "do not match its checksum"),
+        ('"version": 1', '"version": 2', "model file version 2; this thermocomp reads version 1"),
+        ("thermocomp-model", "something-else", "not a model file"),
+    ],
+)
+def test_altered_text_is_refused(old: str, new: str, message: str) -> None:
+    text = modelfile.dumps([model()])
+    assert old in text
+    with pytest.raises(ModelFileError, match=message):
+        modelfile.loads(text.replace(old, new, 1))
+
+
+def altered(change: dict[str, object]) -> str:
+    """Return a model file whose one model was changed and whose checksum was made to fit."""
+    content = json.loads(modelfile.dumps([model()]))
+    entry = content["models"][0]
+    for key, value in change.items():
+        if value is None:
+            del entry[key]
+        else:
+            entry[key] = value
+    content["sha256"] = modelfile._digest(content["models"])
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"family": "oracle"}, "unknown family 'oracle'; known are polynomial, linear-dynamic"),
+        ({"direct": None}, "model 1: direct: .*required"),
+        ({"surprise": 1}, "model 1: surprise"),
+        ({"direct": [1.0]}, "2 signals but 1 direct"),
+        ({"time_constants": [-5.0]}, "time constants must be positive"),
+        ({"inputs": [{"name": "t"}]}, r"inputs\.0\."),
+        ({"support": {"policy": "guess"}}, r"support\.policy"),
+    ],
+)
+def test_wrong_content_is_refused_with_its_place(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ModelFileError, match=message):
+        modelfile.loads(altered(change))
+
+
+def test_nan_is_never_written() -> None:
+    honest = HonestError("p", float("nan"), 2.0, 3.0, 4.0, 5.0, {}, "refused", "")
+    with pytest.raises(ValueError, match="Out of range float"):
+        modelfile.dumps([replace(model(), honest_error=honest)])
