@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
@@ -13,7 +14,7 @@ from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Support
-from thermocomp.models.training import train
+from thermocomp.models.training import method, train
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -122,6 +123,7 @@ def compare(
     *,
     support: Support = Support(),
     robustness: bool = True,
+    jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
     """Train every method for every target and judge it on what it has not seen.
@@ -136,29 +138,36 @@ def compare(
         What the models do outside their trained range.
     robustness : bool
         Also replay with noise and lost sensors.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     progress : callable
-        Called with a line of text before each piece of work; there are `n_jobs` of them.
+        Called with a line of text after each piece of work; there are `n_pieces` of them.
 
     Returns
     -------
     Comparison
     """
+    names = list(dict.fromkeys(methods))
+    for name in names:
+        method(name)  # an unknown one is told before the work starts, not after
+    pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in protocol.splits]
+    done: list[Assessment] = []
+    work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
+    for a in Parallel(n_jobs=jobs, return_as="generator")(work):
+        progress(f"{a.target} {a.model} {a.block}")
+        done.append(a)
     found: list[Assessment] = []
-    for target in range(len(samples.targets)):
-        for name in dict.fromkeys(methods):
-            parts = []
-            for split in protocol.splits:
-                progress(f"{samples.targets[target].name} {name} {split.block}")
-                parts.append(_assess_method(samples, name, target, split, support, robustness))
-            found += parts if len(parts) > 1 else []
-            found.append(_together(parts))
+    for start in range(0, len(done), len(protocol.splits)):
+        parts = done[start : start + len(protocol.splits)]
+        found += parts if len(parts) > 1 else []
+        found.append(_together(parts))
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
-    names = tuple(samples.inputs[j].name for j in temperatures)
-    return Comparison(protocol, tuple(found), collinearity(values, names))
+    heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
+    return Comparison(protocol, tuple(found), heat)
 
 
-def n_jobs(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:
+def n_pieces(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:
     """Return the number of pieces of work of `compare`."""
     return len(samples.targets) * len(dict.fromkeys(methods)) * len(protocol.splits)
 

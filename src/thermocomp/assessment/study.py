@@ -47,6 +47,7 @@ def fit(
     protocol: Protocol,
     *,
     support: Support = Support(),
+    jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Fitted:
     """Judge a method on unseen blocks, then fit it to all rows.
@@ -58,19 +59,21 @@ def fit(
     protocol : Protocol
     support : Support
         For the models.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     progress : callable
-        Called with a line of text before each piece of work: ``n_jobs`` of `compare`, and one per target.
+        Called with a line of text after each piece of work: ``n_pieces`` of them and one per target.
 
     Returns
     -------
     Fitted
     """
-    comparison = compare(samples, [method], protocol, support=support, robustness=False, progress=progress)
+    comparison = compare(samples, [method], protocol, support=support, robustness=False, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
-        progress(f"{overall.target} {method} all rows")
         trained = train(method, samples, k, everything, support=support)
+        progress(f"{overall.target} {method} all rows")
         models.append(replace(trained.model, honest_error=honest_error(overall, protocol)))
         estimators.append(trained.estimator)
         r_squared.append(trained.r_squared)

@@ -165,6 +165,7 @@ def fit(
     leave_one_file_out: Flag = False,
     absolute: Flag = False,
     support: Policy = "clip",
+    jobs: int = -1,
     overwrite: Flag = False,
     json: Json = False,
     quiet: Annotated[bool, Parameter(show=False, parse=False)] = False,
@@ -198,6 +199,8 @@ def fit(
         Take temperatures as they are; without it they are counted from the start of each test.
     support : str
         What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -211,7 +214,7 @@ def fit(
     tests = _read(recordings, mapping)
     with needs("study"):
         from thermocomp.assessment import study
-        from thermocomp.assessment.compare import n_jobs
+        from thermocomp.assessment.compare import n_pieces
         from thermocomp.cli import output as out
         from thermocomp.core.model import Support
         from thermocomp.files import modelfile
@@ -219,8 +222,8 @@ def fit(
     _refuse_existing([output], overwrite)
     samples = stack(tests, target, inputs, rezero=not absolute)
     protocol = _protocol(samples, split, leave_one_cycle_out, leave_one_file_out)
-    with _progress(n_jobs(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
-        result = study.fit(samples, model, protocol, support=Support(support), progress=progress)
+    with _progress(n_pieces(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
+        result = study.fit(samples, model, protocol, support=Support(support), jobs=jobs, progress=progress)
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
         out.show_fit(result, output, _console, as_json=json)
@@ -278,6 +281,7 @@ def compare(
     leave_one_file_out: Flag = False,
     absolute: Flag = False,
     output: OptionalOutput = None,
+    jobs: int = -1,
     overwrite: Flag = False,
     json: Json = False,
 ) -> int:
@@ -305,6 +309,8 @@ def compare(
         Take temperatures as they are; without it they are counted from the start of each test.
     output : Path
         Report to write (.html).
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     overwrite : bool
         Write over an existing report.
     json : bool
@@ -324,8 +330,8 @@ def compare(
         _refuse_existing([output], overwrite)
     samples = stack(tests, target, inputs, rezero=not absolute)
     protocol = _protocol(samples, split, leave_one_cycle_out, leave_one_file_out)
-    with _progress(comparing.n_jobs(samples, models, protocol), json) as progress:
-        comparison = comparing.compare(samples, models, protocol, progress=progress)
+    with _progress(comparing.n_pieces(samples, models, protocol), json) as progress:
+        comparison = comparing.compare(samples, models, protocol, jobs=jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
@@ -365,12 +371,5 @@ def _refuse_existing(paths: list[Path], overwrite: bool) -> None:
 def _progress(total: int, hidden: bool) -> Iterator[Callable[[str], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
-        task = bar.add_task("", total=total)
-        started = False
-
-        def advance(text: str) -> None:
-            nonlocal started
-            bar.update(task, description=text, advance=1 if started else 0)
-            started = True
-
-        yield advance
+        task = bar.add_task("working", total=total)
+        yield lambda text: bar.update(task, description=text, advance=1)

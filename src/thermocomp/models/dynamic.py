@@ -12,6 +12,7 @@ from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.terms import Term
 from thermocomp.models import ridge
 from thermocomp.models.base import ThermalRegressor
 
@@ -145,19 +146,20 @@ class DynamicRidge(ThermalRegressor):
         FitError
             No row to learn from.
         """
-        X, y = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        steps = _steps(dt, len(X))
-        folds, self.chosen_by_ = ridge.number_folds(cycle, len(X))
-        learn = folds >= 0
-        self.data_min_, self.data_max_ = X[learn].min(axis=0), X[learn].max(axis=0)
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        rows: FloatArray = checked[0]
+        steps = _steps(dt, len(rows))
+        folds, self.chosen_by_ = ridge.number_folds(cycle, len(rows))
+        learned = rows[folds >= 0]
+        self.data_min_, self.data_max_ = learned.min(axis=0), learned.max(axis=0)
         self._split_columns()
         candidates = self._candidates()
-        moments = self._moments(X, y, steps, folds)
+        moments = self._moments(rows, checked[1], steps, folds)
         chosen, self.strength_, self.cv_rms_ = self._choose(candidates, moments)
         self.temperature_lags_, self.speed_lags_ = chosen.temperature_lags, chosen.speed_lags
         self._columns = chosen.columns
-        total = moments.sum(axis=0)
-        weights, intercepts = ridge.solve(ridge.part(total, chosen.columns), (self.strength_,), self.fit_intercept)
+        total = ridge.part(moments.sum(axis=0), chosen.columns)
+        weights, intercepts = ridge.solve(total, (self.strength_,), self.fit_intercept)
         self.coef_, self.intercept_ = weights[:, 0], float(intercepts[0])
         return self
 
@@ -175,8 +177,9 @@ class DynamicRidge(ThermalRegressor):
         ndarray of shape (n_rows,)
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float64, reset=False)
-        parts = [f[:, self._columns] @ self.coef_ + self.intercept_ for f in self._features(X, _steps(dt, len(X)))]
+        rows: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        table = self._features(rows, _steps(dt, len(rows)))
+        parts = [features[:, self._columns] @ self.coef_ + self.intercept_ for features in table]
         return np.concatenate(parts)
 
     @property
@@ -220,7 +223,7 @@ class DynamicRidge(ThermalRegressor):
         """
         check_is_fitted(self)
         n_inputs = self.n_features_in_
-        signals = [(i,) for i in range(n_inputs)]
+        signals: list[Term] = [(i,) for i in range(n_inputs)]
         direct = [0.0] * n_inputs
         follows: list[int] = []
         taus: list[float] = []

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -219,7 +220,8 @@ def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 @contextmanager
 def _style(salt: str) -> Iterator[None]:
     # a salt of its own keeps the ids of several figures on one page apart, and the page the same from run to run
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
+    rc: Any = {**_STYLE, "svg.hashsalt": salt}
+    with mpl.rc_context(rc):
         yield
 
 

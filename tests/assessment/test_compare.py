@@ -1,0 +1,187 @@
+"""Compare, fit, assess: trained on what may be seen, replayed through the online step, judged on the rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.assessment import splits, study
+from thermocomp.assessment.compare import ALL, compare, n_pieces
+from thermocomp.assessment.replay import replay
+from thermocomp.assessment.robustness import stress
+from thermocomp.compensation import online
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.reading import Reading
+from thermocomp.files import modelfile
+from thermocomp.models.training import METHODS, train
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+METHOD_NAMES = sorted(METHODS)
+
+
+@pytest.mark.parametrize("name", METHOD_NAMES)
+def test_replay_of_the_frozen_model_equals_the_estimator(name: str, samples: Samples) -> None:
+    everything = np.ones(len(samples), np.bool_)
+    trained = train(name, samples, 0, everything)
+    predicted, outside = replay(trained.model, samples, everything)
+    names = [i.name for i in trained.model.inputs]
+    clock = {"dt": samples.dt()} if METHODS[name].dynamic else {}
+    expected = trained.estimator.predict(samples.frame()[names], **clock)
+    assert np.abs(predicted - expected).max() <= 1e-12 * np.abs(expected).max()
+    assert not outside.any()
+    (again,) = modelfile.loads(modelfile.dumps([trained.model]))
+    assert np.array_equal(replay(again, samples, everything)[0], predicted)
+
+
+@pytest.mark.parametrize("name", METHOD_NAMES)
+def test_what_is_judged_is_never_learned_from(name: str, recording: Recording, samples: Samples) -> None:
+    """Other displacements in the unseen block must not change the model: no leak, whatever the method."""
+    split = splits.leave_one_cycle_out(samples).splits[1]
+    spoiled = recording.table.copy()
+    spoiled.loc[split.judge, ["z_um", "x_um"]] = 1e6
+    other = stack([replace(recording, table=spoiled)], ["z_um", "x_um"])
+    assert train(name, samples, 0, split.learn).model == train(name, other, 0, split.learn).model
+
+
+def test_comparison_covers_every_piece(samples: Samples) -> None:
+    protocol = splits.leave_one_cycle_out(samples)
+    heard: list[str] = []
+    result = compare(samples, ["ols", "dynamic", "ols"], protocol, progress=heard.append)
+    assert len(heard) == n_pieces(samples, ["ols", "dynamic", "ols"], protocol) == 2 * 2 * 4
+    overall = result.overall()
+    assert [(a.target, a.model) for a in overall] == [(t, m) for t in ("z_um", "x_um") for m in ("ols", "dynamic")]
+    for a in overall:
+        assert a.block == ALL
+        assert len(a.measured) == len(samples)
+        assert len(a.verdict.cycles) == 4
+        assert a.robustness is not None
+        assert a.none_metric("rms") == pytest.approx(np.sqrt(np.mean(a.measured**2)))
+    best = result.best("z_um")
+    assert best is not None
+    assert best.model == "dynamic"
+    assert best.metric("rms") < 0.1 * best.none_metric("rms")
+
+
+def test_two_processes_find_the_same(samples: Samples) -> None:
+    protocol = splits.parse("0.75/0.25", samples)
+    one = compare(samples, ["ols", "partial-f"], protocol, robustness=False)
+    two = compare(samples, ["ols", "partial-f"], protocol, robustness=False, jobs=2)
+    for a, b in zip(one.assessments, two.assessments, strict=True):
+        assert (a.model, a.target, a.block) == (b.model, b.target, b.block)
+        assert np.array_equal(a.predicted, b.predicted)
+
+
+def test_unknown_method_is_told_before_the_work(samples: Samples) -> None:
+    with pytest.raises(InputError, match="unknown model 'dynamik'; did you mean dynamic"):
+        compare(samples, ["dynamik"], splits.parse("0.75/0.25", samples))
+
+
+def test_a_method_that_cannot_be_fitted_is_refused_not_hidden(recording: Recording) -> None:
+    table = recording.table.copy()
+    table.loc[2:, "z_um"] = np.nan
+    table.loc[700:, "z_um"] = 1.0
+    broken = stack([replace(recording, table=table)], ["z_um"])
+    result = compare(broken, ["ols"], splits.parse("0.75/0.25", broken))
+    (a,) = result.assessments
+    assert not a.accepted
+    assert "could not be fitted: ols: 2 complete rows of z_um" in a.reason
+    assert np.isnan(a.metric("rms"))
+
+
+def test_static_methods_need_a_temperature(recording: Recording) -> None:
+    speed_only = stack([recording], ["z_um"], ["spindle_rpm"])
+    with pytest.raises(FitError, match="no temperature"):
+        train("ols", speed_only, 0, np.ones(len(speed_only), np.bool_))
+    assert train("dynamic", speed_only, 0, np.ones(len(speed_only), np.bool_)).model.sensors == ("spindle_rpm",)
+
+
+def test_missing_readings_hold_the_prediction(recording: Recording, samples: Samples) -> None:
+    everything = np.ones(len(samples), np.bool_)
+    model = train("dynamic", samples, 0, everything).model
+    table = recording.table.copy()
+    table.loc[300:309, "t1_C"] = np.nan
+    gappy = stack([replace(recording, table=table)], ["z_um"])
+    predicted, _ = replay(model, gappy, everything)
+    assert np.isfinite(predicted).all()
+    assert (predicted[300:310] == predicted[299]).all()
+    full, _ = replay(model, samples, everything)
+    assert np.abs(predicted[310:] - full[310:]).max() < 3.0
+
+
+def test_replay_is_what_the_online_step_commands(samples: Samples) -> None:
+    model = train("dynamic", samples, 0, np.ones(len(samples), np.bool_)).model
+    rows = np.arange(len(samples)) < 120
+    predicted, _ = replay(model, samples, rows)
+    limits = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
+    state = online.start([model])
+    names = [c.name for c in samples.inputs]
+    for k in range(120):
+        reading = Reading(samples.time[k], dict(zip(names, samples.values[k], strict=True)))
+        state, result = online.step([model], limits, state, reading, reading.time)
+        if k:
+            assert result.corrections["z_um"].offset == -predicted[k]
+
+
+def test_stress_finds_the_sensor_that_matters(samples: Samples) -> None:
+    everything = np.ones(len(samples), np.bool_)
+    model = train("ols", samples, 0, everything).model
+    assert isinstance(model, Polynomial)
+    found = stress(model, samples, samples.deviations[:, 0], everything, draws=20)
+    clean, _ = replay(model, samples, everything)
+    assert found.predicted == pytest.approx(clean, rel=1e-12)
+    r = found.robustness
+    assert set(r.lost_rms) == {"t1_C", "t2_C", "t3_C"}
+    weights = dict(
+        zip(r.lost_rms, np.abs(samples.change()[:, :3] * np.array(model.coefficients)).max(axis=0), strict=True)
+    )
+    assert r.worst_lost[0] == max(weights, key=lambda name: weights[name])
+    clean_rms = np.sqrt(np.mean((samples.deviations[:, 0] - clean) ** 2))
+    assert clean_rms < r.noise_rms["uniform"][0] < r.noise_rms["normal"][0] <= r.noise_rms["normal"][1]
+    # white noise through a linear model: variance adds up, sigma of the uniform law is 0.4 / sqrt(3)
+    gain = np.sqrt((np.array(model.coefficients) ** 2).sum())
+    reference = 1 + 1  # the first reading is the zero, so its noise stays in every later change
+    assert r.noise_rms["uniform"][0] ** 2 - clean_rms**2 == pytest.approx(reference * (0.4**2 / 3) * gain**2, rel=0.5)
+
+
+def test_fit_writes_its_honest_error_into_the_models(samples: Samples) -> None:
+    protocol = splits.leave_one_cycle_out(samples)
+    fitted = study.fit(samples, "dynamic", protocol, support=Support("fade"))
+    assert [m.target for m in fitted.models] == ["z_um", "x_um"]
+    for m, a, r2 in zip(fitted.models, fitted.comparison.overall(), fitted.r_squared, strict=True):
+        assert m.honest_error is not None
+        assert m.honest_error.rms == a.metric("rms")
+        assert set(m.honest_error.cycles) == set(samples.cycle_names)
+        assert m.accepted == a.accepted
+        assert m.support.policy == "fade"
+        assert m.provenance is not None
+        assert m.provenance.data_sha256 == ("small0",)
+        assert m.provenance.cycles == samples.cycle_names
+        assert r2 > 0.98
+
+
+def test_assess_says_when_the_test_is_not_honest(recording: Recording, samples: Samples) -> None:
+    models = study.fit(samples, "dynamic", splits.leave_one_cycle_out(samples)).models
+    again = study.assess(models, [recording])
+    assert again.seen == ("small",)
+    fresh = study.assess(models, [small_machine((2200.0, 1200.0), seed=5)])
+    assert fresh.seen == ()
+    assert [a.block for a in fresh.assessments if a.target == "z_um"] == [
+        "cycle 1 (2200 1/min)",
+        "cycle 2 (1200 1/min)",
+        "all cycles",
+    ]
+    assert all(a.accepted for a in fresh.assessments)
+
+
+def test_assess_names_the_missing_channel(recording: Recording, samples: Samples) -> None:
+    models = study.fit(samples, "ols", splits.leave_one_cycle_out(samples)).models
+    channels = tuple(c for c in recording.channels if c.name != "t2_C")
+    poorer = replace(recording, table=pd.DataFrame(recording.table.drop(columns="t2_C")), channels=channels)
+    with pytest.raises(InputError, match="no channel is named 't2_C'"):
+        study.assess(models, [poorer])

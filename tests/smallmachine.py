@@ -1,0 +1,38 @@
+"""A drift test that is computed in a moment and whose physics is known."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core import lagbank
+from thermocomp.core.machine import Channel
+from thermocomp.recording.cycles import find_cycles
+from thermocomp.recording.recording import Recording
+
+
+def small_machine(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *, seed: int = 0) -> Recording:
+    """Return a drift test: lags of 20 and 90 minutes in the drift, of 20 and 45 minutes in the sensors."""
+    rng = np.random.default_rng(seed)
+    dt, half = 60.0, 100
+    speed = np.concatenate([np.r_[np.full(half, n), np.zeros(half)] for n in speeds])
+    speed[0] = 0.0
+    time = np.arange(len(speed), dtype=np.float64) * dt
+    steps = np.full(len(speed), dt)
+    ambient = 0.8 * np.sin(2 * np.pi * time / 40_000)
+    heat = np.column_stack([speed**2 / 1e6, speed / 1e3])
+    fast, slow = lagbank.run(heat, steps, np.array([1200.0, 5400.0])).T
+    between = lagbank.run(heat[:, 1:], steps, np.array([2700.0]))[:, 0]
+    table = pd.DataFrame(
+        {
+            "t1_C": 22 + 2.0 * fast + ambient + 0.02 * rng.normal(size=len(time)),
+            "t2_C": 21 + 1.5 * between + ambient + 0.02 * rng.normal(size=len(time)),
+            "t3_C": 20.5 + ambient + 0.02 * rng.normal(size=len(time)),
+            "spindle_rpm": speed,
+            "z_um": 4.0 * fast + 6.0 * slow + 1.5 * ambient + 0.1 * rng.normal(size=len(time)),
+            "x_um": -2.0 * fast + 0.05 * fast**2 + 0.1 * rng.normal(size=len(time)),
+        }
+    )
+    quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
+    channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
+    return Recording("small", time, table, channels, find_cycles(time, speed), sha256=f"small{seed}")
