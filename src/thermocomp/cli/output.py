@@ -32,6 +32,7 @@ def show_comparison(comparison: Comparison, report: Path | None, console: Consol
         return
     console.print(f"Judged on: {comparison.protocol.name}")
     console.print(_assessment_table(comparison.assessments))
+    console.print(_cycle_table(comparison.assessments))
     for a in comparison.overall():
         if not a.accepted:
             console.print(f"[red]refused[/] {a.model} for {a.target}: {escape(a.reason)}")
@@ -82,7 +83,8 @@ def show_assess(judged: Judged, console: Console, *, as_json: bool) -> None:
         _print_json({"seen_in_training": judged.seen, "results": [_result(a) for a in judged.assessments]}, console)
         return
     console.print(_assessment_table(judged.assessments))
-    table = Table(title="Robustness (RMS [um])")
+    console.print(_cycle_table(judged.assessments))
+    table = Table(title="Robustness: RMS in um")
     for heading in ("target", "clean", "uniform noise", "normal noise", "worst lost sensor", "rows outside range"):
         table.add_column(heading, justify="left" if heading == "target" else "right")
     for a in judged.overall():
@@ -150,30 +152,45 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
 
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Table:
-    table = Table()
-    left = ("target", "model", "unseen block", "verdict")
-    for heading in (*left[:3], "MAE", "RMS", "max", "none MAE", "none RMS", "less", "sensors", left[3]):
-        table.add_column(heading, justify="left" if heading in left else "right")
-    previous: Assessment | None = None
-    for a in assessments:
-        if previous is not None and (a.target, a.model) != (previous.target, previous.model):
-            table.add_section() if a.target != previous.target else None
-        table.add_row(
-            escape(a.target),
-            a.model,
-            escape(a.block),
-            *(f"{a.metric(m):.2f}" for m in ("mae", "rms", "max_abs")),
-            *(f"{a.none_metric(m):.2f}" for m in ("mae", "rms")),
-            f"{a.metric('reduction'):.0f} %",
-            str(len(a.sensors)),
-            _verdict(_word(a)),
-            style="bold"
-            if a.overall and assessments[0] is not a and previous is not None and not previous.overall
-            else "",
-        )
-        previous = a
-    table.caption = "MAE, RMS, max of the residual in um; 'none' is no compensation; 'less' is the fall of the RMS"
+    """Return a table with a section per target and a row per model."""
+    table = Table(caption="residual in um on what had not been learned from")
+    table.add_column("")
+    for heading in ("MAE", "RMS", "max", "less", "sensors"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for mine in _by_target(assessments):
+        table.add_section()
+        none = (f"{mine[0].none_metric(m):.2f}" for m in ("mae", "rms", "max_abs"))
+        table.add_row(f"[bold]{escape(mine[0].target)}[/], none", *none, style="dim")
+        for a in mine:
+            figures = (f"{a.metric(m):.2f}" for m in ("mae", "rms", "max_abs"))
+            less = f"{a.metric('reduction'):.0f} %"
+            table.add_row(a.model, *figures, less, str(len(a.sensors)), _verdict(_word(a)))
     return table
+
+
+def _cycle_table(assessments: Sequence[Assessment]) -> Table:
+    """Return the RMS in every unseen cycle, a section per target and a column per model."""
+    models = list(dict.fromkeys(a.model for a in assessments))
+    table = Table(caption="RMS of the residual in um in each unseen cycle; ! = refused there")
+    table.add_column("")
+    for heading in ("none", *models):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for mine in _by_target(assessments):
+        table.add_section()
+        table.add_row(f"[bold]{escape(mine[0].target)}[/]")
+        verdicts = {a.model: {c.cycle: c for c in a.verdict.cycles} for a in mine}
+        for cycle in dict.fromkeys(c for found in verdicts.values() for c in found):
+            known = {m: found[cycle] for m, found in verdicts.items() if cycle in found}
+            cells = {m: f"{c.rms:.2f} " if c.passed else f"[red]{c.rms:.2f}![/]" for m, c in known.items()}
+            none = f"{next(iter(known.values())).none_rms:.2f}"
+            table.add_row(f"  {escape(cycle)}", none, *(cells.get(m, "") for m in models))
+    return table
+
+
+def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:
+    overall = [a for a in assessments if a.overall]
+    return [[a for a in overall if a.target == t] for t in dict.fromkeys(a.target for a in overall)]
 
 
 def _word(a: Assessment) -> str:

@@ -60,7 +60,7 @@ def verdict(comparison: Comparison) -> str:
     who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
     text = (
-        f"Use {who}: on thermal cycles that had not been seen the RMS falls from {_span(without)} to {_span(with_)} um"
+        f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
     )
     if refused:
         text += f"; leave {_list(refused)} without compensation, no model is surely better than none there"
