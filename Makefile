@@ -1,0 +1,52 @@
+# Everything a stranger needs, on a bare Debian with Python >= 3.11: `make demo` and `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+
+.PHONY: help demo test check bench docs clean
+
+help:
+	@echo "make demo    the main job on the virtual machine: record, fit, judge on unseen cycles, report"
+	@echo "make test    all tests (installs what they need)"
+	@echo "make check   format, lint, types, architecture"
+	@echo "make bench   speed and accuracy beside the peers"
+	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make clean   take away what the other targets made"
+
+demo: $(VENV)/.study
+	$(BIN)/thermocomp demo --output demo --overwrite
+
+test: $(VENV)/.dev
+	scripts/system_packages.sh chromium
+	$(BIN)/python -m pytest --cov --cov-report=term
+
+check: $(VENV)/.dev
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.bench
+	$(BIN)/python benchmarks/run.py
+
+docs: $(VENV)/.docs
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+clean:
+	rm -rf $(VENV) demo docs/_build docs/auto_examples .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+$(VENV)/.study: pyproject.toml
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]'
+	@touch $@
+
+$(VENV)/.dev: pyproject.toml
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group dev
+	@touch $@ $(VENV)/.study
+
+$(VENV)/.bench: pyproject.toml
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group bench
+	@touch $@ $(VENV)/.study
+
+$(VENV)/.docs: pyproject.toml
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group docs
+	@touch $@ $(VENV)/.study
