@@ -52,16 +52,14 @@ def verdict(comparison: Comparison) -> str:
     refused = [t for t in targets if t not in usable]
     if not usable:
         return (
-            f"No model may be used: none is surely better than no compensation for {_list(targets)} on unseen cycles."
+            f"No model may be used for {_list(targets)}: on unseen cycles none is surely better than no compensation."
         )
     by_model: dict[str, list[str]] = {}
     for t, a in usable.items():
         by_model.setdefault(a.model, []).append(t)
     who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
-    text = (
-        f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
-    )
+    text = f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
     if refused:
         text += f"; leave {_list(refused)} without compensation, no model is surely better than none there"
     return text + "."

@@ -1,0 +1,228 @@
+"""The command line: exit codes, JSON, messages, nothing overwritten."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.cli.app import app, run
+from thermocomp.cli.extras import needs
+from thermocomp.core.exceptions import MissingExtraError
+from thermocomp.files import modelfile, recordings
+
+RESULT_KEYS = {
+    "model",
+    "target",
+    "block",
+    "mae_um",
+    "rms_um",
+    "max_um",
+    "none_mae_um",
+    "none_rms_um",
+    "reduction_pct",
+    "verdict",
+    "reason",
+    "sensors",
+    "n_sensors",
+    "fit_s",
+}
+
+
+@pytest.fixture(scope="module")
+def drift(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A CSV file with four thermal cycles."""
+    path = tmp_path_factory.mktemp("cli") / "drift.csv"
+    recordings.write(small_machine(), path)
+    return path
+
+
+def printed(capsys: pytest.CaptureFixture[str]) -> Any:
+    return json.loads(capsys.readouterr().out)
+
+
+def test_compare_as_json(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "compare",
+        str(drift),
+        "--target",
+        "z_um",
+        "x_um",
+        "--models",
+        "ols",
+        "dynamic",
+        "--split",
+        "0.75/0.25",
+    ]
+    assert run([*arguments, "--jobs", "1", "--json"]) == 0
+    results = printed(capsys)["results"]
+    assert [(r["target"], r["model"]) for r in results] == [
+        (t, m) for t in ("z_um", "x_um") for m in ("ols", "dynamic")
+    ]
+    for r in results:
+        assert set(r) >= RESULT_KEYS
+        assert r["block"] == "rows 600-799"
+        assert r["verdict"] in ("accepted", "refused")
+        assert r["n_sensors"] == len(r["sensors"])
+        assert not {"z_um", "x_um"} & set(r["sensors"])
+        assert r["mae_um"] <= r["rms_um"] <= r["max_um"]
+        assert r["reduction_pct"] == pytest.approx(100 * (1 - r["rms_um"] / r["none_rms_um"]))
+
+
+def test_compare_prints_a_table_and_writes_a_report(
+    drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = tmp_path / "report.html"
+    arguments = ["compare", str(drift), "--target", "z_um", "--models", "dynamic", "--jobs", "1", "-o", str(report)]
+    assert run(arguments) == 0
+    text = capsys.readouterr().out
+    assert "leave one thermal cycle out (4 cycles)" in text
+    assert "z_um: dynamic" in text
+    assert report.read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert run(arguments) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert run([*arguments, "--overwrite"]) == 0
+
+
+def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "model.json"
+    assert run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"]) == 0
+    (fitted,) = printed(capsys)["models"]
+    assert fitted["verdict"] == "accepted"
+    assert fitted["r_squared"] > 0.98
+    (frozen,) = modelfile.read(model)
+    assert fitted["formula"] == frozen.formula()
+    assert run(["fit", str(drift), "--target", "z_um", "-o", str(model)]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+    other = tmp_path / "other.csv"
+    recordings.write(small_machine((2200.0, 1200.0), seed=3), other)
+    assert run(["assess", str(model), str(other), "--json"]) == 0
+    results = printed(capsys)["results"]
+    assert [r["block"] for r in results] == ["cycle 1 (2200 1/min)", "cycle 2 (1200 1/min)", "all cycles"]
+    assert set(results[-1]["robustness"]["noise_rms_um"]) == {"uniform", "normal"}
+    assert run(["assess", str(model), str(drift)]) == 0
+    assert "not an honest test" in capsys.readouterr().out
+
+
+def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = small_machine()
+    table = recording.table.copy()
+    table["z_um"] = 5.0 * (-1.0) ** (recording.table.index // 200)  # nothing the temperatures could explain
+    path = tmp_path / "noise.csv"
+    recordings.write(type(recording)(recording.name, recording.time, table, recording.channels, recording.cycles), path)
+    model = tmp_path / "model.json"
+    assert run(["fit", str(path), "--target", "z_um", "--model", "ols", "--jobs", "1", "-o", str(model)]) == 1
+    assert "refused" in capsys.readouterr().out
+    (frozen,) = modelfile.read(model)
+    assert not frozen.accepted
+    assert run(["compare", str(path), "--target", "z_um", "--models", "ols", "--jobs", "1"]) == 1
+    assert "no model may be used" in capsys.readouterr().out
+
+
+def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(drift), "--json"]) == 0
+    (found,) = printed(capsys)["recordings"]
+    assert found["rows"] == 800
+    assert [c["start"] for c in found["cycles"]] == [0, 200, 400, 600]
+    recording = small_machine()
+    table = recording.table.copy()
+    table["t2_C"] = -180.0
+    path = tmp_path / "absent.csv"
+    recordings.write(type(recording)(recording.name, recording.time, table, recording.channels, recording.cycles), path)
+    assert run(["check", str(path)]) == 1
+    text = capsys.readouterr().out
+    assert "trouble" in text
+    assert "-180" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["compare", "{drift}", "--target", "zz_um"], "no channel is named 'zz_um'; the nearest are z_um"),
+        (["compare", "{drift}", "--target", "t1_C"], "target t1_C measures temperature"),
+        (["compare", "{drift}", "--target", "z_um", "--inputs", "x_um"], "no displacement probe"),
+        (["compare", "{drift}", "--target", "z_um", "--models", "dynamik"], "did you mean dynamic"),
+        (["compare", "{drift}", "--target", "z_um", "--split", "7"], "split '7'"),
+        (
+            ["compare", "{drift}", "--target", "z_um", "--split", "0.7/0.3", "--leave-one-cycle-out"],
+            "exclude each other",
+        ),
+        (["compare", "nowhere.csv", "--target", "z_um"], "nowhere.csv"),
+        (["assess", "{drift}", "{drift}"], "not a model file"),
+        (["fit", "{drift}", "--target", "z_um", "--leave-one-file-out", "-o", "m.json"], "at least two recordings"),
+    ],
+)
+def test_unusable_input_is_exit_code_two_and_a_message(
+    arguments: list[str], message: str, drift: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(drift.parent)
+    assert run([a.format(drift=drift) for a in arguments]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not Path("m.json").exists()
+
+
+def test_simulate_and_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = tmp_path / "rec.csv"
+    assert run(["simulate", "hwang", "-o", str(recording)]) == 0
+    assert "displacements" in capsys.readouterr().out
+    assert run(["simulate", "hwang", "-o", str(recording)]) == 2
+    assert run(["simulate", "hwanng", "-o", str(tmp_path / "other.csv")]) == 2
+    assert "hwang" in capsys.readouterr().err
+    assert run(["check", str(recording)]) in (0, 1)
+
+
+def test_every_command_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--help"]) == 0
+    overview = capsys.readouterr().out
+    for name in ("demo", "simulate", "check", "fit", "assess", "compare"):
+        assert name in overview
+        assert run([name, "--help"]) == 0
+        text = capsys.readouterr().out
+        assert "--json" in text
+        assert "Usage: thermocomp" in text
+    assert list(app)  # commands are registered
+
+
+def test_missing_extra_says_what_to_install() -> None:
+    with pytest.raises(MissingExtraError, match=r"pip install 'thermocomp\[study\]'"), needs("study"):
+        raise ModuleNotFoundError("No module named 'sklearn'", name="sklearn.base")
+    with pytest.raises(ModuleNotFoundError), needs("study"):
+        raise ModuleNotFoundError("No module named 'elsewhere'", name="elsewhere")
+
+
+def test_the_base_install_says_what_to_install(drift: Path) -> None:
+    """In a Python that cannot see the extras, help works and a study command names the one to install."""
+    blocked = "import sys\nfor m in ('pandas', 'sklearn', 'scipy', 'joblib', 'matplotlib'): sys.modules[m] = None\n"
+    code = blocked + "from thermocomp.cli.app import run\nsys.exit(run(sys.argv[1:]))"
+    shown = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True, check=False)
+    assert shown.returncode == 0, shown.stderr
+    refused = subprocess.run(
+        [sys.executable, "-c", code, "check", str(drift)], capture_output=True, text=True, check=False
+    )
+    assert refused.returncode == 2
+    assert "pip install 'thermocomp[study]'" in refused.stderr
+
+
+def test_the_running_wing_loads_nothing_of_the_training_wing() -> None:
+    code = (
+        "import sys, thermocomp\n"
+        "import thermocomp.compensation.online, thermocomp.files.modelfile\n"
+        "thermocomp.Polynomial, thermocomp.Limits\n"
+        "print([m for m in ('pandas', 'sklearn', 'scipy', 'matplotlib', 'numba', 'joblib') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+def test_public_names_are_all_there() -> None:
+    import thermocomp
+
+    for name in thermocomp.__all__:
+        assert getattr(thermocomp, name) is not None
+    assert set(dir(thermocomp)) == set(thermocomp.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        thermocomp.nothing  # noqa: B018

@@ -1,0 +1,122 @@
+"""The report: one offline page that a real browser shows."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.assessment import splits
+from thermocomp.assessment.compare import Comparison, compare
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+from thermocomp.report import html
+from thermocomp.report.summary import summarise, verdict
+
+
+@pytest.fixture(scope="module")
+def comparison(samples: Samples) -> Comparison:
+    return compare(samples, ["ols", "mra", "dynamic"], splits.leave_one_cycle_out(samples))
+
+
+@pytest.fixture(scope="module")
+def page(comparison: Comparison, recording: Recording) -> str:
+    return html.render(comparison, [recording])
+
+
+def test_verdict_is_one_true_sentence(comparison: Comparison) -> None:
+    text = verdict(comparison)
+    assert text.count(". ") == 0
+    assert text.endswith(".")
+    for target in ("z_um", "x_um"):
+        best = comparison.best(target)
+        assert best is None or best.model in text
+
+
+def test_no_model_no_recommendation(samples: Samples) -> None:
+    flips = np.where(samples.cycle % 2 == 0, 5.0, -5.0)[:, None] * np.ones(2)  # nothing the inputs could explain
+    unfit = replace(samples, deviations=flips)
+    result = compare(unfit, ["ols", "mra"], splits.leave_one_cycle_out(unfit), robustness=False)
+    assert result.best("z_um") is None
+    assert verdict(result).startswith("No model may be used for z_um and x_um")
+
+
+def test_every_number_of_the_table_is_on_the_page(comparison: Comparison, page: str) -> None:
+    for a in comparison.overall():
+        assert f"{a.metric('rms'):.2f}" in page
+        assert f"{a.none_metric('rms'):.2f}" in page
+
+
+def test_summary_holds_what_was_measured(comparison: Comparison, recording: Recording) -> None:
+    found = summarise(comparison, [recording])
+    assert found["recordings"][0]["rows"] == 800
+    assert [c["name"] for c in found["recordings"][0]["cycles"]] == [c.name for c in recording.cycles]
+    assert [t["name"] for t in found["targets"]] == ["z_um", "x_um"]
+    assert all(len(row["cells"]) == 4 for t in found["targets"] for row in t["per_cycle"])
+
+
+def test_the_page_needs_no_network(page: str) -> None:
+    assert not re.findall(r"""(?:src|href)=["'](?!#)[^"']+["']""", page.replace("xlink:href", "href"))
+    assert "<script" not in page
+    assert "url(http" not in page
+    assert "@import" not in page
+
+
+def test_ids_of_the_figures_do_not_collide(page: str) -> None:
+    clips = re.findall(r'<clipPath id="([^"]+)"', page)
+    assert len(clips) > 5
+    assert len(clips) == len(set(clips))
+
+
+def test_the_page_is_the_same_from_run_to_run(comparison: Comparison, recording: Recording, page: str) -> None:
+    assert html.render(comparison, [recording]) == page
+
+
+def test_a_split_and_a_speed_that_is_not_recorded() -> None:
+    recording = small_machine()
+    channels = tuple(c for c in recording.channels if c.name != "spindle_rpm")
+    bare = Recording("bare", recording.time, recording.table.drop(columns="spindle_rpm"), channels, recording.cycles)
+    samples = stack([bare], ["z_um"])
+    result = compare(samples, ["ols", "dynamic"], splits.parse("0.6/0.2", samples), robustness=False)
+    assert "rows 480-639" in html.render(result, [bare])
+
+
+def test_names_from_a_file_cannot_inject_markup() -> None:
+    recording = small_machine()
+    evil = Recording("<script>alert(1)</script>", recording.time, recording.table, recording.channels, recording.cycles)
+    samples = stack([evil], ["z_um"])
+    result = compare(samples, ["ols"], splits.parse("0.6/0.2", samples), robustness=False)
+    assert "<script>alert" not in html.render(result, [evil])
+
+
+def test_a_real_browser_shows_it(page: str, tmp_path: Path) -> None:
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.skip("chromium is not installed: apt-get install chromium (make test does)")
+    source, picture = tmp_path / "report.html", tmp_path / "page.png"
+    source.write_text(page, encoding="utf-8")
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"]
+    flags += [
+        "--disable-background-networking",
+        "--disable-component-update",
+        f"--user-data-dir={tmp_path / 'profile'}",
+    ]
+    shown = subprocess.run(
+        [browser, *flags, "--window-size=1100,2400", f"--screenshot={picture}", "--dump-dom", source.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "Thermal compensation: may it be used?" in shown.stdout
+    # matplotlib comes with the extra, so its reader will do: a page that was drawn is neither white nor of one colour
+    from matplotlib.image import imread
+
+    pixels = imread(picture)
+    assert pixels.shape[:2] == (2400, 1100)
+    ink = (pixels[..., :3].mean(axis=2) < 0.6).mean(axis=1)
+    assert (ink > 0.01).mean() > 0.15
