@@ -1,0 +1,106 @@
+"""One live sample: the online step and the frozen model beside their estimator and a scikit-learn pipeline.
+
+Run with ``python benchmarks/bench_online.py``. All sides are timed in turn in one run, on the same readings; frozen
+model and estimator must say the same to 1e-12 relative. Goal: the median online step takes at most 50 us.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.linear_model import Ridge
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from thermocomp.compensation import online
+from thermocomp.core import lagbank
+from thermocomp.core.correction import Limits
+from thermocomp.core.model import Input
+from thermocomp.core.reading import Reading
+from thermocomp.models.dynamic import DynamicRidge
+
+FloatArray = NDArray[np.float64]
+
+GOAL_US = 50.0
+N_ROWS, N_TEMPERATURES = 4000, 16
+
+
+def recording(seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
+    """Return inputs (temperatures, then the speed), drift, time steps and cycles of four runs and stops."""
+    rng = np.random.default_rng(seed)
+    speed = np.repeat([0, 1500, 0, 4000, 0, 2500, 0, 3500], N_ROWS // 8).astype(float)
+    steps = np.full(N_ROWS, 30.0)
+    taus = rng.uniform(300, 10_000, N_TEMPERATURES)
+    heat = np.repeat(((speed / 1e3) ** 1.7)[:, None], N_TEMPERATURES, axis=1)
+    rises = lagbank.run(heat, steps, taus)
+    drift = rises @ rng.normal(size=N_TEMPERATURES) + 0.1 * rng.normal(size=N_ROWS)
+    steps[0] = np.inf
+    return (
+        np.column_stack([rises + 0.02 * rng.normal(size=rises.shape), speed]),
+        drift,
+        steps,
+        np.arange(N_ROWS) // 1000,
+    )
+
+
+def percentiles(job: Callable[[int], object], count: int) -> tuple[float, float]:
+    """Return median and 99th percentile of single calls [us]."""
+    for k in range(50):
+        job(k)
+    times = np.empty(count)
+    for k in range(count):
+        begin = time.perf_counter_ns()
+        job(50 + k)
+        times[k] = time.perf_counter_ns() - begin
+    return float(np.median(times)) / 1e3, float(np.quantile(times, 0.99)) / 1e3
+
+
+def main() -> int:
+    X, y, dt, cycle = recording()
+    speed = N_TEMPERATURES
+    estimator = DynamicRidge(speed=[speed]).fit(X, y, dt=dt, cycle=cycle)
+    names = [f"t{k}" for k in range(N_TEMPERATURES)] + ["n"]
+    quantities = [("temperature", "degC")] * N_TEMPERATURES + [("spindle_speed", "1/min")]
+    inputs = [
+        Input(name, quantity, unit, 0.0, False, float(low), float(high))
+        for name, (quantity, unit), low, high in zip(names, quantities, X.min(axis=0), X.max(axis=0), strict=True)
+    ]
+    model = estimator.freeze(target="z", inputs=inputs)
+    state, frozen = model.init(), np.empty(N_ROWS)
+    for k in range(N_ROWS):
+        state, frozen[k] = model.step(state, X[k], 30.0)
+    expected = estimator.predict(X, dt=dt)
+    worst = float(np.abs(frozen - expected).max() / np.abs(expected).max())
+    print(f"frozen model against its estimator, {N_ROWS} rows: largest relative difference {worst:.1e} (goal 1e-12)")
+
+    readings = [Reading(30.0 * k, dict(zip(names, row.tolist(), strict=True))) for k, row in enumerate(X)]
+    limits, live, last = Limits(), online.start([model]), model.init()
+
+    def online_step(k: int) -> None:
+        nonlocal live
+        live, _ = online.step([model], limits, live, readings[k], readings[k].time)
+
+    def model_step(k: int) -> None:
+        nonlocal last
+        last, _ = model.step(last, X[k], 30.0)
+
+    pipeline = make_pipeline(StandardScaler(), Ridge()).fit(X, y)
+    lags = len(model.lagged)
+    rows = [
+        ("online step: gate, model, limits", percentiles(online_step, 3000)),
+        (f"frozen model alone ({len(names)} inputs, {lags} lags)", percentiles(model_step, 3000)),
+        ("scikit-learn pipeline, one row, no dynamics", percentiles(lambda k: pipeline.predict(X[k : k + 1]), 1500)),
+    ]
+    print(f"{'one sample':<48} {'p50 [us]':>9} {'p99 [us]':>9} {'peer / this':>12}")
+    peer = rows[-1][1][0]
+    for title, (p50, p99) in rows:
+        print(f"{title:<48} {p50:>9.1f} {p99:>9.1f} {peer / p50:>11.1f}x")
+    reached = worst <= 1e-12 and rows[0][1][0] <= GOAL_US
+    print(f"goal p50 <= {GOAL_US:.0f} us: {'reached' if reached else 'MISSED'}")
+    return 0 if reached else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,27 @@
+"""Run every benchmark, one after the other, each in a process of its own with one thread for linear algebra.
+
+Run with ``python benchmarks/run.py [NAME ...]``, such as ``stepwise online``. Exit code 1 if a goal is missed.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+
+def main() -> int:
+    here = Path(__file__).resolve().parent
+    wanted = sys.argv[1:]
+    scripts = [p for p in sorted(here.glob("bench_*.py")) if not wanted or p.stem.removeprefix("bench_") in wanted]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    missed = []
+    for script in scripts:
+        print(f"\n== {script.stem.removeprefix('bench_')}", flush=True)
+        if subprocess.run([sys.executable, str(script)], env=environment, check=False).returncode:
+            missed.append(script.stem.removeprefix("bench_"))
+    print(f"\ngoals missed in: {', '.join(missed)}" if missed else "\nall goals reached")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
