@@ -114,6 +114,23 @@ def test_missing_readings_hold_the_prediction(recording: Recording, samples: Sam
     assert np.abs(predicted[310:] - full[310:]).max() < 3.0
 
 
+@pytest.mark.parametrize("policy", ["clip", "hold", "fade"])
+def test_skipped_rows_make_no_difference(policy: str, recording: Recording, samples: Samples) -> None:
+    """A model without memory is stepped through the block only, and says there what it says in a whole replay."""
+    table = recording.table.copy()
+    table.loc[[0, 399, 400, 401, 500], "t1_C"] = np.nan
+    gappy = stack([replace(recording, table=table)], ["z_um"])
+    learn = np.arange(len(samples)) < 200  # a slow cycle: later ones leave its range
+    model = train("ols", gappy, 0, learn, support=Support(policy)).model  # type: ignore[arg-type]
+    everything = np.ones(len(samples), np.bool_)
+    block = (np.arange(len(samples)) >= 400) & (np.arange(len(samples)) < 600)
+    whole, beyond = replay(model, gappy, everything)
+    part, part_beyond = replay(model, gappy, block)
+    assert np.array_equal(part, whole[block])
+    assert np.array_equal(part_beyond, beyond[block])
+    assert beyond[block].any()
+
+
 def test_replay_is_what_the_online_step_commands(samples: Samples) -> None:
     model = train("dynamic", samples, 0, np.ones(len(samples), np.bool_)).model
     rows = np.arange(len(samples)) < 120

@@ -49,8 +49,8 @@ def replay(
         mine = np.flatnonzero(samples.test == test)
         mine = mine[: np.flatnonzero(rows[mine]).max() + 1]
         state, last = model.init(), samples.time[mine[0]]
-        for k in mine:
-            if usable[k]:
+        for k, needed in zip(mine, _needed(model, usable[mine], rows[mine]), strict=True):
+            if needed:
                 reading = values[k] if disturb is None else disturb(values[k], reference[test])
                 state, _ = model.step(state, reading, float(samples.time[k] - last))
                 last = samples.time[k]
@@ -58,3 +58,15 @@ def replay(
                 predicted.append(state.deviation)
                 beyond.append(np.any(state.outside, axis=-1))
     return np.array(predicted), np.array(beyond)
+
+
+def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:
+    """Return the rows of a test that have to be stepped through to know the wanted ones."""
+    if model.remembers or model.support.policy == "hold" or not usable.any():
+        return usable
+    # A model without memory needs its zero, the wanted readings, and for a wanted row without one the reading before.
+    needed = usable & wanted
+    needed[np.argmax(usable)] = True
+    before = np.maximum.accumulate(np.where(usable, np.arange(len(usable)), 0))
+    needed[before[wanted]] = True
+    return needed & usable

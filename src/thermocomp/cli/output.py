@@ -57,7 +57,7 @@ def show_fit(fitted: Fitted, path: Path, console: Console, *, as_json: bool) -> 
         return
     console.print(f"Judged on: {fitted.comparison.protocol.name}")
     table = Table()
-    for heading in ("target", "sensors", "R2 of the fit", "unseen RMS [um]", "none RMS [um]", "verdict"):
+    for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):
         table.add_column(heading, justify="left" if heading in ("target", "verdict") else "right")
     for m, r2 in zip(fitted.models, fitted.r_squared, strict=True):
         honest = m.honest_error

@@ -35,6 +35,7 @@ class LinearDynamic(ErrorModel):
     """
 
     family: ClassVar[str] = "linear-dynamic"
+    remembers: ClassVar[bool] = True
 
     signals: tuple[Term, ...]
     direct: tuple[float, ...]

@@ -175,6 +175,7 @@ class ErrorModel(ABC):
     """
 
     family: ClassVar[str]
+    remembers: ClassVar[bool]  #: False: the deviation depends on the last reading alone
 
     target: str
     unit: str

@@ -28,6 +28,7 @@ class Polynomial(ErrorModel):
     """
 
     family: ClassVar[str] = "polynomial"
+    remembers: ClassVar[bool] = False
 
     variables: tuple[Variable, ...]
     terms: tuple[Term, ...]

@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
 SHADE = "#f1f1ee"
-POINTS = 1200  # of a curve: enough for the eye, light enough for a page
+POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
 
 _STYLE = {
     "svg.fonttype": "none",
@@ -134,11 +134,17 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
         axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
         for ax in axes.flat[len(blocks) :]:
             ax.set_visible(False)
+        points = POINTS // columns
         for ax, block in zip(axes.flat, blocks, strict=False):
             hours = _clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
-            ax.plot(*_thinned(hours, block.measured), color=MEASURED, lw=1.8, label="measured = without compensation")
-            ax.plot(*_thinned(hours, block.predicted), color=PREDICTED, ls="--", label="predicted")
+            ax.plot(
+                *_thinned(hours, block.measured, points),
+                color=MEASURED,
+                lw=1.8,
+                label="measured = without compensation",
+            )
+            ax.plot(*_thinned(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
             ax.plot(
                 *_thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
             )
@@ -205,9 +211,9 @@ def _shade_cycles(ax: Axes, recording: Recording) -> None:
             ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
 
 
-def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return at most about `POINTS` points, the extremes of each stretch among them."""
-    stretch = len(x) // (POINTS // 2)
+def _thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
+    """Return at most about `points` points, the extremes of each stretch among them."""
+    stretch = len(x) // (points // 2)
     if stretch < 2 or not np.isfinite(y).all():
         return x, y
     n = len(x) // stretch * stretch
