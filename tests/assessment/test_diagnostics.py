@@ -1,9 +1,9 @@
-"""Collinearity and effective sample size."""
+"""Collinearity."""
 
 import numpy as np
 import pytest
 
-from thermocomp.assessment.diagnostics import collinearity, effective_sample_size
+from thermocomp.assessment.diagnostics import collinearity
 
 RNG = np.random.default_rng(4)
 
@@ -34,16 +34,3 @@ def test_a_copied_sensor_and_a_constant_one() -> None:
 
 def test_no_varying_input() -> None:
     assert collinearity(np.ones((10, 2)), ("a", "b")).names == ()
-
-
-def test_effective_sample_size_of_an_autoregression() -> None:
-    """For an AR(1) series with coefficient r it tends to n (1 - r) / (1 + r)."""
-    r, n = 0.9, 40_000
-    noise = RNG.normal(size=n)
-    series = np.empty(n)
-    series[0] = noise[0]
-    for k in range(1, n):
-        series[k] = r * series[k - 1] + noise[k]
-    assert effective_sample_size(series) == pytest.approx(n * (1 - r) / (1 + r), rel=0.2)
-    assert effective_sample_size(noise) == pytest.approx(n, rel=0.15)
-    assert effective_sample_size(np.ones(7)) == 7.0

@@ -8,12 +8,13 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
-from thermocomp.assessment.diagnostics import Collinearity, collinearity, effective_sample_size
+from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Support
+from thermocomp.models.leastsquares import effective_sample_size
 from thermocomp.models.training import method, train
 from thermocomp.recording.samples import Samples
 

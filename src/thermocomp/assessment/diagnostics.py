@@ -1,4 +1,4 @@
-"""What the data can carry at all: collinearity of the inputs, effective sample size."""
+"""What the data can carry at all: how far the inputs repeat each other."""
 
 from dataclasses import dataclass
 
@@ -52,29 +52,3 @@ def collinearity(values: FloatArray, names: tuple[str, ...]) -> Collinearity:
         condition = float(eigenvalues[0] / smallest) if smallest > 0 else float("inf")
         vif = (directions**2 / eigenvalues[:, None]).sum(axis=0)
     return Collinearity(kept, condition, tuple(float(v) for v in vif))
-
-
-def effective_sample_size(residual: FloatArray) -> float:
-    """Return how many independent rows a residual is worth (E-C12).
-
-    n / (1 + 2 sum of autocorrelations), summed up to the first negative one (Geyer 1992).
-
-    Parameters
-    ----------
-    residual : ndarray of shape (n_rows,)
-
-    Returns
-    -------
-    float
-        Between 1 and n_rows.
-    """
-    n = len(residual)
-    centred = residual - residual.mean()
-    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    correlation = np.fft.irfft(power)[:n]
-    if correlation[0] <= 0:
-        return float(n)
-    correlation = correlation / correlation[0]
-    negative = np.flatnonzero(correlation < 0)
-    stop = int(negative[0]) if negative.size else n
-    return float(np.clip(n / (1.0 + 2.0 * correlation[1:stop].sum()), 1.0, n))

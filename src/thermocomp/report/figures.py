@@ -76,7 +76,9 @@ def measured(recording: Recording) -> str:
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
-                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=1 + (len(channels) > 8), handlelength=1.4)
+                short = max(len(c.name) for c in channels) < 8
+                columns = 2 if short and len(channels) > 8 else 1
+                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, fontsize=7, handlelength=1.4)
         rest[-1].set_xlabel("time [h]")
         rest[-1].margins(x=0)
         return _svg(figure)

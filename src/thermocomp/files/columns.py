@@ -1,0 +1,317 @@
+"""What the columns of a recording are: understood by their headings' units, or by a mapping."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import Unit, unit
+from thermocomp.files.mapping import ColumnMap, Mapping
+
+FloatArray = NDArray[np.float64]
+
+# What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
+_SUFFIXES = {
+    **{s: s for s in ("C", "degC", "°C", "K", "F", "degF", "°F", "nm", "um", "µm", "μm", "mm", "urad", "µrad", "mrad")},
+    **{s: s for s in ("arcsec", "rpm", "s", "ms", "min", "h")},
+    "RPM": "rpm",
+    "mm_min": "mm/min",
+    "m_min": "m/min",
+}
+# In brackets anything but what would turn a frequency into a spindle speed, or a number into a channel.
+_NOT_IN_BRACKETS = ("", "1", "Hz", "1/s")
+_HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
+_BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
+_AXIS = re.compile(r"[xyzuvw]\d?")
+_TIMES = ("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a heading with a unit says.
+
+    Parameters
+    ----------
+    name : str
+        Channel name: the heading with the suffix of the house unit.
+    base : str
+        The heading without its unit.
+    unit : Unit
+    """
+
+    name: str
+    base: str
+    unit: Unit
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the file and the channel it becomes.
+
+    Parameters
+    ----------
+    index : int
+        Position in the file.
+    channel : Channel
+    unit : Unit
+        Of the scaled value.
+    rule : ColumnMap
+        Scale, zero and missing-value codes.
+    """
+
+    index: int
+    channel: Channel
+    unit: Unit
+    rule: ColumnMap
+
+    def convert(self, raw: FloatArray, missing: Sequence[float] = ()) -> tuple[FloatArray, tuple[str, ...]]:
+        """Return the values in the house unit, nan where missing, and notes on what was replaced."""
+        notes = []
+        codes = np.array([*self.rule.missing, *missing])
+        absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
+        if absent.any():
+            found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
+            notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
+        infinite = np.isinf(raw) & ~absent
+        if infinite.any():
+            notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")
+        values = np.where(absent | infinite, np.nan, raw) if notes else raw
+        if self.rule.zero == "first":
+            valid = np.flatnonzero(np.isfinite(values))
+            values = values - values[valid[0]] if valid.size else values
+        elif self.rule.zero:
+            values = values - self.rule.zero
+        # Multiplying only where needed keeps the digits of the file, and its memory.
+        for factor in (self.rule.scale, self.unit.scale):
+            values = values if factor == 1 else values * factor
+        return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which columns of a file are read, and as what.
+
+    Parameters
+    ----------
+    time : int
+        Position of the time column.
+    time_unit : str
+        A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
+    date : int or None
+        Position of a column of dates that goes with a time of day.
+    cycle : int or None
+        Position of the column of cycle labels.
+    columns : tuple of Column
+        One per channel.
+    aliases : dict of str to str
+        Headings and names without unit to channel names.
+    notes : tuple of str
+    """
+
+    time: int
+    time_unit: str
+    date: int | None
+    cycle: int | None
+    columns: tuple[Column, ...]
+    aliases: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def understand(heading: str) -> Meaning | None:
+    """Find the unit in a heading: ``t1_C``, ``drift_mm``, ``T1 [degC]``, ``Temp 1 (°C)``.
+
+    Returns
+    -------
+    Meaning or None
+        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``).
+
+    Raises
+    ------
+    UnitError
+        The brackets hold what looks like a mistyped unit.
+    """
+    heading = heading.strip()
+    found = _BRACKETS.fullmatch(heading)
+    if found:
+        base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
+        if symbol in _NOT_IN_BRACKETS:
+            return None
+        symbol = _SUFFIXES.get(symbol, symbol)
+        try:
+            meant = unit(symbol)
+        except UnitError:
+            # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
+            if get_close_matches(symbol, _SUFFIXES, n=1, cutoff=0.6):
+                raise
+            return None
+    else:
+        ends = [s for s in _SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
+        if not ends:
+            return None
+        suffix = max(ends, key=len)
+        base, meant = heading[: -len(suffix) - 1], unit(_SUFFIXES[suffix])
+    if meant.quantity == "displacement" and _is_position(base, meant.symbol):
+        meant = unit(meant.symbol, "position")
+    # one word, so that the name can go into a formula or a controller
+    return Meaning(f"{'_'.join(base.split())}_{_HOUSE_SUFFIX[meant.house]}", base, meant)
+
+
+def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
+    """Decide which columns are read, and as what.
+
+    Parameters
+    ----------
+    headings : sequence of str
+        The file's headings; an empty one is passed over.
+    mapping : Mapping
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    RecordingError
+        A heading or channel name comes twice; there is no time column or no channel; a mapped column is not there.
+    UnitError
+        A unit is unknown.
+    """
+    for k, heading in enumerate(headings):
+        if heading and heading in headings[:k]:
+            first = list(headings).index(heading) + 1
+            raise RecordingError(
+                f"{source}: columns {first} and {k + 1} are both named {heading!r}; rename one of them"
+            )
+    meanings = _understand_all(headings, mapping, source)
+    time, date, notes = _find_time(headings, meanings, mapping, source)
+    cycle = _find_cycle(headings, mapping, source)
+    columns: list[Column] = []
+    ignored = {k for k in (time, date, cycle) if k is not None}
+    for name, rule in mapping.columns.items():
+        heading = rule.column or name
+        if rule.role == "ignore" and heading not in headings:
+            continue
+        index = _position(heading, headings, f"[columns.{name}]", source)
+        ignored.add(index)
+        if rule.role in ("ignore", "cycle"):
+            continue
+        meaning = meanings[index]
+        meant = rule.conversion or (meaning.unit if meaning else None)
+        if meant is None:
+            raise RecordingError(f"{source}: mapping [columns.{name}]: give it a unit or a role; {heading!r} has none")
+        columns.append(Column(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+    if not mapping.read.only_mapped:
+        for k, meaning in enumerate(meanings):
+            if k not in ignored and meaning is not None and meaning.unit.quantity != "time":
+                channel = Channel(meaning.name, meaning.unit.quantity, meaning.unit.house)
+                columns.append(Column(k, channel, meaning.unit, ColumnMap()))
+                ignored.add(k)
+        left_out = [h for k, h in enumerate(headings) if h and k not in ignored]
+        if left_out:
+            notes.append(f"left out, having no known unit in the heading and no mapping: {', '.join(left_out)}")
+    _check_names(columns, headings, source)
+    columns.sort(key=lambda c: c.index)
+    time_meaning = meanings[time]
+    time_unit = mapping.time.unit or ("timestamp" if mapping.time.format else "")
+    if not time_unit and time_meaning is not None and time_meaning.unit.quantity == "time":
+        time_unit = time_meaning.unit.symbol
+    return Plan(time, time_unit, date, cycle, tuple(columns), _aliases(columns, headings, meanings), tuple(notes))
+
+
+def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:
+    """Understand every heading; a mistyped unit matters only where the mapping does not speak of the column."""
+    mapped = {rule.column or name for name, rule in mapping.columns.items()} | {mapping.time.column}
+    meanings: list[Meaning | None] = []
+    for k, heading in enumerate(headings, start=1):
+        try:
+            meanings.append(understand(heading))
+        except UnitError as e:
+            if heading not in mapped and not mapping.read.only_mapped:
+                raise UnitError(
+                    f"{source}: heading {heading!r} of column {k}: {e}. Correct it, or leave the column out by a "
+                    f'mapping with [columns."{heading}"] role = "ignore"'
+                ) from e
+            meanings.append(None)
+    return meanings
+
+
+def _find_time(
+    headings: Sequence[str], meanings: Sequence[Meaning | None], mapping: Mapping, source: str
+) -> tuple[int, int | None, list[str]]:
+    """Find the time column, and the column of dates where the time column holds only a time of day."""
+    if mapping.time.column:
+        return _position(mapping.time.column, headings, "[time]", source), None, []
+    timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
+    plain = {h.strip().casefold(): k for k, h in enumerate(headings)}
+    named = [k for k, m in timed.items() if m.base.casefold() in _TIMES]
+    if named:
+        return named[0], None, []
+    if "date" in plain and "time" in plain:
+        return plain["time"], plain["date"], []
+    bare = [plain[name] for name in _TIMES if name in plain and name not in ("t", "elapsed")]
+    if bare:
+        return bare[0], None, []
+    if len(timed) == 1:
+        index = next(iter(timed))
+        return index, None, [f"{headings[index]!r} is taken as the time"]
+    raise RecordingError(
+        f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
+        'time_h, timestamp) in the heading line, or give a mapping with [time] column = "..." and unit = "s"'
+    )
+
+
+def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int | None:
+    if mapping.cycles.column:
+        return _position(mapping.cycles.column, headings, "[cycles]", source)
+    for name, rule in mapping.columns.items():
+        if rule.role == "cycle":
+            return _position(rule.column or name, headings, f"[columns.{name}]", source)
+    mapped = {rule.column or name for name, rule in mapping.columns.items()}
+    return next((k for k, h in enumerate(headings) if h.casefold() == "cycle" and h not in mapped), None)
+
+
+def _position(heading: str, headings: Sequence[str], table: str, source: str) -> int:
+    if heading in headings:
+        return list(headings).index(heading)
+    near = get_close_matches(heading, headings, n=3, cutoff=0.5)
+    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(h for h in headings if h)}"
+    raise RecordingError(f"{source}: mapping {table}: the file has no column {heading!r}; {hint}")
+
+
+def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str) -> None:
+    if not columns:
+        raise RecordingError(
+            f"{source}: none of the columns {', '.join(h for h in headings if h)} is understood as a channel; put the "
+            "unit behind the name (t1_C, drift_um, spindle_rpm) or give a mapping with a table [columns.NAME] for each"
+        )
+    seen: dict[str, Column] = {}
+    for column in columns:
+        other = seen.setdefault(column.channel.name, column)
+        if other is not column:
+            raise RecordingError(
+                f"{source}: columns {headings[other.index]!r} and {headings[column.index]!r} would both become channel "
+                f"{column.channel.name!r}; rename one of them, or map it"
+            )
+
+
+def _aliases(columns: Sequence[Column], headings: Sequence[str], meanings: Sequence[Meaning | None]) -> dict[str, str]:
+    """Headings, and names without a unit where only one channel has them, to channel names."""
+    names = {c.channel.name for c in columns}
+    aliases: dict[str, str] = {}
+    for c in columns:
+        aliases.setdefault(headings[c.index], c.channel.name)
+    bases = [(m.base, c.channel.name) for c in columns if (m := meanings[c.index]) is not None]
+    for base, name in bases:
+        if [b for b, _ in bases].count(base) == 1:
+            aliases.setdefault(base, name)
+    return {alias: name for alias, name in aliases.items() if alias not in names}
+
+
+def _is_position(base: str, symbol: str) -> bool:
+    words = re.split(r"[\s_.-]+", base.casefold())
+    if any(w in ("pos", "position") for w in words):
+        return True
+    return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)

@@ -1,0 +1,271 @@
+"""The small TOML that says what the columns of a foreign recording are."""
+
+import codecs
+import math
+import tomllib
+from collections.abc import Mapping as AbstractMapping
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+
+from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.units import HOUSE_UNITS, Unit, unit
+
+Role = Literal[
+    "temperature",
+    "displacement",
+    "spindle_speed",
+    "position",
+    "angle",
+    "feed",
+    "dimensionless",
+    "cycle",
+    "ignore",
+]
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """Table ``[time]``: the column that holds the time.
+
+    Parameters
+    ----------
+    column : str
+        Its heading; empty: found by its heading (``time_s``, ``timestamp`` ...).
+    unit : str
+        A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
+    format : str
+        How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
+    start : str
+        ISO timestamp of the first row, for files that hold only relative times.
+    """
+
+    column: str = ""
+    unit: str = ""
+    format: str = ""
+    start: str = ""
+
+
+@dataclass(frozen=True)
+class ColumnMap:
+    """Table ``[columns.NAME]``: one column that becomes the channel NAME.
+
+    The value in the file's unit is ``scale * (number in the file - zero)``.
+
+    Parameters
+    ----------
+    column : str
+        Its heading in the file; empty: NAME itself.
+    unit : str
+        Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
+    role : str, optional
+        What it measures, or ``cycle`` (labels of thermal cycles), or ``ignore``; without it the unit decides.
+    scale : float
+        Factor from the number in the file to `unit`.
+    zero : float or 'first'
+        Number in the file that counts as zero; ``first``: the first valid one of the column.
+    missing : tuple of float
+        Numbers in the file that stand for a missing value.
+    place : str
+        Where the sensor sits, in words.
+    """
+
+    column: str = ""
+    unit: str = ""
+    role: Role | None = None
+    scale: float = 1.0
+    zero: float | Literal["first"] = 0.0
+    missing: tuple[float, ...] = ()
+    place: str = ""
+
+    @property
+    def conversion(self) -> Unit | None:
+        """What leads to the house unit; None if neither unit nor role says."""
+        quantity = self.role if self.role in HOUSE_UNITS else None
+        if self.unit:
+            return unit(self.unit, quantity)
+        return unit(HOUSE_UNITS[quantity], quantity) if quantity else None
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Table ``[read]``: how the file is written; what is left empty is found out.
+
+    Parameters
+    ----------
+    delimiter : str
+        One character; a space stands for any white space.
+    decimal : {'', '.', ','}
+    encoding : str
+        Such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
+    comment : str
+        Lines that begin with it are passed over; empty: there are none.
+    missing : tuple of float
+        Numbers that stand for a missing value in every column.
+    only_mapped : bool
+        True: columns that have no table ``[columns.NAME]`` are left out.
+    """
+
+    delimiter: str = ""
+    decimal: Literal["", ".", ","] = ""
+    encoding: str = ""
+    comment: str = "#"
+    missing: tuple[float, ...] = ()
+    only_mapped: bool = False
+
+
+@dataclass(frozen=True)
+class CycleRule:
+    """Table ``[cycles]``: how the test is split into thermal cycles.
+
+    Parameters
+    ----------
+    column : str
+        Column of labels; empty: a column named ``cycle``, else the spindle speed.
+    min_run_s, min_stop_s : float
+        Shorter runs and stops of the spindle do not split [s].
+    """
+
+    column: str = ""
+    min_run_s: float = 300.0
+    min_stop_s: float = 300.0
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What the columns of a file are; see the tables' classes.
+
+    Parameters
+    ----------
+    time : TimeColumn
+    columns : mapping of str to ColumnMap
+        By channel name.
+    read : ReadOptions
+    cycles : CycleRule
+    """
+
+    time: TimeColumn = TimeColumn()
+    columns: AbstractMapping[str, ColumnMap] = field(default_factory=dict)
+    read: ReadOptions = ReadOptions()
+    cycles: CycleRule = CycleRule()
+
+    def __post_init__(self) -> None:
+        if self.time.unit not in ("", "timestamp"):
+            _unit_in("[time]", self.time.unit, "time")
+        for name, column in self.columns.items():
+            table = f"[columns.{name}]"
+            _unit_in(table, column.unit, column.role if column.role in HOUSE_UNITS else None)
+            if column.scale == 0 or not math.isfinite(column.scale):
+                raise InputError(f"{table}: scale = {column.scale}: must be a number other than 0")
+        if len(self.read.delimiter) > 1:
+            raise InputError(f"[read]: delimiter = {self.read.delimiter!r}: must be one character")
+        for name in ("min_run_s", "min_stop_s"):
+            if not getattr(self.cycles, name) >= 0:
+                raise InputError(f"[cycles]: {name} = {getattr(self.cycles, name)}: must not be negative")
+        _check_encoding(self.read.encoding or "utf-8")
+
+    def over(self, below: "Mapping") -> "Mapping":
+        """Return this mapping with what only `below` says about the time and the columns added."""
+        time = below.time if self.time == TimeColumn() else self.time
+        return replace(self, time=time, columns={**below.columns, **self.columns})
+
+
+#: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
+ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
+
+_TABLES: dict[str, type] = {"time": TimeColumn, "columns": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
+
+
+def read_mapping(path: str | Path) -> Mapping:
+    """Read a mapping TOML.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Mapping
+
+    Raises
+    ------
+    InputError
+        No such file, not TOML, or a key or value that is not understood; the message names file, table and key.
+    UnitError
+        A unit is unknown or does not belong to the role.
+
+    Examples
+    --------
+    A stepper's counts as a displacement, and a sensor that says -180 where there is none::
+
+        [time]
+        column = "time"
+        format = "%Y/%m/%d-%H:%M:%S"
+
+        [columns.z]
+        column = "mcu_pos_z"
+        role = "displacement"
+        unit = "mm"
+        scale = 0.0025
+        zero = "first"
+
+        [columns.chamber]
+        column = "chamber_t"
+        role = "temperature"
+        missing = [-180.0]
+    """
+    source = Path(path)
+    try:
+        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError as e:
+        raise InputError(f"{source}: no such mapping file") from e
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{source}: cannot be read as a mapping: {e}") from e
+    except tomllib.TOMLDecodeError as e:
+        raise InputError(f"{source}: not valid TOML: {e}") from e
+    try:
+        return ADAPTER.validate_python(content)
+    except ValidationError as e:
+        raise InputError(f"{source}: {_explain(e)}") from e
+    except InputError as e:
+        raise type(e)(f"{source}: {e}") from e
+
+
+def _explain(failure: ValidationError) -> str:
+    """Say table, key and the nearest known key of pydantic's first error."""
+    errors = failure.errors()
+    error = errors[0]
+    depth = 3 if error["loc"][0] == "columns" else 2
+    loc = [str(part) for part in error["loc"][:depth]]  # what follows are members of a union, which no user wrote
+    inside = _TABLES.get(loc[0]) if len(loc) == depth else None
+    table = f"table [{'.'.join(loc[:-1])}]" if len(loc) > 1 else "top level"
+    key = loc[-1]
+    if error["type"] != "unexpected_keyword_argument":
+        reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
+        return f"{table}: key {key!r} = {error['input']!r}: {reasons}"
+    known = [f.name for f in fields(inside or Mapping)]
+    near = get_close_matches(key, known, n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{table}: unknown key {key!r}; {hint}Known are {', '.join(known)}"
+
+
+def _unit_in(table: str, symbol: str, quantity: str | None) -> None:
+    try:
+        if symbol:
+            unit(symbol, quantity)
+    except UnitError as e:
+        raise UnitError(f"{table}: {e}") from e
+
+
+def _check_encoding(name: str) -> None:
+    try:
+        plain = codecs.decode(b"a;1\n", name) == "a;1\n"
+    except (LookupError, UnicodeDecodeError, TypeError) as e:
+        raise InputError(f"[read]: encoding = {name!r} is not known; use utf-8, latin-1 or cp1252") from e
+    if not plain:
+        raise InputError(
+            f"[read]: encoding = {name!r}: save the file as UTF-8; only encodings that hold ASCII are read"
+        )

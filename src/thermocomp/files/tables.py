@@ -1,0 +1,208 @@
+"""Raw tables, their cells not yet understood: XLSX and Parquet, and what all kinds of files share."""
+
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn, Protocol
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core.exceptions import MissingExtraError, RecordingError
+
+#: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
+EMBEDDED = "thermocomp"
+
+#: texts that stand for a missing value, besides an empty cell
+MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
+
+
+class Table(Protocol):
+    """The cells of a file before anybody knows what its columns mean."""
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """Stripped headings; empty where there is none."""
+
+    @property
+    def embedded(self) -> str:
+        """JSON of the mapping that thermocomp wrote into the file; empty if there is none."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know."""
+
+    def is_number(self, column: int) -> bool:
+        """Return whether the first filled cell of a column is a number."""
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+        """Read some columns, as float64 and as they are; the table's columns are named by position.
+
+        Raises
+        ------
+        RecordingError
+            A cell of `numbers` holds text.
+        """
+
+    def place(self, row: int) -> str:
+        """Say where a row stands in the file, such as ``line 7``."""
+
+
+@dataclass(frozen=True)
+class FrameTable:
+    """A sheet or a Parquet file, which arrive as a whole.
+
+    Parameters
+    ----------
+    source : str
+        The file, for messages.
+    headings : tuple of str
+    frame : DataFrame
+        Cells as they are; columns named by position.
+    rows : sequence of int
+        Row in the file of each row of `frame`, from 1.
+    embedded : str
+    notes : tuple of str
+    """
+
+    source: str
+    headings: tuple[str, ...]
+    frame: pd.DataFrame
+    rows: Sequence[int]
+    embedded: str = ""
+    notes: tuple[str, ...] = ()
+
+    def is_number(self, column: int) -> bool:
+        """Return whether the first filled cell of a column is a number."""
+        filled = self.frame[column].dropna()
+        return filled.empty or is_float(str(filled.iloc[0]))
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+        """Read columns; see `Table.load`."""
+        data = {k: self.frame[k] for k in texts}
+        for k in numbers:
+            cells = self.frame[k]
+            if cells.dtype != np.float64:
+                bad = not_numbers(cells).to_numpy()
+                if bad.any():
+                    row = int(np.flatnonzero(bad)[0])
+                    refuse_cell(self, self.source, row, k, cells.iloc[row])
+                cells = pd.to_numeric(cells, errors="coerce").astype(np.float64)
+            data[k] = cells
+        return pd.DataFrame(data, copy=False)
+
+    def place(self, row: int) -> str:
+        """Say in which row of the sheet or file, counted from 1, a row stands."""
+        return f"row {self.rows[row]}"
+
+
+def open_xlsx(path: Path) -> FrameTable:
+    """Open the first sheet of a workbook.
+
+    Raises
+    ------
+    RecordingError
+        It is not a workbook, or holds no recording.
+    """
+    try:
+        with pd.ExcelFile(path, engine="openpyxl") as book:
+            sheets = [str(s) for s in book.sheet_names]
+            cells = pd.read_excel(book, sheet_name=sheets[0], header=None, dtype=object)
+    except ImportError as e:
+        raise MissingExtraError("study", "openpyxl") from e
+    except (ValueError, KeyError, zipfile.BadZipFile) as e:
+        raise RecordingError(f"{path}: is not a workbook in the XLSX format ({e}); save it anew as .xlsx") from e
+    notes = [f"only the first sheet {sheets[0]!r} of {len(sheets)} is read"] if len(sheets) > 1 else []
+    if cells.empty:
+        raise RecordingError(f"{path}: sheet {sheets[0]!r} is empty; a recording has a heading row and rows of numbers")
+    remark = cells[0].map(lambda c: isinstance(c, str) and c.lstrip().startswith("#"))
+    content = cells[~remark.astype(bool) & cells.notna().any(axis=1)]
+    headings = ["" if pd.isna(c) else str(c).strip() for c in content.iloc[0]] if len(content) else []
+    check_headings(path, headings, n_rows=len(content) - 1)
+    rows = [int(k) + 1 for k in content.index[1:]]
+    return FrameTable(str(path), tuple(headings), content.iloc[1:].reset_index(drop=True), rows, notes=tuple(notes))
+
+
+def open_parquet(path: Path) -> FrameTable:
+    """Open a Parquet file.
+
+    Raises
+    ------
+    RecordingError
+        It is not a Parquet file, or holds no recording.
+    """
+    try:
+        frame = pd.read_parquet(path)
+    except ImportError as e:
+        raise MissingExtraError("study", "pyarrow") from e
+    except (ValueError, KeyError) as e:  # pyarrow's own errors are ValueErrors
+        raise RecordingError(f"{path}: is not a Parquet file, or a damaged one ({e}); write it anew") from e
+    embedded = str(frame.attrs.get(EMBEDDED, ""))
+    if not isinstance(frame.index, pd.RangeIndex):
+        frame = frame.reset_index()
+    headings = tuple(str(c).strip() for c in frame.columns)
+    check_headings(path, headings, n_rows=len(frame))
+    frame.columns = pd.RangeIndex(len(headings))
+    return FrameTable(str(path), headings, frame, range(1, len(frame) + 1), embedded)
+
+
+def check_headings(path: Path, headings: Sequence[str], n_rows: int) -> None:
+    """Refuse a table that cannot be a recording, whatever its columns mean.
+
+    Raises
+    ------
+    RecordingError
+        No headings, numbers instead of headings, one column, or no rows.
+    """
+    filled = [h for h in headings if h.strip()]
+    if not filled:
+        raise RecordingError(f"{path}: no heading line; a recording has headings such as time_s,t1_C,drift_um")
+    if all(is_float(h.replace(",", ".")) for h in filled):
+        raise RecordingError(
+            f"{path}: the first row holds numbers ({', '.join(filled[:3])} ...); put a heading line before it, such as "
+            "time_s,t1_C,drift_um"
+        )
+    if len(filled) < 2:
+        raise RecordingError(
+            f"{path}: only one column, {filled[0]!r}; a recording needs a time and at least one channel. If a CSV file "
+            'has another delimiter than , ; | tab or white space: give it in a mapping, [read] delimiter = "..."'
+        )
+    if n_rows < 1:
+        raise RecordingError(f"{path}: a heading line but no rows below it; the recording is empty")
+
+
+def refuse_cell(
+    table: Table, source: str, row: int, column: int, cell: object, cause: Exception | None = None
+) -> NoReturn:
+    """Tell which cell holds text where a number belongs.
+
+    Raises
+    ------
+    RecordingError
+        Always.
+    """
+    raise RecordingError(
+        f"{source}: {table.place(row)}, column {table.headings[column]!r}: {str(cell)!r} is not a number; correct the "
+        'cell, leave it empty for a missing value, or leave the column out by a mapping with role = "ignore"'
+    ) from cause
+
+
+def not_numbers(cells: "pd.Series[Any]") -> "pd.Series[bool]":
+    """Return where a cell is filled with something that is not a number."""
+    filled = cells.notna()
+    if pd.api.types.is_datetime64_any_dtype(cells.dtype):
+        return filled
+    bad = filled & pd.to_numeric(cells, errors="coerce").isna()
+    if bad.any():
+        bad &= ~cells.astype(str).str.strip().str.casefold().isin(MISSING_TEXT)
+    return bad
+
+
+def is_float(text: str) -> bool:
+    """Return whether a text is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,283 @@
+"""CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
+
+import csv
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.files.mapping import ReadOptions
+from thermocomp.files.tables import EMBEDDED, MISSING_TEXT, check_headings, is_float, not_numbers, refuse_cell
+
+_SAMPLE_LINES = 100
+_CHUNK = 100_000  # rows that are text in memory at a time
+_BOM = b"\xef\xbb\xbf"
+_MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
+_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
+# pandas before 3.1 may read the last digit wrong unless told
+_PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
+_EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round_trip"}
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A text file with a heading line; made by `open_csv`. A `thermocomp.files.tables.Table`.
+
+    Parameters
+    ----------
+    path : Path
+    headings : tuple of str
+    sample : tuple of tuple of str
+        Cells of the first rows.
+    delimiter : str
+        One character; a space stands for any white space.
+    decimals : str
+        Decimal signs to try, in this order.
+    encoding : str
+    skipped : tuple of int
+        Lines that are no rows (headings, comments, blank ones), from 0.
+    n_rows : int
+    embedded : str
+    notes : tuple of str
+    """
+
+    path: Path
+    headings: tuple[str, ...]
+    sample: tuple[tuple[str, ...], ...]
+    delimiter: str
+    decimals: str
+    encoding: str
+    skipped: tuple[int, ...]
+    n_rows: int
+    embedded: str
+    notes: tuple[str, ...] = ()
+
+    def is_number(self, column: int) -> bool:
+        """Return whether the first filled cell of a column is a number."""
+        cells = (row[column].strip() for row in self.sample if column < len(row))
+        first = next((c for c in cells if c.casefold() not in MISSING_TEXT), "nan")
+        return is_float(first) or is_float(first.replace(",", "."))
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+        """Read columns; see `thermocomp.files.tables.Table.load`."""
+        types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
+        options = self._options(types)
+        failure: ValueError = ValueError("nothing tried")
+        for decimal in self.decimals:
+            try:
+                with pd.read_csv(self.path, decimal=decimal, **options, **_EXACT) as chunks:
+                    frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
+                if len(frame) != self.n_rows:
+                    raise RecordingError(
+                        f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
+                        "goes over the end of its line; close it, or delete the mark"
+                    )
+                return frame
+            except UnicodeDecodeError as e:
+                raise RecordingError(
+                    f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
+                    "[read] encoding"
+                ) from e
+            except ValueError as e:
+                failure = e
+        with suppress(ValueError):  # pandas' own reasons; what is wrong with a cell comes as a RecordingError
+            self._refuse_text(numbers, failure)
+        raise RecordingError(f"{self.path}: cannot be read as a table: {failure}") from failure
+
+    def place(self, row: int) -> str:
+        """Say in which line of the file, counted from 1, a row stands."""
+        line = row
+        while (shifted := row + bisect_right(self.skipped, line)) != line:
+            line = shifted
+        return f"line {line + 1}"
+
+    def _options(self, types: dict[int, Any]) -> dict[str, Any]:
+        return {
+            "sep": r"\s+" if self.delimiter == " " else self.delimiter,
+            "header": None,
+            "names": range(len(self.headings)),
+            "usecols": sorted(types),
+            "dtype": types,
+            "index_col": False,
+            "skiprows": list(self.skipped),
+            "skipinitialspace": True,
+            "encoding": self.encoding,
+            "chunksize": _CHUNK,
+            "keep_default_na": False,
+            "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
+        }
+
+    def _refuse_text(self, numbers: Sequence[int], cause: Exception) -> None:
+        """Name the first cell that is not a number; slow, but only met on the way to an error."""
+        with pd.read_csv(self.path, **self._options(dict.fromkeys(numbers, str))) as chunks:
+            for chunk in chunks:
+                bad = np.logical_and.reduce([_not_numbers(chunk, decimal) for decimal in self.decimals])
+                if bad.any():
+                    row, k = (int(v) for v in np.argwhere(bad)[0])
+                    column: Any = chunk.columns[k]
+                    refuse_cell(self, str(self.path), int(chunk.index[row]), column, chunk.iloc[row, k], cause)
+
+
+def open_csv(path: Path, options: ReadOptions) -> CsvTable:
+    """Find out how a text file is written: one pass over its lines, none of which is kept.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+        What is known beforehand.
+
+    Raises
+    ------
+    RecordingError
+        Empty, binary, no heading line, no rows, one column, or rows of unequal length.
+    """
+    _refuse_binary(path)
+    comment = options.comment.encode()
+    skipped: list[int] = []
+    first = [line for _, line in islice(_content(path, comment, []), _SAMPLE_LINES)]
+    if not first:
+        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
+    sample = [line.decode("latin-1") for line in first]
+    delimiter = options.delimiter or _sniff_delimiter(sample)
+    ending = delimiter.encode()
+    width, is_utf8, n_rows = _cells(first[0], delimiter), True, -1
+    for number, line in _content(path, comment, skipped):
+        is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
+        n_rows += 1
+        if n_rows == 0:  # the heading line
+            skipped.append(number)
+            continue
+        cells = _cells(line, delimiter)
+        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
+            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
+        if cells != width:
+            raise RecordingError(_ragged(path, number + 1, cells, width, line, delimiter))
+    encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
+    try:
+        headings = [h.strip() for h in _split(first[0].decode(encoding), delimiter)]
+    except UnicodeDecodeError as e:
+        raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
+    headings += [""] * (width - len(headings))
+    check_headings(path, headings, n_rows)
+    rows = tuple(tuple(_split(line, delimiter)) for line in sample[1:])
+    return CsvTable(
+        path=path,
+        headings=tuple(headings),
+        sample=rows,
+        delimiter=delimiter,
+        decimals=options.decimal or _sniff_decimal(rows, delimiter),
+        encoding=encoding,
+        skipped=tuple(skipped),
+        n_rows=n_rows,
+        embedded=_embedded(path),
+    )
+
+
+def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
+    """Yield number and text of each line that is neither blank nor a comment; tell the others in `skipped`."""
+    blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
+    with path.open("rb") as f:
+        for number, raw in enumerate(f):
+            line = raw.removeprefix(_BOM) if number == 0 else raw
+            if line.count(b"\r") > line.endswith(b"\r\n"):  # pandas would count lines otherwise than we do
+                raise RecordingError(
+                    f"{path}: line {number + 1} holds a carriage return that does not end it, as in files of old "
+                    "Macintoshes; save the file with the line ends of Unix or Windows"
+                )
+            text = line.lstrip()
+            if not text.strip(blank) or (comment and text.startswith(comment)):
+                skipped.append(number)
+            else:
+                yield number, line
+
+
+def _embedded(path: Path) -> str:
+    """Return the description that thermocomp writes into the first line of its own files."""
+    with path.open("rb") as f:
+        line = f.readline()
+    start = f"# {EMBEDDED}: ".encode()
+    return line.removeprefix(start).decode("utf-8", "replace").strip() if line.startswith(start) else ""
+
+
+def _refuse_binary(path: Path) -> None:
+    with path.open("rb") as f:
+        head = f.read(65536)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise RecordingError(f"{path}: is written in UTF-16; save it as UTF-8 (in a spreadsheet: CSV UTF-8)")
+    kinds = {b"PK\x03\x04": "a workbook or zip file", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file"}
+    kind = next((k for magic, k in kinds.items() if head.startswith(magic)), "")
+    if kind or b"\x00" in head:
+        raise RecordingError(
+            f"{path}: is not text but {kind or 'binary'}; export the recording as CSV, or correct the file's ending"
+        )
+
+
+def _sniff_delimiter(lines: Sequence[str]) -> str:
+    """Choose the delimiter under which the heading has several cells and most rows as many as it."""
+    best, best_fit = ",", (0.0, 0)
+    for delimiter in ("\t", ";", "|", ",", " "):
+        width = len(_split(lines[0], delimiter))
+        if width < 2 or (delimiter == " " and best_fit > (0, 0)):
+            continue  # white space stands inside headings and timestamps too: the last resort
+        rows = [len(_split(line, delimiter)) in (width, width + 1) for line in lines[1:]]
+        fit = (sum(rows) / len(rows) if rows else 1.0, width)
+        if fit > best_fit and (fit[0] > 0 or delimiter != " "):
+            best, best_fit = delimiter, fit
+    return best
+
+
+def _sniff_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
+    if delimiter == ",":
+        return "."
+    cells = [c.strip() for row in rows for c in row]
+    points = sum(_POINT.fullmatch(c) is not None for c in cells)
+    commas = sum("." not in c and _POINT.fullmatch(c.replace(",", ".", 1)) is not None for c in cells)
+    if points == commas == 0:
+        return ".,"  # whole numbers so far: try both
+    return "," if commas > points else "."
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
+    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
+
+
+def _cells(line: bytes, delimiter: str) -> int:
+    if delimiter == " " or b'"' in line:
+        return len(_split(line.decode("latin-1"), delimiter))
+    return line.count(delimiter.encode()) + 1
+
+
+def _ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
+    start = line[:60].decode("latin-1").strip()
+    text = f"{path}: line {number} has {cells} cells where the heading has {width}: {start!r}"
+    if delimiter == "," and cells > width:
+        return f"{text}; if it has decimal commas, export with ';' between the columns"
+    if not line.endswith(b"\n"):
+        return f"{text}; it is the last line, perhaps cut off while it was written: complete or delete it"
+    return f"{text}; complete or delete the line"
+
+
+def _not_numbers(cells: pd.DataFrame, decimal: str) -> Any:
+    if decimal == ",":
+        # a point is no part of a number where the comma is the decimal sign
+        cells = cells.apply(lambda c: c.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False))
+    return cells.apply(not_numbers).to_numpy()
+
+
+def _is_utf8(line: bytes) -> bool:
+    try:
+        line.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True

@@ -1,0 +1,145 @@
+"""What the regressions on terms share: the fit of chosen terms, how good it is, and `freeze`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Term, TermTable, Variable
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.leastsquares import Solution, effective_sample_size, table
+
+FloatArray = NDArray[np.float64]
+
+
+class TermRegressor(ThermalRegressor):
+    """Linear combination of terms of the inputs.
+
+    Attributes
+    ----------
+    coef_ : ndarray of shape (n_terms,)
+        One for each of `terms_`.
+    intercept_ : float
+        Deviation at the reference state.
+    terms_ : tuple of str
+        Names of the terms.
+    dependent_ : tuple of str
+        Terms that depend on the others (or on the constant) and got the coefficient 0.
+    condition_ : float
+        Condition number of the terms, centred (if there is an intercept) and scaled.
+    n_rows_ : int
+    r_squared_, adjusted_r_squared_ : float
+        In the training data; nan where not defined.
+    r_squared_kind_ : {'centred', 'uncentred'}
+        Whether the sum of squares they compare with is about the mean or, without intercept, about zero (E-C10).
+    standard_error_ : float
+        Standard error of estimate, as if the rows were independent [unit of y].
+    n_effective_ : float
+        How many independent rows the training rows stand for, by the autocorrelation of the residual (E-C12).
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range.
+    """
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        return np.asarray(self._table.evaluate(change) @ self.coef_ + self.intercept_)
+
+    def freeze(
+        self,
+        *,
+        target: str,
+        unit: str = "um",
+        inputs: Sequence[Input] | None = None,
+        support: Support = Support(),
+        provenance: Provenance | None = None,
+    ) -> Polynomial:
+        """Return the fitted model as plain numbers, without the inputs it has no use for.
+
+        A sensor that was not selected may die without a consequence.
+
+        Parameters
+        ----------
+        target : str
+            Displacement channel (or error component) it predicts.
+        unit : str
+            Unit of the deviation it gives.
+        inputs : sequence of Input, optional
+            One per feature; made from the training data if not given.
+        support : Support
+            What the model does outside its trained range.
+        provenance : Provenance, optional
+            Where it comes from.
+
+        Returns
+        -------
+        Polynomial
+
+        Raises
+        ------
+        InputError
+            `inputs` are not as many as the features.
+        """
+        offered = self._inputs(inputs)
+        active = [(term, c) for term, c in zip(self._table.terms, self.coef_.tolist(), strict=True) if c != 0]
+        variables = sorted({v for term, _ in active for v in term})
+        sensors = sorted({i for v in variables for i, _ in self._table.variables[v].weights})
+        kept = []
+        for v in variables:
+            weights = tuple((sensors.index(i), factor) for i, factor in self._table.variables[v].weights)
+            kept.append(Variable("-".join(offered[sensors[i]].name for i, _ in weights), weights))
+        return Polynomial(
+            target=target,
+            unit=unit,
+            inputs=tuple(offered[i] for i in sensors),
+            support=support,
+            provenance=provenance,
+            variables=tuple(kept),
+            terms=tuple(tuple(variables.index(v) for v in term) for term, _ in active),
+            coefficients=tuple(c for _, c in active),
+            intercept=self.intercept_,
+        )
+
+    # -- for the methods ---------------------------------------------------------------------------------------------
+
+    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Check the training data and note their range; return X, y, and a copy of both as `table`."""
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        change, deviation = checked[0], np.asarray(checked[1], dtype=np.float64)
+        both = table(change, deviation)
+        # by column in memory, which makes these ten times as fast
+        self.data_min_, self.data_max_ = both[:, :-1].min(axis=0), both[:, :-1].max(axis=0)
+        return change, deviation, both
+
+    def _keep(
+        self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float, intercept: bool
+    ) -> None:
+        """Note the coefficients of `terms`, and how well they fit; `total` is the sum of squares of y."""
+        self._table = TermTable(self.n_features_in_, tuple(variables), tuple(terms))
+        n_rows = len(found.residual)
+        self.coef_, self.intercept_ = found.coefficients, found.intercept
+        self.terms_ = self._table.names()
+        self.dependent_ = tuple(self.terms_[k] for k in found.dependent)
+        self.condition_ = found.condition
+        self.n_rows_ = n_rows
+        self.r_squared_kind_ = "centred" if intercept else "uncentred"
+        left = n_rows - found.rank - int(intercept)
+        self.r_squared_ = 1 - found.rss / total if total > 0 else float("nan")
+        per_row = (n_rows - int(intercept)) / left if left > 0 else float("nan")
+        self.adjusted_r_squared_ = 1 - (1 - self.r_squared_) * per_row
+        self.standard_error_ = float(np.sqrt(found.rss / left)) if left > 0 else float("nan")
+        self.n_effective_ = effective_sample_size(found.residual)

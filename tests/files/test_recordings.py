@@ -1,0 +1,378 @@
+"""Reading and writing recordings: dialects, headings, units, time, cycles, and two measured files."""
+
+import hashlib
+import tempfile
+from datetime import datetime, time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.files.columns import understand
+from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
+from thermocomp.files.recordings import read, read_all, write
+from thermocomp.recording.cycles import Cycle, whole
+from thermocomp.recording.quality import check
+from thermocomp.recording.recording import Recording
+
+VORON = Path(__file__).parent / "voron.toml"
+NUMBERS = st.floats(allow_nan=True, allow_infinity=False)
+DELIMITERS = {",": ".", ";": ".,", "\t": ".,", "|": ".,", "   ": ".,"}
+
+
+@settings(deadline=None)
+@given(
+    rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=12),
+    dialect=st.sampled_from([(d, decimal) for d, decimals in DELIMITERS.items() for decimal in decimals]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "latin-1"]),
+    newline=st.sampled_from(["\n", "\r\n"]),
+    remarks=st.lists(st.sampled_from(["", "# ein Käfer", "  # 1;2,3\t4"]), max_size=4),
+    missing=st.sampled_from(["nan", "NaN", "NAN", "NA", "null"]),
+)
+def test_any_dialect_gives_the_same_table(
+    rows: list[tuple[float, float]],
+    dialect: tuple[str, str],
+    encoding: str,
+    newline: str,
+    remarks: list[str],
+    missing: str,
+) -> None:
+    delimiter, decimal = dialect
+    sensor = "Lager_vorn" if delimiter == "   " else "Lager vörn"
+
+    def cell(value: float) -> str:
+        return missing if np.isnan(value) else repr(value).replace(".", decimal)
+
+    lines = [*remarks[:2], delimiter.join(["time_s", f"{sensor}_C", "drift_um"])]
+    for k, (a, b) in enumerate(rows):
+        lines += [*remarks[2:], delimiter.join([cell(0.5 * k), cell(a), cell(b)])]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.csv"
+        path.write_bytes((newline.join(lines) + newline).encode(encoding))
+        recording = read(path)
+
+    np.testing.assert_array_equal(recording.table.to_numpy(), np.array(rows))
+    np.testing.assert_array_equal(recording.time, 0.5 * np.arange(len(rows)))
+    assert recording.channel(sensor).quantity == "temperature"
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "quantity", "scale"),
+    [
+        ("t5_C", "t5_C", "temperature", 1.0),
+        ("t5_degC", "t5_C", "temperature", 1.0),
+        ("t5_K", "t5_C", "temperature", 1.0),
+        ("t5_F", "t5_C", "temperature", 5 / 9),
+        ("T1 [degC]", "T1_C", "temperature", 1.0),
+        ("Temp 1 (°C)", "Temp_1_C", "temperature", 1.0),
+        ("ch1_um", "ch1_um", "displacement", 1.0),
+        ("ch1_µm", "ch1_um", "displacement", 1.0),
+        ("drift_mm", "drift_um", "displacement", 1e3),
+        ("drift [in]", "drift_um", "displacement", 25400.0),
+        ("x_drift_mm", "x_drift_um", "displacement", 1e3),
+        ("x_mm", "x_mm", "position", 1.0),
+        ("X1 [mm]", "X1_mm", "position", 1.0),
+        ("pos_z_mm", "pos_z_mm", "position", 1.0),
+        ("x_pos_um", "x_pos_mm", "position", 1e-3),
+        ("x_um", "x_um", "displacement", 1.0),
+        ("spindle_rpm", "spindle_rpm", "spindle_speed", 1.0),
+        ("S [1/min]", "S_rpm", "spindle_speed", 1.0),
+        ("yaw_arcsec", "yaw_urad", "angle", 4.84813681109536),
+        ("feed_mm_min", "feed_mm_min", "feed", 1.0),
+    ],
+)
+def test_a_heading_is_understood_by_its_unit(heading: str, name: str, quantity: str, scale: float) -> None:
+    meaning = understand(heading)
+
+    assert meaning is not None
+    assert (meaning.name, meaning.unit.quantity, meaning.unit.scale) == (name, quantity, scale)
+
+
+@pytest.mark.parametrize(
+    "heading", ["frame_t", "coolant_in", "mains [Hz]", "P (kW)", "front (left)", "n_1", "_C", "C", ""]
+)
+def test_a_heading_without_a_known_unit_is_not_guessed_at(heading: str) -> None:
+    assert understand(heading) is None
+
+
+def test_units_become_house_units_and_old_names_stay_valid(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_min,t1_K,drift_mm,z_mm,note\n0,293.15,0.001,5,cold\n1,294.15,0.002,6,warm\n")
+
+    recording = read(path)
+
+    assert [(c.name, c.unit) for c in recording.channels] == [("t1_C", "degC"), ("drift_um", "um"), ("z_mm", "mm")]
+    assert recording.time.tolist() == [0.0, 60.0]
+    np.testing.assert_allclose(recording.table, [[20, 1, 5], [21, 2, 6]], rtol=1e-12)
+    assert recording.channel("drift_mm") == recording.channel("drift") == recording.channel("drift_um")
+    assert recording.notes == ("left out, having no known unit in the heading and no mapping: note",)
+    assert recording.name == "rec"
+    assert recording.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_name_without_unit_that_two_columns_share_is_no_alias(tmp_path: Path) -> None:
+    recording = read(_csv(tmp_path, "time_s,z_um,z_mm\n0,1,2\n"))
+
+    assert "z" not in recording.aliases
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds", "start"),
+    [
+        ("timestamp,t1_C\n2024-05-01T10:00:00,1\n2024-05-01 10:00:01.5,2\n", 1.5, "2024-05-01T10:00:00"),
+        ("time,t1_C\n2024-05-01T10:00:00Z,1\n2024-05-01T12:00:30+02:00,2\n", 30.0, "2024-05-01T10:00:00+00:00"),
+        # the clock goes back: 02:59:30 summer time, then 02:00:30 winter time
+        ("time,t1_C\n2024-10-27T02:59:30+02:00,1\n2024-10-27T02:00:30+01:00,2\n", 60.0, "2024-10-27T02:59:30+02:00"),
+        ("datetime;t1_C\n01.05.2024 10:00:00;1,5\n01.05.2024 10:01:00;2\n", 60.0, "2024-05-01T10:00:00"),
+        ("date,time,t1_C\n2024-05-01,23:59:59,1\n2024-05-02,00:00:01,2\n", 2.0, "2024-05-01T23:59:59"),
+        ("time,t1_C\n10:00:00,1\n10:00:15,2\n", 15.0, ""),
+        ("time,t1_C\n3,1\n18,2\n", 15.0, ""),
+        ("t_s,t1_C\n3,1\n18,2\n", 15.0, ""),
+        ("Time (min),t1_C\n3,1\n18,2\n", 900.0, ""),
+        ("run_h,t1_C\n0,1\n1,2\n", 3600.0, ""),
+    ],
+)
+def test_the_time_is_found_and_counted_from_the_first_row(
+    tmp_path: Path, text: str, seconds: float, start: str
+) -> None:
+    recording = read(_csv(tmp_path, text))
+
+    assert recording.time.tolist() == [0.0, seconds]
+    assert recording.start == start
+
+
+def test_a_long_file_is_read_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("thermocomp.files.textfile._CHUNK", 3)
+    monkeypatch.setattr("thermocomp.files.recordings._CHUNK", 2)
+    rows = [f"2024-05-01T10:00:{k:02d},{k}.5,{k // 4}" for k in range(8)]
+
+    recording = read(_csv(tmp_path, "\n".join(["time,t1_C,cycle", *rows])))
+
+    assert recording.time.tolist() == list(range(8))
+    assert recording.table["t1_C"].tolist() == [k + 0.5 for k in range(8)]
+    assert recording.cycles == (Cycle("0", 0, 4), Cycle("1", 4, 8))
+    rows[7] = rows[7].replace(".5", "?")
+    with pytest.raises(RecordingError, match=r"line 9, column 't1_C': '7\?' is not a number"):
+        read(_csv(tmp_path, "\n".join(["time,t1_C,cycle", *rows])))
+
+
+def test_a_time_without_a_unit_is_taken_as_seconds_and_told(tmp_path: Path) -> None:
+    assert read(_csv(tmp_path, "time,t1_C\n0,1\n1,2\n")).notes == ("'time' has no unit and is taken as seconds",)
+
+
+def test_a_delimiter_at_the_end_of_each_row_is_no_column(tmp_path: Path) -> None:
+    for text in ("time_s;t1_C;\n0;20,5;\n1;21;\n", "time_s;t1_C\n0;20,5;\n1;21;\n;;\n"):
+        assert read(_csv(tmp_path, text)).table["t1_C"].tolist() == [20.5, 21.0]
+
+
+def test_a_decimal_comma_may_come_late(tmp_path: Path) -> None:
+    rows = "".join(f"{k};{20 + k}\n" for k in range(300))
+
+    assert read(_csv(tmp_path, f"time_s;t1_C\n{rows}300;20,25\n")).table["t1_C"].iloc[-1] == 20.25
+
+
+def test_quoted_cells_may_hold_the_delimiter(tmp_path: Path) -> None:
+    recording = read(_csv(tmp_path, '"time_s","bearing, front_C",note\n0,"20.5","a, b"\n1,21,\n'))
+
+    assert recording.table["bearing,_front_C"].tolist() == [20.5, 21.0]
+
+
+def test_a_mapping_scales_zeroes_and_masks_before_the_unit(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_s,count,bed,gap\n0,-180,-180,7\n1,100,25,inf\n2,104,-1,9\n")
+    mapping = Mapping(
+        columns={
+            "z": ColumnMap("count", unit="mm", scale=0.0025, zero="first", missing=(-180.0,), place="spindle nose"),
+            "bed": ColumnMap(role="temperature", missing=(-1.0,)),
+            "gap_um": ColumnMap("gap", unit="um", zero=7.0),
+        },
+        read=ReadOptions(missing=(-180.0,)),
+    )
+
+    recording = read(path, mapping)
+
+    np.testing.assert_allclose(recording.table["z"], [np.nan, 0.0, 10.0])
+    np.testing.assert_array_equal(recording.table["bed"], [np.nan, 25.0, np.nan])
+    np.testing.assert_array_equal(recording.table["gap_um"], [0.0, np.nan, 2.0])
+    assert recording.channel("z").place == "spindle nose"
+    assert recording.channel("count").name == "z"
+    assert recording.notes == (
+        "z: missing-value code -180 in 1 of 3 cells",
+        "bed: missing-value code -180, -1 in 2 of 3 cells",
+        "gap_um: infinite, taken as missing, in 1 of 3 cells",
+    )
+
+
+def test_what_a_mapping_does_not_speak_of_is_understood_by_its_heading(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_s,a,t1_C,t2_C\n0,1,2,3\n")
+    some = {"a_um": ColumnMap("a", unit="um"), "ignored": ColumnMap("t2_C", role="ignore")}
+
+    assert [c.name for c in read(path, Mapping(columns=some)).channels] == ["a_um", "t1_C"]
+    only = Mapping(columns=some, read=ReadOptions(only_mapped=True))
+    assert [c.name for c in read(path, only).channels] == ["a_um"]
+
+
+def test_cycles_come_from_a_column_or_the_speed_or_are_one(tmp_path: Path) -> None:
+    rows = [(600 * k, 1000 * (k % 4 < 2), "a" if k < 3 else "b") for k in range(8)]
+    path = _csv(tmp_path, "time_s,s_rpm,cycle,part\n" + "".join(f"{t},{s},{c},{t < 600}\n" for t, s, c in rows))
+    plain = _csv(tmp_path, "time_s,t1_C\n0,1\n1,2\n", "plain.csv")
+
+    assert read(path).cycles == (Cycle("a", 0, 3), Cycle("b", 3, 8))
+    assert read(path, Mapping(cycles=CycleRule("part"))).cycles == (Cycle("True", 0, 1), Cycle("False", 1, 8))
+    by_role = Mapping(columns={"c": ColumnMap("part", role="cycle")})
+    assert len(read(path, by_role).cycles[0]) == 1
+    ignoring = Mapping(columns={"cycle": ColumnMap(role="ignore")})
+    assert [c.start for c in read(path, ignoring).cycles] == [0, 4]
+    long_stops = Mapping(columns={"cycle": ColumnMap(role="ignore")}, cycles=CycleRule(min_stop_s=2000.0))
+    assert len(read(path, long_stops).cycles) == 1
+    assert read(plain).cycles == whole(2)
+
+
+def test_several_files_are_several_tests(tmp_path: Path) -> None:
+    paths = [_csv(tmp_path, f"time_s,a\n0,{k}\n", f"{k}.csv") for k in range(2)]
+
+    recordings = read_all(paths, Mapping(columns={"a": ColumnMap(role="temperature")}))
+
+    assert [(r.name, r.table["a"].iloc[0]) for r in recordings] == [("0", 0.0), ("1", 1.0)]
+
+
+def test_a_workbook_reads_like_a_text_file(tmp_path: Path) -> None:
+    path = tmp_path / "rec.xlsx"
+    rows = [["# logger 7", None, None], ["date", "time", "t1_C"], [datetime(2024, 5, 1), time(10, 0), 20.5]]
+    rows += [[None, None, None], [datetime(2024, 5, 1), time(10, 1), None]]
+    with pd.ExcelWriter(path) as book:
+        pd.DataFrame(rows).to_excel(book, sheet_name="test", header=False, index=False)
+        pd.DataFrame([[1]]).to_excel(book, sheet_name="more")
+
+    recording = read(path)
+
+    assert recording.time.tolist() == [0.0, 60.0]
+    np.testing.assert_array_equal(recording.table["t1_C"], [20.5, np.nan])
+    assert recording.start == "2024-05-01T10:00:00"
+    assert recording.notes == ("only the first sheet 'test' of 2 is read",)
+
+
+def test_a_parquet_file_may_have_its_timestamps_as_index(tmp_path: Path) -> None:
+    path = tmp_path / "rec.parquet"
+    index = pd.date_range("2024-05-01T10:00", periods=3, freq="15s", name="timestamp", tz="Europe/Berlin")
+    pd.DataFrame({"t1_C": [1, 2, 3]}, index=index).to_parquet(path)
+
+    recording = read(path)
+
+    assert recording.time.tolist() == [0.0, 15.0, 30.0]
+    assert recording.start == "2024-05-01T10:00:00+02:00"
+    assert recording.table["t1_C"].tolist() == [1.0, 2.0, 3.0]
+
+
+@settings(deadline=None)
+@given(
+    rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=12),
+    ending=st.sampled_from([".csv", ".parquet"]),
+    names=st.sampled_from([("t1_C", "drift_um"), ("x_um", "z_um"), ("Käfig", 'a, "b"'), ("t1", "t1_C")]),
+    kinds=st.sampled_from([("temperature", "displacement"), ("position", "angle"), ("dimensionless", "feed")]),
+    place=st.sampled_from(["", "front bearing"]),
+    start=st.sampled_from(["", "2024-05-01T10:00:00+02:00"]),
+    label=st.sampled_from(["whole test", "1", "1.0", "2 (100 1/min)", "NA"]),
+)
+def test_what_is_written_is_read_again(
+    rows: list[tuple[float, float]],
+    ending: str,
+    names: tuple[str, str],
+    kinds: tuple[str, str],
+    place: str,
+    start: str,
+    label: str,
+) -> None:
+    units = {"temperature": "degC", "displacement": "um", "position": "mm", "angle": "urad", "dimensionless": "1"}
+    channels = tuple(Channel(n, q, units.get(q, "mm/min"), place) for n, q in zip(names, kinds, strict=True))
+    time = np.cumsum(np.full(len(rows), 0.1)) - 0.1
+    cycles = (Cycle(label, 0, 1), Cycle("last", 1, len(rows)))
+    recording = Recording("r", time, pd.DataFrame(rows, columns=list(names)), channels, cycles, start=start)
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"r{ending}"
+        write(recording, path)
+        again = read(path)
+
+    np.testing.assert_array_equal(again.time, time)
+    np.testing.assert_array_equal(again.table.to_numpy(), recording.table.to_numpy())
+    assert (again.channels, again.cycles, again.start) == (channels, cycles, start)
+
+
+def test_writing_keeps_what_is_there_unless_told(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_s,t1_C\n0,1\n")
+    recording = read(path)
+
+    with pytest.raises(InputError, match=r"rec\.csv: exists already"):
+        write(recording, path)
+    write(recording, path, overwrite=True)
+    assert path.read_text() == "time_s,t1_C,cycle\n0.0,1.0,whole test\n"
+    with pytest.raises(InputError, match=r"written as \.csv or \.parquet"):
+        write(recording, tmp_path / "rec.xlsx")
+    with pytest.raises(InputError, match="there is no folder"):
+        write(recording, tmp_path / "no" / "rec.csv")
+    named = Recording(
+        "r", recording.time, recording.table.set_axis(["cycle"], axis=1), (Channel("cycle", "angle", "urad"),), whole(1)
+    )
+    write(named, tmp_path / "odd.csv")
+    assert read(tmp_path / "odd.csv").channels == named.channels
+
+
+def test_cycles_of_one_name_are_numbered_when_written(tmp_path: Path) -> None:
+    recording = read(_csv(tmp_path, "time_s,t1_C\n0,1\n1,2\n")).with_cycles([Cycle("a", 0, 1), Cycle("a", 1, 2)])
+
+    write(recording, tmp_path / "out.csv")
+
+    assert read(tmp_path / "out.csv").cycles == (Cycle("1: a", 0, 1), Cycle("2: a", 1, 2))
+
+
+def test_the_measured_spindle_test(shared_data: Path) -> None:
+    recording = read(shared_data / "fl_thermal" / "recording.csv")
+
+    assert len(recording) == 8892
+    assert [c.start for c in recording.cycles] == [0, 1951, 3871, 5791, 7711]
+    assert [c.name for c in recording.cycles] == [
+        f"{k} ({n} 1/min)" for k, n in enumerate((1250, 2500, 3750, 5000, 3500), start=1)
+    ]
+    assert (len(recording.temperatures), len(recording.displacements)) == (16, 5)
+    assert recording.table["t16_C"].iloc[0] == 26.4743629292737
+    findings = check(recording)
+    assert [(f.severity, f.channel, f.kind) for f in findings] == [("warning", "t16_C", "spike")]
+
+
+def test_the_measured_printer_gives_the_published_regression(shared_data: Path) -> None:
+    name = "frame_exp_quant_v3_2021-06-13_05-41-53.csv"
+
+    recording = read(shared_data / "voron_frame" / name, read_mapping(VORON))
+
+    z = recording.table["z"].to_numpy() / 1000  # [mm]
+    inputs = np.column_stack([np.ones(len(recording)), recording.table["bed_t"], recording.table["frame_t"]])
+    found, rest, *_ = np.linalg.lstsq(inputs, z)
+    assert len(recording) == 1203
+    np.testing.assert_allclose(found, [0.695263, 0.00200320, -0.0333537], rtol=2e-6)
+    assert 1 - rest[0] / np.sum((z - z.mean()) ** 2) == pytest.approx(0.996351, abs=5e-7)
+    assert recording.start == "2021-06-13T05:42:16"
+
+
+def test_the_measured_absent_sensor_is_told_and_can_be_marked(shared_data: Path) -> None:
+    path = shared_data / "voron_frame" / "frame_exp_quant_v3_2021-06-12_12-54-36-mvieleers_V2.1253.csv"
+    time = TimeColumn("time", format="%Y/%m/%d-%H:%M:%S")
+    sensors = {k: ColumnMap(role="temperature") for k in ("frame_t", "chamber_t", "bed_t")}
+
+    trouble = [f for f in check(read(path, Mapping(time, sensors))) if f.severity == "trouble"]
+    marked = read(path, Mapping(time, sensors, ReadOptions(missing=(-180.0,))))
+
+    assert [(f.channel, f.kind) for f in trouble] == [("chamber_t", "missing-value code")]
+    assert "-180" in trouble[0].text
+    assert "sensor is absent" in trouble[0].text
+    assert marked.table["chamber_t"].isna().all()
+    assert marked.table["frame_t"].notna().all()
+
+
+def _csv(folder: Path, text: str, name: str = "rec.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path

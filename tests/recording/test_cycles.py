@@ -1,0 +1,82 @@
+"""Thermal cycles from the spindle speed, or given."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.exceptions import RecordingError
+from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
+
+
+@given(
+    stretches=st.lists(st.tuples(st.integers(1, 40), st.sampled_from([0.0, 1000.0, -2500.0, np.nan])), min_size=1),
+    dt=st.sampled_from([1.0, 15.0, 60.0, 400.0]),
+    limits=st.tuples(st.sampled_from([0.0, 300.0]), st.sampled_from([0.0, 300.0])),
+)
+def test_cycles_cover_all_rows_without_overlap(
+    stretches: list[tuple[int, float]], dt: float, limits: tuple[float, float]
+) -> None:
+    speed = np.concatenate([np.full(n, v) for n, v in stretches])
+    time = np.arange(len(speed), dtype=np.float64) * dt
+
+    cycles = find_cycles(time, speed, min_run=limits[0], min_stop=limits[1])
+
+    assert [row for c in cycles for row in range(c.start, c.stop)] == list(range(len(speed)))
+    assert len({c.name for c in cycles}) == len(cycles)
+
+
+@given(
+    halves=st.lists(st.tuples(st.integers(6, 30), st.integers(6, 30), st.floats(100, 5000)), min_size=1, max_size=6),
+    lead=st.integers(0, 10),
+)
+def test_each_run_and_the_stop_that_follows_is_a_cycle(halves: list[tuple[int, int, float]], lead: int) -> None:
+    speed = np.concatenate([np.zeros(lead), *(np.r_[np.full(run, v), np.zeros(stop)] for run, stop, v in halves)])
+    lengths = [run + stop for run, stop, _ in halves]
+    lengths[0] += lead  # rows before the first run belong to it
+
+    cycles = find_cycles(np.arange(0.0, 60.0 * len(speed), 60.0), speed)
+
+    assert [len(c) for c in cycles] == lengths
+    assert [c.name for c in cycles] == [f"{k} ({v:.0f} 1/min)" for k, (_, _, v) in enumerate(halves, start=1)]
+
+
+def test_short_runs_and_stops_do_not_split() -> None:
+    time = np.arange(0.0, 24000.0, 60.0)
+    speed = np.where(time % 12000 < 6000, 2000.0, 0.0)
+    tool_change = speed.copy()
+    tool_change[20:23] = 0.0
+    probing = speed.copy()
+    probing[150:153] = 500.0
+
+    assert [c.start for c in find_cycles(time, tool_change)] == [0, 200]
+    assert [c.start for c in find_cycles(time, probing)] == [0, 200]
+    assert [c.start for c in find_cycles(time, tool_change, min_stop=60.0)] == [0, 23, 200]
+
+
+def test_a_speed_that_jitters_is_named_by_its_median_and_one_that_varies_by_its_range() -> None:
+    time = np.arange(0.0, 12000.0, 60.0)
+    jitter = np.where(time < 6000, 2000 + np.random.default_rng(1).normal(size=200), 0.0)
+    steps = np.where(time < 6000, np.where(time < 3000, 1000.0, 3000.0), 0.0)
+
+    assert [c.name for c in find_cycles(time, jitter)] == ["1 (2000 1/min)"]
+    assert [c.name for c in find_cycles(time, steps)] == ["1 (1000-3000 1/min)"]
+
+
+@pytest.mark.parametrize("speed", [np.zeros(5), np.full(5, np.nan), np.full(5, 1000.0)])
+def test_a_spindle_that_never_starts_anew_gives_one_cycle(speed: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+    (cycle,) = find_cycles(np.arange(5.0), speed)
+
+    assert (cycle.start, cycle.stop) == (0, 5)
+
+
+def test_labels_become_cycles() -> None:
+    assert given_cycles(["a", "a", "b"]) == (Cycle("a", 0, 2), Cycle("b", 2, 3))
+    assert given_cycles([1.0, 1.0, 2.5]) == (Cycle("1", 0, 2), Cycle("2.5", 2, 3))
+    with pytest.raises(RecordingError, match=r"'a' comes back at row 2"):
+        given_cycles(["a", "b", "a"])
+
+
+def test_the_whole_test_is_one_cycle() -> None:
+    assert whole(7) == (Cycle("whole test", 0, 7),)
+    assert len(whole(7)[0]) == 7

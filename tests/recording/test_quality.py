@@ -1,0 +1,268 @@
+"""Faults put into sound signals on purpose, and sound signals that must raise no alarm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.recording.cycles import find_cycles, whole
+from thermocomp.recording.quality import Finding, check
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+N = 2000
+TIME: FloatArray = np.arange(0.0, 15.0 * N, 15.0)
+
+
+def _warm_up(*, noise: float = 0.02, resolution: float = 0.0, seed: int = 1) -> FloatArray:
+    """Return a sensor that warms up by 10 degC until row 1000 and cools down again."""
+    clean = 20 + 10 * (1 - np.exp(-np.minimum(TIME, 15000) / 4000)) * np.exp(-np.maximum(TIME - 15000, 0) / 4000)
+    values = clean + noise * np.random.default_rng(seed).normal(size=N)
+    return np.asarray(np.round(values / resolution) * resolution if resolution else values)
+
+
+def _recording(time: FloatArray = TIME, quantity: str = "temperature", **columns: FloatArray) -> Recording:
+    channels = tuple(Channel(name, quantity, HOUSE_UNITS[quantity]) for name in columns)
+    return Recording("test", time, pd.DataFrame(columns), channels, whole(len(time)))
+
+
+def _check(values: FloatArray, quantity: str = "temperature") -> list[Finding]:
+    return [f for f in check(_recording(quantity=quantity, t1=values)) if f.kind != "no cycle"]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005, 0.02, 0.05, 0.2])
+@pytest.mark.parametrize("resolution", [0.0, 0.001, 0.01, 0.1])
+@pytest.mark.parametrize("quantity", ["temperature", "displacement"])
+def test_a_sound_sensor_of_any_noise_and_resolution_raises_nothing(
+    noise: float, resolution: float, quantity: str
+) -> None:
+    for seed in range(3):
+        assert _check(_warm_up(noise=noise, resolution=resolution, seed=seed), quantity) == []
+
+
+def test_a_displacement_that_jumps_or_creeps_to_rest_raises_nothing() -> None:
+    creeping = np.round(1000 * np.exp(-TIME / 600))  # a dial gauge of 1 um that stands still for the last 5 hours
+    jumping = np.where(TIME > 5000, 100.0, 0.0) + _warm_up()
+
+    assert _check(creeping, "displacement") == []
+    assert _check(jumping, "displacement") == []
+
+
+def test_a_spindle_speed_and_a_position_may_stand_still() -> None:
+    speed = np.where(TIME % 8000 < 4000, 3000.0, 0.0)
+
+    for quantity in ("spindle_speed", "position"):
+        assert _check(speed, quantity) == []
+
+
+@settings(deadline=None, max_examples=100)
+@given(start=st.integers(0, N - 100), length=st.integers(40, N - 100), resolution=st.sampled_from([0.0, 0.001]))
+def test_a_stuck_sensor_is_trouble_wherever_it_sticks(start: int, length: int, resolution: float) -> None:
+    values = _warm_up(resolution=resolution)
+    stop = start + length if start + length < N - 5 else N
+    values[start:stop] = values[start]
+
+    found = _check(values)
+
+    assert [(f.severity, f.channel, f.kind) for f in found] == [("trouble", "t1", "stuck")]
+    # a neighbour may happen to hold the same number
+    rows = [int(word) for word in found[0].text.split() if word.isdigit()][-2:]
+    assert abs(rows[0] - start) <= 3
+    assert abs(rows[1] - (stop - 1)) <= 3
+
+
+def test_a_noiseless_sensor_that_stops_dead_is_stuck() -> None:
+    values = _warm_up(noise=0.0)
+    values[50:] = values[50]
+
+    assert [f.kind for f in _check(values)] == ["stuck"]
+
+
+def test_a_sensor_that_dies_at_once_is_stuck() -> None:
+    values = _warm_up()
+    values[5:] = values[5]
+
+    assert [(f.severity, f.kind) for f in _check(values)] == [("trouble", "stuck")]
+
+
+def test_a_coarse_sensor_that_stands_still_is_only_a_warning() -> None:
+    values = _warm_up(resolution=0.1)  # noise of a fifth of a step: it rests now and then
+    values[1500:] = values[1500]
+
+    assert [(f.severity, f.kind) for f in _check(values)] == [("warning", "stuck")]
+
+
+def test_several_stuck_stretches_are_counted() -> None:
+    values = _warm_up()
+    values[200:260] = values[200]
+    values[600:700] = values[600]
+
+    (found,) = _check(values)
+
+    assert "100 rows, from row 600 (9000 s) to row 699 (10485 s), one of 2 such stretches" in found.text
+
+
+@settings(deadline=None, max_examples=100)
+@given(row=st.integers(0, N - 1), height=st.sampled_from([-3.0, 0.6, 3.0]), noise=st.sampled_from([0.0, 0.01, 0.03]))
+def test_a_single_spike_is_a_warning_that_names_its_row(row: int, height: float, noise: float) -> None:
+    values = _warm_up(noise=noise)
+    values[row] += height
+
+    (found,) = _check(values)
+
+    assert (found.severity, found.kind) == ("warning", "spike")
+    # measured from the neighbour next to it, which noise and slope have moved a little
+    assert abs(_height(found) - abs(height)) < 0.3
+    assert f"at row {row} ({15 * row} s)" in found.text
+
+
+def _height(finding: Finding) -> float:
+    return float(finding.text.split("by ")[1].split()[0])
+
+
+def test_a_spike_higher_than_all_else_is_trouble() -> None:
+    values = _warm_up()
+    values[[300, 900]] += [0.8, 50.0]
+
+    (found,) = _check(values)
+
+    assert found.severity == "trouble"
+    assert "2 spikes" in found.text
+    assert "row 900" in found.text
+
+
+@pytest.mark.parametrize("code", [-180.0, -273.15, -999.0, -9999.0, 85.0, 850.0, 9999.0, 1e30])
+@pytest.mark.parametrize("rows", [[700], [0, 700, 701, 1999]])
+def test_a_missing_value_code_is_trouble_and_nothing_else_is_said(code: float, rows: list[int]) -> None:
+    values = _warm_up()
+    values[rows] = code
+
+    (found,) = _check(values)
+
+    assert (found.severity, found.kind) == ("trouble", "missing-value code")
+    assert f"hold {code:g}" in found.text
+    assert f"{len(rows)} value" in found.text
+    assert f"row {rows[0]} " in found.text
+    assert f"missing = [{code:g}]" in found.text
+
+
+def test_a_code_that_lies_among_the_values_is_a_value() -> None:
+    values = _warm_up() + 60.0
+    values[700] = 85.0  # between 80 and 90 degC
+
+    assert "missing-value code" not in [f.kind for f in _check(values)]
+
+
+@pytest.mark.parametrize(("code", "quantity"), [(-180.0, "temperature"), (-9999.0, "displacement")])
+def test_a_sensor_that_gives_nothing_but_a_code_is_absent(code: float, quantity: str) -> None:
+    (found,) = _check(np.full(N, code), quantity)
+
+    assert (found.severity, found.kind) == ("trouble", "missing-value code")
+    assert "the sensor is absent" in found.text
+
+
+@pytest.mark.parametrize(
+    ("quantity", "severity"), [("temperature", "trouble"), ("displacement", "trouble"), ("spindle_speed", "info")]
+)
+def test_a_constant_channel_is_told(quantity: str, severity: str) -> None:
+    (found,) = _check(np.full(N, 21.5), quantity)
+
+    assert (found.severity, found.kind) == (severity, "constant")
+    assert "is 21.5" in found.text
+
+
+def test_missing_values_are_counted_and_located() -> None:
+    values = _warm_up()
+    values[400] = np.nan
+    values[600:700] = np.nan
+    half = values.copy()
+    half[1000:] = np.nan
+
+    (found,) = _check(values)
+
+    assert (found.severity, found.kind) == ("warning", "missing values")
+    assert "101 values of 2000 (5.1%) missing, at most 100 in a row from row 600 (9000 s)" in found.text
+    assert [f.severity for f in _check(half)] == ["trouble"]
+    assert [(f.severity, f.text[:19]) for f in _check(np.full(N, np.nan))] == [("trouble", "has no value at all")]
+
+
+def test_an_implausible_temperature_is_trouble() -> None:
+    (found,) = _check(_warm_up() + 600)
+
+    assert (found.severity, found.kind) == ("trouble", "implausible")
+
+
+def test_a_coarse_resolution_is_told() -> None:
+    (found,) = _check(_warm_up(resolution=0.5))
+
+    assert (found.severity, found.kind) == ("info", "quantised")
+    assert "steps of 0.5 degC" in found.text
+
+
+def test_the_same_sensor_twice_is_told_but_empty_ones_are_not() -> None:
+    empty = np.full(N, np.nan)
+    recording = _recording(a=_warm_up(), b=_warm_up(seed=2), c=_warm_up(), d=empty, e=empty)
+
+    found = [f for f in check(recording) if f.kind == "duplicate channel"]
+
+    assert [(f.channel, f.text[:32]) for f in found] == [("c", "has the same value as a in every")]
+
+
+def test_gaps_and_irregular_sampling_are_told() -> None:
+    values = _warm_up()
+    gaps = TIME + 600 * (np.arange(N) > 700) + 90 * (np.arange(N) > 1200)
+    jitter = TIME + np.random.default_rng(1).uniform(0, 6, size=N)
+    bursts = np.cumsum(np.tile([52.0, 4.0, 4.0], N)[:N])  # three probings a minute: no gap, but no interval either
+
+    def kinds(time: FloatArray) -> list[tuple[str, str]]:
+        return [(f.severity, f.kind) for f in check(_recording(time, t1=values)) if f.kind != "no cycle"]
+
+    assert kinds(gaps) == [("warning", "gap")]
+    text = next(f.text for f in check(_recording(gaps, t1=values)) if f.kind == "gap")
+    assert "2 gaps in time, the longest 615 s after row 700 (10500 s), where rows are 15 s apart" in text
+    assert kinds(jitter) == [("warning", "irregular sampling")]
+    assert kinds(bursts) == [("warning", "irregular sampling")]
+
+
+def test_one_cycle_is_told_with_its_reason() -> None:
+    plain = _recording(t1=_warm_up())
+    speed = np.where(TIME % 15000 < 7500, 3000.0, 0.0)
+    turning = Recording(
+        "test",
+        TIME,
+        pd.DataFrame({"t1": _warm_up(), "n": speed}),
+        (*plain.channels, Channel("n", "spindle_speed", "1/min")),
+        find_cycles(TIME, speed),
+    )
+
+    assert [(f.severity, f.kind) for f in check(plain)] == [("info", "no cycle")]
+    assert "no spindle speed" in check(plain)[0].text
+    assert check(turning) == ()
+    assert "never starts anew" in check(turning.with_cycles(whole(N)))[0].text
+
+
+def test_the_gravest_comes_first() -> None:
+    values = _warm_up()
+    values[300] += 3.0
+    recording = _recording(TIME + 600 * (np.arange(N) > 700), spiking=values, dead=np.full(N, 20.0))
+
+    assert [f.severity for f in check(recording)] == ["trouble", "warning", "warning", "info"]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
+def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
+    recording = _recording(TIME[:n], t1=_warm_up()[:n], t2=np.full(n, np.nan), t3=np.full(n, -180.0))
+    short = replace(recording, cycles=whole(n))
+
+    kinds = {(f.channel, f.kind) for f in check(short)}
+
+    assert {("t2", "missing values"), ("t3", "missing-value code"), ("", "no cycle")} <= kinds
+    assert (("", "short") in kinds) == (n < 3)
+    assert not {f for f in kinds if f[0] == "t1"}

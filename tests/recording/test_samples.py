@@ -1,0 +1,154 @@
+"""Recordings stacked into samples: references, time steps, what may be an input."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.recording.cycles import Cycle, whole
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
+
+CHANNELS = (
+    Channel("t1_C", "temperature", "degC"),
+    Channel("spindle_rpm", "spindle_speed", "1/min"),
+    Channel("t2_C", "temperature", "degC"),
+    Channel("z_um", "displacement", "um"),
+)
+
+
+def _test(name: str, steps: list[float], seed: int, first_missing: int = 0) -> Recording:
+    values = np.random.default_rng(seed).normal(20, 5, size=(len(steps) + 1, len(CHANNELS)))
+    values[:first_missing, 2] = np.nan
+    table = pd.DataFrame(values, columns=[c.name for c in CHANNELS])
+    return Recording(name, np.cumsum([0.0, *steps]), table, CHANNELS, whole(len(table)), sha256=f"{seed:064d}")
+
+
+TESTS = st.lists(st.lists(st.floats(0.5, 100.0), min_size=2, max_size=8), min_size=1, max_size=4)
+
+
+@given(steps=TESTS)
+def test_the_first_row_of_each_test_has_no_row_before_it(steps: list[list[float]]) -> None:
+    samples = stack([_test(f"test {k}", s, k) for k, s in enumerate(steps)], ["z_um"])
+
+    first = samples.row == 0
+    assert first.sum() == len(steps)
+    np.testing.assert_array_equal(np.isinf(samples.dt()), first)
+    np.testing.assert_allclose(samples.dt()[~first], np.concatenate(steps), rtol=1e-9)
+
+
+@given(steps=TESTS, first_missing=st.integers(0, 2))
+def test_temperatures_are_counted_from_the_first_complete_row_of_their_test(
+    steps: list[list[float]], first_missing: int
+) -> None:
+    recordings = [_test(f"test {k}", s, k, first_missing) for k, s in enumerate(steps)]
+
+    samples = stack(recordings, ["z_um"])
+    absolute = stack(recordings, ["z_um"], rezero=False)
+
+    assert [c.name for c in samples.inputs] == ["t1_C", "t2_C", "spindle_rpm"]
+    for k, recording in enumerate(recordings):
+        temperatures = recording.table[["t1_C", "t2_C"]].to_numpy()
+        change = samples.change()[samples.test == k]
+        np.testing.assert_array_equal(change[:, :2], temperatures - temperatures[first_missing])
+        np.testing.assert_array_equal(change[:, 2], recording.table["spindle_rpm"])
+    np.testing.assert_array_equal(absolute.change(), absolute.values)
+    assert samples.frame().columns.tolist() == ["t1_C", "t2_C", "spindle_rpm"]
+
+
+@given(keep=st.lists(st.booleans(), min_size=9, max_size=9))
+def test_taking_rows_keeps_what_belongs_to_them(keep: list[bool]) -> None:
+    samples = stack([_test("a", [1.0] * 4, 1), _test("b", [2.0] * 3, 2)], ["z_um"])
+
+    taken = samples.take(np.array(keep))
+
+    np.testing.assert_array_equal(taken.values, samples.values[keep])
+    np.testing.assert_array_equal(taken.deviations, samples.deviations[keep])
+    np.testing.assert_array_equal(taken.row, samples.row[keep])
+    assert len(taken) == sum(keep)
+    assert (taken.test_names, taken.hashes) == (samples.test_names, samples.hashes)
+
+
+def test_cycles_and_names_are_those_of_the_tests() -> None:
+    first = _test("a", [1.0] * 3, 1).with_cycles([Cycle("one", 0, 1), Cycle("two", 1, 4)])
+
+    alone = stack([first], ["z_um"])
+    both = stack([first, _test("a", [1.0], 2)], ["z_um"])
+
+    assert alone.cycle_names == ("one", "two")
+    assert alone.cycle.tolist() == [0, 1, 1, 1]
+    assert both.test_names == ("a#1", "a#2")
+    assert both.cycle_names == ("a#1: one", "a#1: two", "a#2: whole test")
+    assert both.cycle.tolist() == [0, 1, 1, 1, 2, 2]
+    assert both.row.tolist() == [0, 1, 2, 3, 0, 1]
+
+
+def test_a_model_is_told_reference_and_trained_range() -> None:
+    recording = _test("a", [1.0] * 5, 3)
+    samples = stack([recording], ["z_um"])
+
+    temperature, speed = samples.model_inputs([0, 2], np.arange(1, 5))
+
+    values = recording.table["t1_C"].to_numpy()
+    assert (temperature.name, temperature.rezero, temperature.reference) == ("t1_C", True, values[0])
+    assert temperature.low == (values[1:5] - values[0]).min()
+    assert temperature.high == (values[1:5] - values[0]).max()
+    assert (speed.name, speed.rezero, speed.reference) == ("spindle_rpm", False, 0.0)
+    assert speed.high == recording.table["spindle_rpm"].iloc[1:5].max()
+
+
+def test_what_cannot_be_stacked_is_told() -> None:
+    recording = _test("a", [1.0], 1)
+    blind = Recording("blind", recording.time, recording.table[["z_um"]], CHANNELS[3:], whole(2))
+
+    with pytest.raises(InputError, match="no recording given"):
+        stack([], ["z_um"])
+    with pytest.raises(InputError, match="no target given"):
+        stack([recording], [])
+    with pytest.raises(InputError, match="target t1_C measures temperature"):
+        stack([recording], ["t1_C"])
+    with pytest.raises(InputError, match="input z_um is a displacement"):
+        stack([recording], ["z_um"], ["t1_C", "z_um"])
+    with pytest.raises(InputError, match="blind: no temperature and no spindle speed"):
+        stack([blind], ["z_um"])
+    with pytest.raises(InputError, match=r"blind: no channel is named 't1_C'"):
+        stack([recording, blind], ["z_um"])
+    with pytest.raises(RecordingError, match="a: no row has a number in all of the inputs"):
+        stack([_test("a", [1.0], 1, first_missing=2)], ["z_um"]).reference()
+
+
+def test_a_recording_finds_its_channels_by_any_of_their_names() -> None:
+    recording = _test("a", [1.0, 3.0], 1)
+
+    assert recording.channel("z_um") == CHANNELS[3]
+    assert [c.name for c in recording.temperatures] == ["t1_C", "t2_C"]
+    assert [c.name for c in recording.displacements] == ["z_um"]
+    assert recording.speed == CHANNELS[1]
+    assert recording.sampling_interval == 2.0
+    assert np.isnan(Recording("one", np.zeros(1), recording.table[:1], CHANNELS, whole(1)).sampling_interval)
+    with pytest.raises(InputError, match=r"no channel is named 't3_C'; the nearest are t2_C, t1_C"):
+        recording.channel("t3_C")
+
+
+@pytest.mark.parametrize(
+    ("time", "cycles", "says"),
+    [
+        ([0.0], whole(2), "1 times for 2 rows"),
+        ([0.0, 0.0], whole(2), "time does not rise at row 1"),
+        ([0.0, np.nan], whole(2), "time does not rise at row 1"),
+        ([0.0, 1.0], whole(1), "do not cover the 2 rows"),
+        ([0.0, 1.0], (), "do not cover the 2 rows"),
+    ],
+)
+def test_a_recording_that_contradicts_itself_is_refused(
+    time: list[float], cycles: tuple[Cycle, ...], says: str
+) -> None:
+    table = _test("a", [1.0], 1).table
+
+    with pytest.raises(RecordingError, match=says):
+        Recording("a", np.array(time), table, CHANNELS, cycles)
+    with pytest.raises(RecordingError, match="table columns and channels differ"):
+        Recording("a", np.array([0.0, 1.0]), table, CHANNELS[:2], whole(2))
