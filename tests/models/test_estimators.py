@@ -12,6 +12,8 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input, Support
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.leastsquares import lstsq
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.mra import StepwiseMRA
@@ -23,8 +25,8 @@ FloatArray = NDArray[np.float64]
 ALL = [LeastSquares(), PartialF(), StepwiseMRA(), StepwiseMRA(fit_intercept=True, hierarchy=True)]
 
 
-@parametrize_with_checks(ALL)  # type: ignore[untyped-decorator]
-def test_contract_of_scikit_learn(estimator: TermRegressor, check: Callable[[TermRegressor], None]) -> None:
+@parametrize_with_checks([*ALL, DynamicRidge(), DynamicRidge(fit_intercept=True)])  # type: ignore[untyped-decorator]
+def test_contract_of_scikit_learn(estimator: ThermalRegressor, check: Callable[[ThermalRegressor], None]) -> None:
     check(estimator)
 
 
@@ -158,7 +160,8 @@ def test_nothing_enters() -> None:
     np.testing.assert_allclose(m.predict(X), y.mean())
     assert m.r_squared_ == pytest.approx(0, abs=1e-12)
     frozen = m.freeze(target="dx")
-    assert frozen.sensors == frozen.inputs == ()
+    assert frozen.sensors == ()
+    assert frozen.inputs == ()
     assert frozen.step(frozen.init(), X[:, :0], 0.0)[1] == pytest.approx(m.predict(X))
     assert "NONE" in m.log_text()
     assert (StepwiseMRA(alpha_enter=1e-30).fit(X, y - y.mean()).predict(X) == 0).all()

@@ -51,7 +51,7 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
 def part(moments: FloatArray, columns: IntArray) -> FloatArray:
     """Return the moments of some features, the constant and y."""
     keep = np.append(columns, [len(moments) - 2, len(moments) - 1])
-    return moments[np.ix_(keep, keep)]
+    return np.asarray(moments[np.ix_(keep, keep)])
 
 
 def solve(moments: FloatArray, strengths: Sequence[float], fit_intercept: bool) -> tuple[FloatArray, FloatArray]:
