@@ -68,7 +68,7 @@ def demo(
         _console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
     code = compare([recording], target=targets, leave_one_cycle_out=True, output=report, overwrite=overwrite, json=json)
     if not json:
-        _console.print("\n[bold]3. The best of them, fitted to everything and frozen[/]")
+        _console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
         fit([recording], target=targets, model="dynamic", output=model, overwrite=overwrite)
     else:
         fit([recording], target=targets, model="dynamic", output=model, overwrite=overwrite, quiet=True)
@@ -165,6 +165,7 @@ def fit(
     leave_one_file_out: Flag = False,
     absolute: Flag = False,
     support: Policy = "clip",
+    margin: float = 0.25,
     jobs: int = -1,
     overwrite: Flag = False,
     json: Json = False,
@@ -199,6 +200,8 @@ def fit(
         Take temperatures as they are; without it they are counted from the start of each test.
     support : str
         What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
+    margin : float
+        Share of each input's trained span by which its range is widened.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     overwrite : bool
@@ -223,7 +226,7 @@ def fit(
     samples = stack(tests, target, inputs, rezero=not absolute)
     protocol = _protocol(samples, split, leave_one_cycle_out, leave_one_file_out)
     with _progress(n_pieces(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
-        result = study.fit(samples, model, protocol, support=Support(support), jobs=jobs, progress=progress)
+        result = study.fit(samples, model, protocol, support=Support(support, margin), jobs=jobs, progress=progress)
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
         out.show_fit(result, output, _console, as_json=json)

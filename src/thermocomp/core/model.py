@@ -70,7 +70,7 @@ class Support:
     """
 
     policy: Literal["clip", "hold", "fade"] = "clip"
-    margin: float = 0.1
+    margin: float = 0.25
     fade_over: float = 0.5
 
     def __post_init__(self) -> None:

@@ -11,6 +11,19 @@ class Unit:
     """A unit a file may use, and how it becomes the house unit of its quantity.
 
     ``value_in_house_unit = scale * value + shift``
+
+    Parameters
+    ----------
+    symbol : str
+        As written in files, such as ``degF``.
+    quantity : str
+        A key of `HOUSE_UNITS`.
+    house : str
+        House unit of that quantity.
+    scale : float
+        [house unit per unit]
+    shift : float
+        [house unit]
     """
 
     symbol: str

@@ -177,6 +177,18 @@ def refuse_cell(
 ) -> NoReturn:
     """Tell which cell holds text where a number belongs.
 
+    Parameters
+    ----------
+    table : Table
+    source : str
+        The file.
+    row, column : int
+        Position of the cell in `table`.
+    cell : object
+        What it holds.
+    cause : Exception, optional
+        What it was noticed by.
+
     Raises
     ------
     RecordingError

@@ -107,6 +107,21 @@ def run(
 ) -> SimulatedTest:
     """Run one test on a machine.
 
+    Parameters
+    ----------
+    machine : VirtualMachine
+    programme : Programme
+        What is done and what is recorded.
+    weather, noise : numpy.random.Generator
+        Of the air round the machine, and of sensors and probes.
+    sensor_noise : float, optional
+        Standard deviation of the temperature noise [degC]; the sensors' own if not given.
+    faults : sequence of Fault
+
+    Returns
+    -------
+    SimulatedTest
+
     Raises
     ------
     InputError

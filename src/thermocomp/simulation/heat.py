@@ -88,7 +88,23 @@ class HeatSources:
         return float((abs(speed) / self.top_speed) ** 0.7)
 
     def power(self, temperatures: FloatArray, index: Mapping[str, int], drive: Drive, chilling: float) -> FloatArray:
-        """Return the heat put into each node [W], of shape (n_nodes,), the chiller running a share of the time."""
+        """Return the heat put into each node.
+
+        Parameters
+        ----------
+        temperatures : ndarray of shape (n_nodes,)
+            [degC]
+        index : mapping of str to int
+            Of each node, by name.
+        drive : Drive
+        chilling : float
+            Share of the time that the chiller runs.
+
+        Returns
+        -------
+        ndarray of shape (n_nodes,)
+            [W]
+        """
         power = np.zeros(len(temperatures))
         if not drive.powered:
             return power
