@@ -1,0 +1,52 @@
+"""The README shows what the commands really print."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from thermocomp.cli.app import app, run
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def blocks() -> list[list[str]]:
+    """Return the lines of each ```text block."""
+    return [b.strip("\n").split("\n") for b in re.findall(r"```text\n(.*?)```", README.read_text("utf-8"), re.DOTALL)]
+
+
+def assert_printed(shown: list[str], output: str) -> None:
+    """Every shown line was printed, in this order; ``...`` stands for lines left out."""
+    lines = iter(line.rstrip() for line in output.split("\n"))
+    for line in shown:
+        if line != "...":
+            assert line.rstrip() in lines, f"the README shows a line that is not printed there: {line}"
+
+
+def test_the_demo_prints_what_the_readme_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(["demo", "--output", "demo"]) == 0
+    assert_printed(blocks()[0], capsys.readouterr().out)
+    assert sorted(p.name for p in Path("demo").iterdir()) == ["model.json", "recording.parquet", "report.html"]
+    assert run(["demo", "--output", "demo"]) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_the_real_machine_prints_what_the_readme_shows(
+    shared_data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    recording = str(shared_data / "fl_thermal" / "recording.csv")
+    assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic"]) == 0
+    assert_printed(blocks()[2], capsys.readouterr().out)
+
+
+def test_commands_of_the_readme_exist() -> None:
+    text = README.read_text("utf-8")
+    for name in re.findall(r"^ +thermocomp (\S+)", text, re.MULTILINE):
+        assert name in list(app)
+    for target in re.findall(r"^ +make (\w+)", text, re.MULTILINE):
+        assert re.search(rf"^{target}:", (README.parent / "Makefile").read_text("utf-8"), re.MULTILINE)
