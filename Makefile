@@ -33,7 +33,7 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) demo docs/_build docs/auto_examples .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) demo docs/_build docs/auto_examples docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 $(VENV)/.study: pyproject.toml
 	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]'

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from thermocomp.compensation import online
@@ -82,7 +82,7 @@ def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) ->
         good[channel] = value if channel == "t" or not math.isfinite(value) else 1e9
     after, result = online.step([model()], OPEN, state, Reading(time, good), now)
     assert result.rejected
-    assert after is state
+    assert after._replace(clock=state.clock) == state
     assert result.corrections["z"] == state.corrections[0]
 
 
@@ -91,6 +91,7 @@ def test_the_reason_names_the_channel() -> None:
     assert result.rejected == "t = nan degC is not plausible"
 
 
+@example(target=67.0, current=1.3340758758793854, dt=7.0, magnitude=66.20264931370188, rate=10.0, dead_band=0.0)
 @given(
     target=st.floats(),
     current=st.floats(-50, 50),
@@ -121,6 +122,23 @@ def test_rate_limit_is_reached_over_time() -> None:
     for k in range(1, 8):
         state, result = online.step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
         assert result.corrections["z"].offset == pytest.approx(-min(4.0, 1.0 * k))
+
+
+@pytest.mark.parametrize("silent", [True, False])
+def test_an_outage_does_not_end_in_a_jump(silent: bool) -> None:
+    """Half an hour without a usable reading: the rate limit saves no travel up."""
+    limits = Limits(magnitude=1000.0, rate=0.05, reading_age=60.0)
+    state = online.start([model()])
+    for k in range(3):
+        state, _ = online.step([model()], limits, state, reading(10.0 * k, 20.0), 10.0 * k)
+    if not silent:
+        for k in range(3, 180):
+            state, result = online.step([model()], limits, state, reading(10.0 * k, math.nan), 10.0 * k)
+            assert result.rejected
+    _, result = online.step([model()], limits, state, reading(1800.0, 60.0), 1800.0)
+    assert not result.rejected
+    travelled = abs(result.corrections["z"].offset)
+    assert 0 < travelled <= limits.rate * (limits.reading_age if silent else 10.0) * (1 + 1e-12)
 
 
 def test_outside_inputs_are_told() -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.machine import Channel
 from thermocomp.files.columns import understand
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
@@ -376,3 +376,19 @@ def _csv(folder: Path, text: str, name: str = "rec.csv") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def test_a_role_without_a_unit_takes_the_unit_of_the_heading(tmp_path: Path) -> None:
+    path = tmp_path / "units.csv"
+    path.write_text("time_s,T2 [degF],z_mm,frame\n0,68,0.5,20\n1,77,0.6,21\n", encoding="utf-8")
+    columns = {
+        "t2": ColumnMap("T2 [degF]", role="temperature"),
+        "z": ColumnMap("z_mm", role="displacement"),
+        "frame": ColumnMap(role="temperature"),
+    }
+    table = read(path, Mapping(columns=columns)).table
+    assert table["t2"].tolist() == pytest.approx([20.0, 25.0])
+    assert table["z"].tolist() == pytest.approx([500.0, 600.0])
+    assert table["frame"].tolist() == [20.0, 21.0]
+    with pytest.raises(UnitError, match=r"the role is displacement, but the heading 'T2 \[degF\]' says degF"):
+        read(path, Mapping(columns={"t2": ColumnMap("T2 [degF]", role="displacement")}))

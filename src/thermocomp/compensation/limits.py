@@ -30,4 +30,6 @@ def limited(target: float, current: float, dt: float, limits: Limits) -> float:
     if abs(target - current) <= limits.dead_band:
         return current
     reach = limits.rate * dt
-    return current + max(-reach, min(reach, target - current))
+    if abs(target - current) <= reach:
+        return target  # exactly: current + (target - current) may round past the magnitude
+    return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))

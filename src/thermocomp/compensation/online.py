@@ -31,6 +31,7 @@ class OnlineState(NamedTuple):
     models: tuple[State, ...]  #: one per model
     corrections: tuple[Correction, ...]  #: in force, one per model
     time: float | None  #: of the last reading that passed the gate [s]
+    clock: float | None  #: when the step was last taken, whatever the gate said [s]
 
 
 class OnlineResult(NamedTuple):
@@ -55,7 +56,7 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
     for m in models:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
-    return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None)
+    return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
 
 
 def gate(models: Sequence[ErrorModel], reading: Reading, last: float | None, now: float, limits: Limits) -> str:
@@ -115,18 +116,21 @@ def step(
     """
     rejected = gate(models, reading, state.time, now, limits)
     if rejected:
-        return state, _result(models, state.corrections, rejected, ())
+        waiting = state._replace(clock=now) if math.isfinite(now) else state
+        return waiting, _result(models, state.corrections, rejected, ())
     dt = 0.0 if state.time is None else reading.time - state.time
+    # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
+    travel = 0.0 if state.clock is None else min(now - state.clock, limits.reading_age)
     states, corrections, outside = [], [], []
     for model, memory, current in zip(models, state.models, state.corrections, strict=True):
         values = np.array([reading.values[i.name] for i in model.inputs])
         after, deviation = model.step(memory, values, dt)
         wanted = Correction.opposing(Deviation(float(deviation)))
         states.append(after)
-        corrections.append(Correction(limited(wanted.offset, current.offset, dt, limits)))
+        corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
         if after.outside.any():
             outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-    new = OnlineState(tuple(states), tuple(corrections), reading.time)
+    new = OnlineState(tuple(states), tuple(corrections), reading.time, now)
     return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import Unit, unit
+from thermocomp.core.units import HOUSE_UNITS, Unit, unit
 from thermocomp.files.mapping import ColumnMap, Mapping
 
 FloatArray = NDArray[np.float64]
@@ -199,9 +199,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
         if rule.role in ("ignore", "cycle"):
             continue
         meaning = meanings[index]
-        meant = rule.conversion or (meaning.unit if meaning else None)
-        if meant is None:
-            raise RecordingError(f"{source}: mapping [columns.{name}]: give it a unit or a role; {heading!r} has none")
+        meant = _meant(rule, meaning, f"{source}: mapping [columns.{name}]", heading)
         columns.append(Column(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
     if not mapping.read.only_mapped:
         for k, meaning in enumerate(meanings):
@@ -219,6 +217,23 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
     if not time_unit and time_meaning is not None and time_meaning.unit.quantity == "time":
         time_unit = time_meaning.unit.symbol
     return Plan(time, time_unit, date, cycle, tuple(columns), _aliases(columns, headings, meanings), tuple(notes))
+
+
+def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> Unit:
+    """Return the unit of a mapped column: the mapping's, else the heading's, else the house unit of the role."""
+    if rule.unit or meaning is None:
+        meant = rule.conversion
+        if meant is None:
+            raise RecordingError(f"{where}: give it a unit or a role; {heading!r} has none")
+        return meant
+    if rule.role not in HOUSE_UNITS:
+        return meaning.unit
+    try:
+        return unit(meaning.unit.symbol, rule.role)
+    except UnitError as e:
+        raise UnitError(
+            f"{where}: the role is {rule.role}, but the heading {heading!r} says {meaning.unit.symbol}; give it a unit"
+        ) from e
 
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:

@@ -1,0 +1,58 @@
+"""Directive ``cli-help``: what a command prints when it is asked for help, taken from the real app at build time.
+
+    .. cli-help:: fit
+
+Without a name it is the help of the whole app.
+"""
+
+import os
+import subprocess
+import sys
+from typing import Any, ClassVar
+
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
+
+from thermocomp.cli import app, commands
+
+COLUMNS = 104
+
+
+def help_text(command: str = "") -> str:
+    """Run ``thermocomp COMMAND --help`` on a plain terminal of a fixed width.
+
+    Raises
+    ------
+    RuntimeError
+        It did not end with exit code 0.
+    """
+    line = [sys.executable, "-m", "thermocomp.cli.app", *([command] if command else []), "--help"]
+    terminal = {"COLUMNS": str(COLUMNS), "NO_COLOR": "1", "TERM": "dumb", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(line, env=os.environ | terminal, capture_output=True, encoding="utf-8", check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(line[1:])} ended with {done.returncode}: {done.stderr.strip()}")
+    return "\n".join(row.rstrip() for row in done.stdout.strip().splitlines())
+
+
+class CliHelp(SphinxDirective):
+    """See the module."""
+
+    optional_arguments: ClassVar[int] = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return the help as a literal block."""
+        for module in (app, commands):
+            self.env.note_dependency(str(module.__file__))
+        try:
+            text = help_text(*self.arguments)
+        except RuntimeError as e:
+            raise self.error(str(e)) from e
+        block = nodes.literal_block(text, text, language="none", classes=["cli-help"])
+        self.set_source_info(block)
+        return [block]
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register the directive."""
+    app.add_directive("cli-help", CliHelp)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,87 @@
+"""Configuration of the documentation: everything offline, every warning an error (see the Makefile)."""
+
+import re
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
+
+# Pages of modules that are gone would be read again, and fail.
+listed = re.findall(r"^   (thermocomp\.\S+)$", (HERE / "reference.rst").read_text(encoding="utf-8"), re.MULTILINE)
+for page in HERE.glob("reference/generated/*.rst"):
+    if page.stem not in listed:
+        page.unlink()
+
+project = "thermocomp"
+author = "The thermocomp maintainers"
+copyright = "the thermocomp maintainers, Apache-2.0"
+release = version = version_of("thermocomp")
+
+extensions = [
+    "cli_help",
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.viewcode",
+    "sphinx_gallery.gen_gallery",
+]
+# The tutorial's source is read by sphinx-gallery, what comes of it lies in auto_examples.
+exclude_patterns = ["_build", "tutorial"]
+templates_path = ["_templates"]
+
+# `name` in a page or a docstring is a link where it names something of thermocomp, else it is set as code.
+default_role = "py:obj"
+myst_heading_anchors = 2
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings say types, shapes and units
+autodoc_preserve_defaults = True
+autodoc_default_options = {
+    "members": True,
+    "show-inheritance": True,
+    # scikit-learn gives them to every estimator; their docstrings refer to its own pages
+    "exclude-members": "set_fit_request, set_predict_request, set_score_request",
+}
+numpydoc_show_class_members = False
+toc_object_entries = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "tutorial",
+    "gallery_dirs": "auto_examples",
+    "filename_pattern": "plot_",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "image_srcset": ["2x"],
+    "min_reported_time": 1e6,
+    "reference_url": {"thermocomp": None},
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "write_computation_times": False,
+}
+
+html_theme = "alabaster"
+html_static_path = ["_static"]
+html_css_files = ["thermocomp.css"]
+html_title = f"thermocomp {release}"
+html_show_sourcelink = False
+html_show_sphinx = False
+html_theme_options = {
+    "description": "From temperature recordings to a validated thermal compensation",
+    "fixed_sidebar": True,
+    "font_family": "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif",
+    "head_font_family": "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif",
+    "code_font_family": "ui-monospace, 'SF Mono', Consolas, 'DejaVu Sans Mono', monospace",
+    "font_size": "16px",
+    "code_font_size": "0.85em",
+    "page_width": "1120px",
+    "sidebar_width": "230px",
+    "sidebar_collapse": True,
+    "show_powered_by": False,
+    "show_relbar_bottom": True,
+}
+html_sidebars = {"**": ["about.html", "searchfield.html", "navigation.html"]}
