@@ -87,10 +87,9 @@ def main() -> int:
         last, _ = model.step(last, X[k], 30.0)
 
     pipeline = make_pipeline(StandardScaler(), Ridge()).fit(X, y)
-    lags = len(model.lagged)
     rows = [
         ("online step: gate, model, limits", percentiles(online_step, 3000)),
-        (f"frozen model alone ({len(names)} inputs, {lags} lags)", percentiles(model_step, 3000)),
+        (f"frozen model alone ({len(names)} inputs, {len(estimator.coef_)} features)", percentiles(model_step, 3000)),
         ("scikit-learn pipeline, one row, no dynamics", percentiles(lambda k: pipeline.predict(X[k : k + 1]), 1500)),
     ]
     print(f"{'one sample':<48} {'p50 [us]':>9} {'p99 [us]':>9} {'peer / this':>12}")

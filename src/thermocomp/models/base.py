@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
@@ -17,7 +18,6 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     ``data_min_`` and ``data_max_`` of shape (n_features,).
     """
 
-    @abstractmethod
     def freeze(
         self,
         *,
@@ -27,7 +27,9 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         support: Support = Support(),
         provenance: Provenance | None = None,
     ) -> ErrorModel:
-        """Return the fitted model as plain numbers.
+        """Return the fitted model as plain numbers, without the inputs it has no use for.
+
+        A sensor that was not selected may die without a consequence.
 
         Parameters
         ----------
@@ -52,6 +54,13 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         InputError
             `inputs` are not as many as the features.
         """
+        return self._frozen(
+            self._inputs(inputs), {"target": target, "unit": unit, "support": support, "provenance": provenance}
+        )
+
+    @abstractmethod
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> ErrorModel:
+        """Build the model of the method's family; `header` holds what is the same for all families."""
 
     def _names(self) -> tuple[str, ...]:
         """Return the names of the features: those of the table given to `fit`, else x0, x1, ..."""

@@ -11,7 +11,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.model import Input
 from thermocomp.core.terms import Term
 from thermocomp.models import ridge
 from thermocomp.models.base import ThermalRegressor
@@ -197,70 +197,34 @@ class DynamicRidge(ThermalRegressor):
         ]
         return tuple(labels[k] for k in self._columns)
 
-    def freeze(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-    ) -> LinearDynamic:
-        """Return the fitted model as plain numbers.
-
-        Parameters
-        ----------
-        target, unit : str
-            What it predicts.
-        inputs : sequence of Input, optional
-            One per feature; made from the training data if not given.
-        support : Support
-        provenance : Provenance, optional
-
-        Returns
-        -------
-        LinearDynamic
-        """
-        check_is_fitted(self)
-        n_inputs = self.n_features_in_
-        signals: list[Term] = [(i,) for i in range(n_inputs)]
-        direct = [0.0] * n_inputs
-        follows: list[int] = []
-        taus: list[float] = []
-        lagged: list[float] = []
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> LinearDynamic:
+        direct: dict[Term, float] = {}
+        lagged: list[tuple[Term, float, float]] = []  # signal, time constant, weight
         weights = iter(self.coef_.tolist())
         for i in self._temperatures:
-            direct[i] += next(weights)
+            direct[(i,)] = next(weights)
         for tau in self.temperature_lags_:
             for i in self._temperatures:
                 w = next(weights)
-                if self.copies == "high-passed":
-                    direct[i] += w
+                if self.copies == "high-passed":  # w (s - lag of s)
+                    direct[(i,)] += w
                     w = -w
-                follows.append(i)
-                taus.append(tau)
-                lagged.append(w)
+                lagged.append(((i,), tau, w))
         for tau in self.speed_lags_:
-            for power in self.speed_powers:
-                for i in self._speeds:
-                    signal = (i,) * power
-                    if signal not in signals:
-                        signals.append(signal)
-                        direct.append(0.0)
-                    follows.append(signals.index(signal))
-                    taus.append(tau)
-                    lagged.append(next(weights))
+            lagged += [((i,) * power, tau, next(weights)) for power in self.speed_powers for i in self._speeds]
+        lagged = [lag for lag in lagged if lag[2] != 0]
+        signals = sorted(
+            {s for s, w in direct.items() if w != 0} | {s for s, _, _ in lagged}, key=lambda s: (len(s), s)
+        )
+        sensors = sorted({i for s in signals for i in s})
         return LinearDynamic(
-            target=target,
-            unit=unit,
-            inputs=self._inputs(inputs),
-            support=support,
-            provenance=provenance,
-            signals=tuple(signals),
-            direct=tuple(direct),
-            lag_signals=tuple(follows),
-            time_constants=tuple(taus),
-            lagged=tuple(lagged),
+            **header,
+            inputs=tuple(inputs[i] for i in sensors),
+            signals=tuple(tuple(sensors.index(i) for i in s) for s in signals),
+            direct=tuple(direct.get(s, 0.0) for s in signals),
+            lag_signals=tuple(signals.index(s) for s, _, _ in lagged),
+            time_constants=tuple(tau for _, tau, _ in lagged),
+            lagged=tuple(w for _, _, w in lagged),
             intercept=self.intercept_,
         )
 

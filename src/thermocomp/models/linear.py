@@ -1,12 +1,13 @@
 """What the regressions on terms share: the fit of chosen terms, how good it is, and `freeze`."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.models.base import ThermalRegressor
@@ -59,55 +60,17 @@ class TermRegressor(ThermalRegressor):
         change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
         return np.asarray(self._table.evaluate(change) @ self.coef_ + self.intercept_)
 
-    def freeze(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-    ) -> Polynomial:
-        """Return the fitted model as plain numbers, without the inputs it has no use for.
-
-        A sensor that was not selected may die without a consequence.
-
-        Parameters
-        ----------
-        target : str
-            Displacement channel (or error component) it predicts.
-        unit : str
-            Unit of the deviation it gives.
-        inputs : sequence of Input, optional
-            One per feature; made from the training data if not given.
-        support : Support
-            What the model does outside its trained range.
-        provenance : Provenance, optional
-            Where it comes from.
-
-        Returns
-        -------
-        Polynomial
-
-        Raises
-        ------
-        InputError
-            `inputs` are not as many as the features.
-        """
-        offered = self._inputs(inputs)
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Polynomial:
         active = [(term, c) for term, c in zip(self._table.terms, self.coef_.tolist(), strict=True) if c != 0]
         variables = sorted({v for term, _ in active for v in term})
         sensors = sorted({i for v in variables for i, _ in self._table.variables[v].weights})
         kept = []
         for v in variables:
             weights = tuple((sensors.index(i), factor) for i, factor in self._table.variables[v].weights)
-            kept.append(Variable("-".join(offered[sensors[i]].name for i, _ in weights), weights))
+            kept.append(Variable("-".join(inputs[sensors[i]].name for i, _ in weights), weights))
         return Polynomial(
-            target=target,
-            unit=unit,
-            inputs=tuple(offered[i] for i in sensors),
-            support=support,
-            provenance=provenance,
+            **header,
+            inputs=tuple(inputs[i] for i in sensors),
             variables=tuple(kept),
             terms=tuple(tuple(variables.index(v) for v in term) for term, _ in active),
             coefficients=tuple(c for _, c in active),
