@@ -7,28 +7,26 @@ without it.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from thermocomp.cli.extras import needs
-from thermocomp.core.exceptions import InputError
+from thermocomp.cli.options import (
+    Flag,
+    Json,
+    Names,
+    OptionalOutput,
+    Output,
+    Recordings,
+    Study,
+    read_recordings,
+    refuse_existing,
+)
 
-if TYPE_CHECKING:
-    from thermocomp.assessment.splits import Protocol
-    from thermocomp.recording.recording import Recording
-    from thermocomp.recording.samples import Samples
-
-Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
-Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
-OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
-Flag = Annotated[bool, Parameter(negative=())]
-Json = Annotated[bool, Parameter(name="--json", negative=())]
-Output = Annotated[Path, Parameter(name=["--output", "-o"])]
-OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
-
+Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Policy = Literal["clip", "hold", "fade"]
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
 
@@ -59,19 +57,17 @@ def demo(
     """
     output.mkdir(parents=True, exist_ok=True)
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
-    _refuse_existing([recording, model, report], overwrite)
+    refuse_existing([recording, model, report], overwrite)
     if not json:
         _console.print("[bold]1. The virtual machine tool runs a drift test[/]")
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
-    targets = [c.name for c in _read([recording], None)[0].displacements]
+    study = Study(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
         _console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
-    code = compare([recording], target=targets, leave_one_cycle_out=True, output=report, overwrite=overwrite, json=json)
+    code = compare([recording], study=study, output=report, overwrite=overwrite, json=json)
     if not json:
         _console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
-        fit([recording], target=targets, model="dynamic", output=model, overwrite=overwrite)
-    else:
-        fit([recording], target=targets, model="dynamic", output=model, overwrite=overwrite, quiet=True)
+    fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)
     return code
 
 
@@ -83,7 +79,7 @@ def simulate(
     noise: float | None = None,
     overwrite: Flag = False,
     json: Json = False,
-    quiet: Annotated[bool, Parameter(show=False, parse=False)] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Record an experiment on the virtual machine tool.
 
@@ -117,7 +113,7 @@ def simulate(
         if len(tests) == 1
         else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, len(tests) + 1)]
     )
-    _refuse_existing(paths, overwrite)
+    refuse_existing(paths, overwrite)
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)
     if not quiet:
@@ -142,7 +138,7 @@ def check(recordings: Recordings, /, *, mapping: Path | None = None, json: Json 
     int
         0 nothing wrong, 1 trouble found, 2 unusable input.
     """
-    tests = _read(recordings, mapping)
+    tests = read_recordings(recordings, mapping)
     with needs("study"):
         from thermocomp.cli import output as out
         from thermocomp.recording.quality import check as findings_of
@@ -155,21 +151,14 @@ def fit(
     recordings: Recordings,
     /,
     *,
-    target: Names,
+    study: Study,
     model: str = "dynamic",
     output: Output,
-    inputs: OptionalNames = None,
-    mapping: Path | None = None,
-    split: str | None = None,
-    leave_one_cycle_out: Flag = False,
-    leave_one_file_out: Flag = False,
-    absolute: Flag = False,
     support: Policy = "clip",
     margin: float = 0.25,
-    jobs: int = -1,
     overwrite: Flag = False,
     json: Json = False,
-    quiet: Annotated[bool, Parameter(show=False, parse=False)] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
 
@@ -180,30 +169,16 @@ def fit(
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files; each is one test.
-    target : list of str
-        Displacement channels to predict.
+    study : Study
+        What is predicted from what, and on what it is judged.
     model : str
         ols, partial-f, mra or dynamic.
     output : Path
         Model file to write (.json).
-    inputs : list of str
-        Channels to predict from; all temperatures and the spindle speed if not given.
-    mapping : Path
-        TOML file that says what the columns are.
-    split : str
-        Judge by time: shares of the rows such as 0.75/0.25, or hours such as 20h/8h.
-    leave_one_cycle_out : bool
-        Judge on each thermal cycle in turn (what is done if nothing is said and there are several).
-    leave_one_file_out : bool
-        Judge on each recording in turn.
-    absolute : bool
-        Take temperatures as they are; without it they are counted from the start of each test.
     support : str
         What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
     margin : float
         Share of each input's trained span by which its range is widened.
-    jobs : int
-        Processes to share the work among; -1 takes all cores.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -214,19 +189,20 @@ def fit(
     int
         0 done, 1 a component was refused, 2 unusable input.
     """
-    tests = _read(recordings, mapping)
+    tests = read_recordings(recordings, study.mapping)
     with needs("study"):
-        from thermocomp.assessment import study
+        from thermocomp.assessment import study as studies
         from thermocomp.assessment.compare import n_pieces
         from thermocomp.cli import output as out
         from thermocomp.core.model import Support
         from thermocomp.files import modelfile
-        from thermocomp.recording.samples import stack
-    _refuse_existing([output], overwrite)
-    samples = stack(tests, target, inputs, rezero=not absolute)
-    protocol = _protocol(samples, split, leave_one_cycle_out, leave_one_file_out)
+    refuse_existing([output], overwrite)
+    samples = study.samples(tests)
+    protocol = study.protocol(samples)
     with _progress(n_pieces(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
-        result = study.fit(samples, model, protocol, support=Support(support, margin), jobs=jobs, progress=progress)
+        result = studies.fit(
+            samples, model, protocol, support=Support(support, margin), jobs=study.jobs, progress=progress
+        )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
         out.show_fit(result, output, _console, as_json=json)
@@ -259,14 +235,14 @@ def assess(
     int
         0 every model accepted, 1 one was refused, 2 unusable input.
     """
-    tests = _read(recordings, mapping)
+    tests = read_recordings(recordings, mapping)
     with needs("study"):
-        from thermocomp.assessment import study
+        from thermocomp.assessment import study as studies
         from thermocomp.cli import output as out
         from thermocomp.files import modelfile
     models = modelfile.read(model)
     with _progress(len(models), json) as progress:
-        judged = study.assess(models, tests, progress=progress)
+        judged = studies.assess(models, tests, progress=progress)
     out.show_assess(judged, _console, as_json=json)
     return 0 if all(a.accepted for a in judged.assessments) else 1
 
@@ -275,16 +251,9 @@ def compare(
     recordings: Recordings,
     /,
     *,
-    target: Names,
+    study: Study,
     models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
-    inputs: OptionalNames = None,
-    mapping: Path | None = None,
-    split: str | None = None,
-    leave_one_cycle_out: Flag = False,
-    leave_one_file_out: Flag = False,
-    absolute: Flag = False,
     output: OptionalOutput = None,
-    jobs: int = -1,
     overwrite: Flag = False,
     json: Json = False,
 ) -> int:
@@ -294,26 +263,12 @@ def compare(
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files; each is one test.
-    target : list of str
-        Displacement channels to predict.
+    study : Study
+        What is predicted from what, and on what it is judged.
     models : list of str
         Methods to compare: ols, partial-f, mra, dynamic.
-    inputs : list of str
-        Channels to predict from; all temperatures and the spindle speed if not given.
-    mapping : Path
-        TOML file that says what the columns are.
-    split : str
-        Judge by time: shares of the rows such as 0.75/0.25, or hours such as 20h/8h.
-    leave_one_cycle_out : bool
-        Judge on each thermal cycle in turn (what is done if nothing is said and there are several).
-    leave_one_file_out : bool
-        Judge on each recording in turn.
-    absolute : bool
-        Take temperatures as they are; without it they are counted from the start of each test.
     output : Path
         Report to write (.html).
-    jobs : int
-        Processes to share the work among; -1 takes all cores.
     overwrite : bool
         Write over an existing report.
     json : bool
@@ -324,50 +279,22 @@ def compare(
     int
         0 every target has a model that may be used, 1 a target has none, 2 unusable input.
     """
-    tests = _read(recordings, mapping)
+    tests = read_recordings(recordings, study.mapping)
     with needs("study"):
         from thermocomp.assessment import compare as comparing
         from thermocomp.cli import output as out
-        from thermocomp.recording.samples import stack
     if output is not None:
-        _refuse_existing([output], overwrite)
-    samples = stack(tests, target, inputs, rezero=not absolute)
-    protocol = _protocol(samples, split, leave_one_cycle_out, leave_one_file_out)
+        refuse_existing([output], overwrite)
+    samples = study.samples(tests)
+    protocol = study.protocol(samples)
     with _progress(comparing.n_pieces(samples, models, protocol), json) as progress:
-        comparison = comparing.compare(samples, models, protocol, jobs=jobs, progress=progress)
+        comparison = comparing.compare(samples, models, protocol, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
         html.write(comparison, tests, output)
     out.show_comparison(comparison, output, _console, as_json=json)
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1
-
-
-def _read(paths: list[Path], mapping: Path | None) -> "list[Recording]":
-    if not paths:
-        raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
-    with needs("study"):
-        from thermocomp.files import mapping as mappings
-        from thermocomp.files import recordings as reader
-    return reader.read_all(paths, mappings.read_mapping(mapping) if mapping is not None else None)
-
-
-def _protocol(samples: "Samples", split: str | None, by_cycle: bool, by_file: bool) -> "Protocol":
-    from thermocomp.assessment import splits
-
-    if (split is not None) + by_cycle + by_file > 1:
-        raise InputError("--split, --leave-one-cycle-out and --leave-one-file-out exclude each other: choose one")
-    if split is not None:
-        return splits.parse(split, samples)
-    if by_file:
-        return splits.leave_one_file_out(samples)
-    return splits.leave_one_cycle_out(samples)
-
-
-def _refuse_existing(paths: list[Path], overwrite: bool) -> None:
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
 
 
 @contextmanager

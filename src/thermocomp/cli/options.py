@@ -1,0 +1,93 @@
+"""Options that several commands share, and what they stand for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from thermocomp.cli.extras import needs
+from thermocomp.core.exceptions import InputError
+
+if TYPE_CHECKING:
+    from thermocomp.assessment.splits import Protocol
+    from thermocomp.recording.recording import Recording
+    from thermocomp.recording.samples import Samples
+
+Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
+Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
+OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
+Flag = Annotated[bool, Parameter(negative=())]
+Json = Annotated[bool, Parameter(name="--json", negative=())]
+Output = Annotated[Path, Parameter(name=["--output", "-o"])]
+OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What is predicted from what, and on what it is judged.
+
+    Parameters
+    ----------
+    target : list of str
+        Displacement channels to predict.
+    inputs : list of str
+        Channels to predict from; all temperatures and the spindle speed if not given.
+    mapping : Path
+        TOML file that says what the columns are.
+    split : str
+        Judge by time: shares of the rows such as 0.75/0.25, or hours such as 20h/8h.
+    leave_one_cycle_out : bool
+        Judge on each thermal cycle in turn (what is done if nothing is said).
+    leave_one_file_out : bool
+        Judge on each recording in turn.
+    absolute : bool
+        Take temperatures as they are; without it they are counted from the start of each test.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    """
+
+    target: Names
+    inputs: OptionalNames = None
+    mapping: Path | None = None
+    split: str | None = None
+    leave_one_cycle_out: Flag = False
+    leave_one_file_out: Flag = False
+    absolute: Flag = False
+    jobs: int = -1
+
+    def samples(self, tests: "list[Recording]") -> "Samples":
+        """Stack the tests."""
+        from thermocomp.recording.samples import stack
+
+        return stack(tests, self.target, self.inputs, rezero=not self.absolute)
+
+    def protocol(self, samples: "Samples") -> "Protocol":
+        """Return what is learned from and what is judged."""
+        from thermocomp.assessment import splits
+
+        if (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out > 1:
+            raise InputError("--split, --leave-one-cycle-out and --leave-one-file-out exclude each other: choose one")
+        if self.split is not None:
+            return splits.parse(self.split, samples)
+        if self.leave_one_file_out:
+            return splits.leave_one_file_out(samples)
+        return splits.leave_one_cycle_out(samples)
+
+
+def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]":
+    """Read the recordings named on the command line."""
+    if not paths:
+        raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
+    with needs("study"):
+        from thermocomp.files import mapping as mappings
+        from thermocomp.files import recordings as reader
+    return reader.read_all(paths, mappings.read_mapping(mapping) if mapping is not None else None)
+
+
+def refuse_existing(paths: list[Path], overwrite: bool) -> None:
+    """Raise `InputError` if a file is there already, before any work is done."""
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
