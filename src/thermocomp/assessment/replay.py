@@ -1,11 +1,11 @@
 """Replay: every prediction that is judged comes out of `ErrorModel.step`, reading by reading, as it would live."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.model import ErrorModel
+from thermocomp.core.model import ErrorModel, State
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -15,10 +15,32 @@ BoolArray = NDArray[np.bool_]
 Disturb = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def replay(
-    model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None
-) -> tuple[FloatArray, BoolArray]:
+def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
     """Replay a model over the tests that hold `rows`, from the start of each test.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Rows whose prediction is wanted.
+
+    Returns
+    -------
+    deviation : ndarray of shape (n_wanted,)
+        Predicted deviation at the wanted rows.
+    outside : ndarray of bool of shape (n_wanted,)
+        An input was outside the trained range.
+    """
+    wanted = int(rows.sum())
+    predicted, beyond = np.empty(wanted), np.empty(wanted, dtype=np.bool_)
+    for k, state in enumerate(walk(model, samples, rows)):
+        predicted[k], beyond[k] = state.deviation, state.outside.any()
+    return predicted, beyond
+
+
+def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
+    """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
 
     The compensator runs without a break from the start of a test, as it would on the machine; its only inputs are those
     of `samples`, never a displacement. A row with a missing input is what the gate turns away live: the last deviation
@@ -29,22 +51,18 @@ def replay(
     model : ErrorModel
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose prediction is wanted.
+        Rows whose state is wanted.
     disturb : callable, optional
         Makes several variants of each reading; see `Disturb`.
 
-    Returns
-    -------
-    deviation : ndarray of shape (n_wanted,) or (n_wanted, n_variants)
-        Predicted deviation at the wanted rows.
-    outside : ndarray of bool of shape (n_wanted,) or (n_wanted, n_variants)
-        An input was outside the trained range.
+    Yields
+    ------
+    State
     """
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     values = samples.values[:, columns]
     usable = np.all(np.isfinite(values), axis=1)
     reference = samples.reference()[:, columns]
-    predicted, beyond = [], []
     for test in np.unique(samples.test[rows]):
         mine = np.flatnonzero(samples.test == test)
         mine = mine[: np.flatnonzero(rows[mine]).max() + 1]
@@ -55,9 +73,7 @@ def replay(
                 state, _ = model.step(state, reading, float(samples.time[k] - last))
                 last = samples.time[k]
             if rows[k]:
-                predicted.append(state.deviation)
-                beyond.append(np.any(state.outside, axis=-1))
-    return np.array(predicted), np.array(beyond)
+                yield state
 
 
 def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:

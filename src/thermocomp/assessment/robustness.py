@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.replay import replay
+from thermocomp.assessment.replay import walk
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.samples import Samples
 
@@ -138,16 +138,21 @@ def stress(
             batch[variant, k] = reference[k]
         return batch
 
-    predicted, outside = replay(model, samples, rows, disturb)
-    squares = (measured[:, None] - predicted) ** 2
-    rms = np.sqrt(squares.mean(axis=0))
-    beyond = outside[:, 0]
+    # sums, not a table: a long recording times two hundred variants would not fit into memory
+    predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
+    squares = np.zeros(1 + 2 * draws + len(lost))
+    for k, state in enumerate(walk(model, samples, rows, disturb)):
+        deviation = np.broadcast_to(state.deviation, squares.shape)
+        squares += (measured[k] - deviation) ** 2
+        predicted[k] = deviation[0]
+        beyond[k] = np.atleast_2d(state.outside)[0].any()
+    rms = np.sqrt(squares / len(measured))
     laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
     robustness = Robustness(
         noise=noise,
         noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
         lost_rms={model.inputs[k].name: float(rms[1 + 2 * draws + i]) for i, k in enumerate(lost)},
         outside=float(beyond.mean()),
-        outside_rms=float(np.sqrt(squares[beyond, 0].mean())) if beyond.any() else float("nan"),
+        outside_rms=float(np.sqrt(np.mean((measured - predicted)[beyond] ** 2))) if beyond.any() else float("nan"),
     )
-    return Replayed(predicted[:, 0], beyond, robustness)
+    return Replayed(predicted, beyond, robustness)
