@@ -35,4 +35,4 @@ def small_machine(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *,
     )
     quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
     channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
-    return Recording("small", time, table, channels, find_cycles(time, speed), sha256=f"small{seed}")
+    return Recording("small", time, table, channels, find_cycles(time, speed))

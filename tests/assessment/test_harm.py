@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from thermocomp.assessment import harm
 
@@ -23,7 +24,7 @@ def test_a_good_model_passes() -> None:
     assert verdict.word == "accepted"
     assert verdict.cycles[0].ratio == pytest.approx(0.1)
     assert verdict.cycles[0].ratio_bound == pytest.approx(0.1)
-    assert "better than none in every unseen cycle" in verdict.reason
+    assert "better than none wherever it was judged" in verdict.reason
 
 
 def test_a_harmful_model_is_refused_with_figures() -> None:
@@ -62,16 +63,26 @@ def test_bound_tightens_with_independent_rows() -> None:
     measured = 10 + RNG.normal(size=5000)
     predicted = measured - RNG.normal(0, 9, 5000)
     verdict = harm.judge(measured, predicted, everything(5000))
-    assert verdict.cycles[0].ratio < verdict.cycles[0].ratio_bound < verdict.cycles[0].ratio * 1.03
+    assert verdict.cycles[0].ratio < verdict.cycles[0].ratio_bound < verdict.cycles[0].ratio * 1.05
 
 
 def test_too_few_rows_prove_nothing() -> None:
-    verdict = harm.judge(np.ones(3), np.ones(3), everything(3))
+    verdict = harm.judge(np.ones(19), np.ones(19), everything(19))
     assert not verdict.accepted
-    assert "fewer than 5 rows" in verdict.reason
+    assert "fewer than 20 rows" in verdict.reason
     assert not harm.judge(np.ones(3), np.ones(3), []).accepted
 
 
 def test_a_machine_that_does_not_drift_needs_no_model() -> None:
     verdict = harm.judge(np.zeros(100), np.full(100, 0.1), everything(100))
     assert not verdict.accepted
+
+
+def test_a_model_as_bad_as_none_is_mostly_refused() -> None:
+    """Residual and drift are independent slow series of one size: few pass by luck."""
+    rng = np.random.default_rng(11)
+    accepted = 0
+    for _ in range(100):
+        measured, residual = (lfilter([1.0], [1.0, -0.98], rng.normal(size=2000)) for _ in range(2))
+        accepted += harm.judge(measured, measured - residual, everything(2000), draws=300).accepted
+    assert accepted <= 15

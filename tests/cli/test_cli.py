@@ -6,13 +6,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from smallmachine import small_machine
 from thermocomp.cli.app import app, run
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import MissingExtraError
+from thermocomp.core.machine import Channel
 from thermocomp.files import modelfile, recordings
+from thermocomp.recording.recording import Recording
 
 RESULT_KEYS = {
     "model",
@@ -104,8 +107,12 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     results = printed(capsys)["results"]
     assert [r["block"] for r in results] == ["cycle 1 (2200 1/min)", "cycle 2 (1200 1/min)", "all cycles"]
     assert set(results[-1]["robustness"]["noise_rms_um"]) == {"uniform", "normal"}
-    assert run(["assess", str(model), str(drift)]) == 0
-    assert "not an honest test" in capsys.readouterr().out
+    assert run(["assess", str(model), str(drift)]) == 1
+    assert "no honest test: fitted to drift" in capsys.readouterr().out
+    copy = drift.with_name("copy.csv")
+    copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file
+    assert "fitted to copy" in capsys.readouterr().out
 
 
 def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -139,6 +146,62 @@ def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "-180" in text
 
 
+def altered(path: Path, **columns: object) -> Path:
+    """Write the small machine's recording with other columns."""
+    recording = small_machine()
+    table = recording.table.assign(**columns)
+    channels = tuple(
+        Channel(str(c), *("displacement", "um"))
+        if c not in recording.table
+        else next(k for k in recording.channels if k.name == c)
+        for c in table.columns
+    )
+    recordings.write(Recording(recording.name, recording.time, table, channels, recording.cycles), path)
+    return path
+
+
+def test_a_target_without_numbers_is_refused_not_a_crash(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = altered(tmp_path / "empty.csv", z_um=np.nan)
+    assert run(["compare", str(path), "--target", "z_um", "x_um", "--models", "ols", "--jobs", "1", "--json"]) == 1
+    results = printed(capsys)["results"]
+    assert {r["verdict"] for r in results if r["target"] == "z_um"} == {"refused"}
+    assert any(r["verdict"] == "accepted" for r in results if r["target"] == "x_um")
+    assert (
+        run(
+            ["compare", str(path), "--target", "z_um", "--models", "ols", "--jobs", "1", "-o", str(tmp_path / "r.html")]
+        )
+        == 1
+    )
+
+
+def test_a_constant_target_is_refused_not_a_crash(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = altered(tmp_path / "constant.csv", z_um=3.0)
+    arguments = [
+        "compare",
+        str(path),
+        "--target",
+        "z_um",
+        "--models",
+        "ols",
+        "partial-f",
+        "mra",
+        "dynamic",
+        "--jobs",
+        "1",
+    ]
+    assert run([*arguments, "-o", str(tmp_path / "r.html")]) in (0, 1)
+    assert run(["fit", str(path), "--target", "z_um", "--jobs", "1", "-o", str(tmp_path / "m.json")]) in (0, 1)
+    assert "trouble" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["[/]_um", "z'[red]_um", "<b>z</b>_um", "z µ°_um"])
+def test_odd_names_are_printed_as_they_are(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = altered(tmp_path / "odd.csv", **{name: small_machine().table["z_um"]})
+    arguments = ["compare", str(path), "--target", name, "--models", "ols", "--jobs", "1"]
+    assert run([*arguments, "-o", str(tmp_path / "r.html")]) == 0
+    assert f"{name}: ols" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -154,6 +217,12 @@ def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         (["compare", "nowhere.csv", "--target", "z_um"], "nowhere.csv"),
         (["assess", "{drift}", "{drift}"], "not a model file"),
         (["fit", "{drift}", "--target", "z_um", "--leave-one-file-out", "-o", "m.json"], "at least two recordings"),
+        (["fit", "{drift}", "--target", "z_um", "-o", "nowhere/m.json"], "there is no folder nowhere"),
+        (["compare", "{drift}", "--target", "z_um", "-o", "{drift}", "--overwrite"], "is also an input"),
+        (["compare", "{drift}", "--target", "z_um", "-o", ".", "--overwrite"], "is a folder"),
+        (["compare", "{drift}", "--target", "z_um", "--jobs", "0"], "--jobs 0"),
+        (["demo", "-o", "{drift}"], "is a file; name a folder"),
+        (["compare", "{drift}", "{drift}", "--target", "z_um"], "holds the same test"),
     ],
 )
 def test_unusable_input_is_exit_code_two_and_a_message(

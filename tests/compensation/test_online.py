@@ -1,6 +1,7 @@
 """The online step: a dead, stale or absurd reading never moves an axis."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import Input
+from thermocomp.core.model import HonestError, Input
 from thermocomp.core.reading import Reading
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
@@ -63,7 +64,10 @@ def test_open_limits_give_minus_the_replayed_deviation() -> None:
 bad_number = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -273.15, 850.0])
 
 
-@given(value=bad_number, channel=st.sampled_from(["t", "n", "time", "missing", "stale", "past", "same"]))
+@given(
+    value=bad_number,
+    channel=st.sampled_from(["t", "n", "time", "missing", "stale", "past", "same", "future", "text", "truth"]),
+)
 def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) -> None:
     state = warmed()
     good = {"t": 25.0, "n": 1000.0}
@@ -72,6 +76,10 @@ def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) ->
         del good["t"]
     elif channel == "stale":
         now = time + 2e9
+    elif channel == "future":
+        time = now + 60.0
+    elif channel in ("text", "truth"):
+        good["t"] = "25.0" if channel == "text" else True  # type: ignore[assignment]
     elif channel == "past":
         time = 5.0
     elif channel == "same":
@@ -122,6 +130,29 @@ def test_rate_limit_is_reached_over_time() -> None:
     for k in range(1, 8):
         state, result = online.step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
         assert result.corrections["z"].offset == pytest.approx(-min(4.0, 1.0 * k))
+
+
+@pytest.mark.parametrize("value", [0.0, 85.0, 119.9])
+def test_a_sensor_that_fails_within_what_sensors_can_say(value: float) -> None:
+    """Trained from -5 to 15 degC about a zero of 31 degC: what is a span further away is a broken sensor."""
+    frozen = model()
+    narrow = replace(frozen, inputs=(replace(frozen.inputs[0], reference=31.0, low=-5.0, high=15.0), frozen.inputs[1]))
+    cold = online.start([narrow])
+    _, result = online.step([narrow], OPEN, cold, reading(0.0, value), 0.0)
+    assert "t = " in result.rejected  # it would have become the zero
+    state, _ = online.step([narrow], OPEN, cold, reading(0.0, 26.0), 0.0)
+    state, before = online.step([narrow], OPEN, state, reading(10.0, 30.0), 10.0)
+    after, result = online.step([narrow], OPEN, state, reading(20.0, value), 20.0)
+    assert result.rejected.endswith("is not plausible")
+    assert result.corrections == before.corrections
+    assert after.models is state.models
+
+
+def test_a_refused_model_does_not_start() -> None:
+    refused = HonestError("p", 1.0, 1.0, 1.0, 1.0, 1.0, {}, "refused", "worse than none")
+    with pytest.raises(InputError, match="was refused and will not run: worse than none"):
+        online.start([replace(model(), honest_error=refused)])
+    assert online.start([replace(model(), honest_error=replace(refused, verdict="accepted"))])
 
 
 @pytest.mark.parametrize("silent", [True, False])

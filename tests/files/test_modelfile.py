@@ -49,6 +49,21 @@ def test_files(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["model.json"]
 
 
+def test_a_neighbour_and_a_folder_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "model.json.part").write_text("mine", encoding="utf-8")
+    modelfile.write([model()], tmp_path / "model.json")
+    assert (tmp_path / "model.json.part").read_text(encoding="utf-8") == "mine"
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError, match="folder"):
+        modelfile.write([model()], tmp_path / "folder", overwrite=True)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "model.json", "model.json.part"]
+
+
+def test_deep_nesting_is_no_model() -> None:
+    with pytest.raises(ModelFileError, match="nested too deeply"):
+        modelfile.loads("[" * 100_000)
+
+
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match=r"nothing\.json: no such file"):
         modelfile.read(tmp_path / "nothing.json")

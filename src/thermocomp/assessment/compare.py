@@ -12,7 +12,7 @@ from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Protocol, Split
-from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.leastsquares import effective_sample_size
 from thermocomp.models.training import method, train
@@ -50,6 +50,8 @@ class Assessment:
         The model that was replayed; None for several blocks together, or if it could not be fitted.
     failure : str
         Why the method could not be fitted; empty if it could.
+    caveat : str
+        Why this is no honest test, whatever the figures say; empty if it is one.
     overall : bool
         It is the last word on this model and target: all that was judged, not one cycle of it.
     """
@@ -69,25 +71,30 @@ class Assessment:
     robustness: Robustness | None = None
     frozen: ErrorModel | None = None
     failure: str = ""
+    caveat: str = ""
     overall: bool = False
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
-        return metrics.METRICS[name](self.measured, self.predicted) if not self.failure else float("nan")
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
 
     def none_metric(self, name: str) -> float:
         """Return the metric without compensation."""
-        return metrics.METRICS[name](self.measured, np.zeros_like(self.measured))
+        return (
+            metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
+        )
 
     @property
     def accepted(self) -> bool:
         """True if the gate let it pass."""
-        return not self.failure and self.verdict.accepted
+        return not self.failure and not self.caveat and self.verdict.accepted
 
     @property
     def reason(self) -> str:
         """Why it was accepted or refused."""
-        return f"could not be fitted: {self.failure}" if self.failure else self.verdict.reason
+        if self.failure:
+            return f"could not be judged: {self.failure}"
+        return self.caveat or self.verdict.reason
 
 
 @dataclass(frozen=True)
@@ -196,18 +203,16 @@ def judge(
     -------
     Assessment
 
-    Raises
-    ------
-    InputError
-        The target has no number in the block.
     """
     target = [c.name for c in samples.targets].index(model.target)
     rows = split.judge & np.isfinite(samples.deviations[:, target])
     if not rows.any():
-        raise InputError(f"{split.block}: {model.target} has no number there to judge against")
+        return _failed(samples, name, target, split, f"{model.target} has no number in {split.block} to judge against")
     measured = samples.deviations[rows, target]
     stressed = stress(model, samples, measured, rows) if robustness else None
     predicted = stressed.predicted if stressed else replay(model, samples, rows)[0]
+    if not np.isfinite(metrics.rms(measured, predicted)):
+        return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
     return Assessment(
         model=name,
         target=model.target,
@@ -256,30 +261,37 @@ def _assess_method(
     try:
         trained = train(name, samples, target, split.learn, support=support)
     except FitError as e:
-        rows = split.judge & np.isfinite(samples.deviations[:, target])
-        measured = samples.deviations[rows, target]
-        return Assessment(
-            model=name,
-            target=samples.targets[target].name,
-            block=split.block,
-            measured=measured,
-            predicted=np.zeros_like(measured),
-            row=samples.row[rows],
-            test=samples.test[rows],
-            cycle=samples.cycle[rows],
-            verdict=harm.Verdict((), harm.LEVEL),
-            sensors=(),
-            fit_s=0.0,
-            n_effective=float("nan"),
-            failure=str(e),
-        )
+        return _failed(samples, name, target, split, str(e))
     return judge(name, trained.model, samples, split, fit_s=trained.seconds, robustness=robustness)
+
+
+def _failed(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
+    """Return the assessment of a method that gave no prediction: refused, and said why."""
+    rows = split.judge & np.isfinite(samples.deviations[:, target])
+    measured = samples.deviations[rows, target]
+    return Assessment(
+        model=name,
+        target=samples.targets[target].name,
+        block=split.block,
+        measured=measured,
+        predicted=np.zeros_like(measured),
+        row=samples.row[rows],
+        test=samples.test[rows],
+        cycle=samples.cycle[rows],
+        verdict=harm.Verdict((), harm.LEVEL),
+        sensors=(),
+        fit_s=0.0,
+        n_effective=float("nan"),
+        failure=why,
+    )
 
 
 def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
     cycle = samples.cycle[rows]
     for k in np.unique(cycle):
-        yield samples.cycle_names[k], cycle == k
+        name = samples.cycle_names[k]
+        whole = (cycle == k).sum() == (samples.cycle == k).sum()
+        yield name if whole else f"part of {name}", cycle == k
 
 
 def _together(parts: Sequence[Assessment]) -> Assessment:

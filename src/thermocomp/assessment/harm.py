@@ -5,19 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 #: a stretch shorter than this says nothing about a cycle
-MIN_ROWS = 5
+MIN_ROWS = 20
 #: confidence of the bound
 LEVEL = 0.95
 
 
 @dataclass(frozen=True)
 class CycleVerdict:
-    """What the gate found in one unseen cycle (or the part of it that was judged).
+    """What the gate found in one thermal cycle, or in the part of it that was judged.
 
     Parameters
     ----------
@@ -65,16 +66,16 @@ class Verdict:
         if not self.cycles:
             return "nothing was judged"
         worst = max(self.cycles, key=lambda c: c.ratio_bound)
-        if not np.isfinite(worst.rms):
+        if not np.isfinite(worst.ratio_bound) and not np.isfinite(worst.rms):
             return f"fewer than {MIN_ROWS} rows of {worst.cycle} to judge on"
         figures = f"RMS {worst.rms:.2f} um, {worst.none_rms:.2f} um without compensation"
         if self.accepted:
-            return f"better than none in every unseen cycle; least in {worst.cycle}: {figures}"
+            return f"better than none wherever it was judged; least in {worst.cycle}: {figures}"
         if worst.ratio >= 1:
             return f"worse than none in {worst.cycle}: {figures}"
         return (
             f"not surely better than none in {worst.cycle}: {figures}, "
-            f"ratio up to {worst.ratio_bound:.2f} at {self.level:.0%}"
+            f"ratio up to {worst.ratio_bound:.2f} at about {self.level:.0%}"
         )
 
 
@@ -90,8 +91,9 @@ def judge(
     """Decide whether a model may be used.
 
     In every segment the ratio of the RMS with and without compensation is bounded from above by a circular block
-    bootstrap (Politis, Romano 1992): rows of a thermal cycle depend on each other, so whole stretches are drawn. The
-    stretches are as long as twice the correlation time of the squared residual, at most a fifth of the segment.
+    bootstrap (Politis, Romano 1992): rows of a thermal cycle depend on each other, so whole stretches are drawn. They
+    are four times as long as the correlation time of the squared residual or drift, at most a quarter of the segment;
+    few stretches widen the bound as few degrees of freedom do (Student's t).
 
     Parameters
     ----------
@@ -125,27 +127,34 @@ def judge(
 
 def _ratio_bound(residual: FloatArray, none: FloatArray, level: float, draws: int, rng: np.random.Generator) -> float:
     n = len(residual)
-    length = _block_length(residual)
+    if not residual.any():
+        return 0.0 if none.any() else np.inf
+    if not none.any():
+        return np.inf
+    length = max(_block_length(residual), _block_length(none))
     blocks = -(-n // length)
     starts = rng.integers(0, n, (draws, blocks))
     sums = []
     for squares in (residual, none):
         running = np.concatenate([[0.0], np.cumsum(np.concatenate([squares, squares[:length]]))])
         sums.append((running[starts + length] - running[starts]).sum(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.sqrt(sums[0] / sums[1])
-    ratios[~np.isfinite(ratios)] = np.inf
-    return float(np.quantile(ratios, level, method="higher"))
+    with np.errstate(divide="ignore"):
+        ratios = 0.5 * (np.log(sums[0]) - np.log(sums[1]))
+    found = 0.5 * np.log(residual.sum() / none.sum())
+    excess = float(np.quantile(ratios, level, method="higher")) - found
+    freedom = n / length - 1
+    few = stats.t.ppf(level, freedom) / stats.norm.ppf(level) * np.sqrt((freedom + 1) / freedom)
+    return float(np.exp(found + few * max(excess, 0.0)))
 
 
 def _block_length(squares: FloatArray) -> int:
-    """Return twice the lag at which the autocorrelation falls below 1/e, at most a fifth of the rows."""
+    """Return four times the lag at which the autocorrelation falls below 1/e, at most a quarter of the rows."""
     n = len(squares)
     centred = squares - squares.mean()
-    longest = max(1, n // 5)
+    longest = max(1, n // 4)
     power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     correlation = np.fft.irfft(power)[: longest + 1]
     if correlation[0] <= 0:
         return longest
     below = np.flatnonzero(correlation < correlation[0] / np.e)
-    return min(longest, 2 * int(below[0])) if below.size else longest
+    return min(longest, 4 * int(below[0])) if below.size else longest

@@ -125,7 +125,7 @@ def stress(
     -------
     Replayed
     """
-    temperatures = np.array([i.quantity == "temperature" for i in model.inputs])
+    temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
     lost = [k for k, i in enumerate(model.inputs) if i.name in model.sensors]
     rng = np.random.default_rng(seed)
     n_inputs = len(model.inputs)

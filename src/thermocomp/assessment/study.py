@@ -149,14 +149,15 @@ def assess(
     """
     found: list[Assessment] = []
     hashes = {h for m in models if m.provenance for h in m.provenance.data_sha256}
+    seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
+    caveat = f"no honest test: fitted to {', '.join(seen)}; judge it on another recording" if seen else ""
     for model in models:
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
         everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
         name = model.provenance.method if model.provenance else model.family
-        overall = replace(judge(name, model, samples, everything), overall=True)
+        overall = replace(judge(name, model, samples, everything), overall=True, caveat=caveat)
         cut = per_cycle(overall)
         found += [*cut, overall] if len(cut) > 1 else [overall]
-    seen = tuple(r.name for r in recordings if r.sha256 and r.sha256 in hashes)
     return Judged(tuple(models), tuple(found), seen)

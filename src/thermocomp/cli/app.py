@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from cyclopts import App
 from rich.console import Console
+from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import commands
@@ -45,8 +46,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         code = app(None if arguments is None else list(arguments))
     except ThermocompError as e:
-        Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {_plain(str(e))}", soft_wrap=True)
-        return 2
+        return _unusable(str(e))
+    except OSError as e:  # a folder that may not be written to, a full disk
+        return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
     return code if isinstance(code, int) else 0
 
 
@@ -55,8 +57,9 @@ def main() -> None:
     sys.exit(run())
 
 
-def _plain(text: str) -> str:
-    return text.replace("[", r"\[")  # square brackets are markup to rich
+def _unusable(message: str) -> int:
+    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
+    return 2
 
 
 if __name__ == "__main__":

@@ -24,7 +24,9 @@ from thermocomp.cli.options import (
     Study,
     read_recordings,
     refuse_existing,
+    tell_trouble,
 )
+from thermocomp.core.exceptions import InputError
 
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Policy = Literal["clip", "hold", "fade"]
@@ -55,6 +57,8 @@ def demo(
     int
         0 done, 1 judged bad.
     """
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is a file; name a folder")
     output.mkdir(parents=True, exist_ok=True)
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
@@ -86,7 +90,7 @@ def simulate(
     Parameters
     ----------
     experiment : str
-        chen1996, chen1996-new, wessel-fem, hwang, stepwise2017, precompensation, etve, random or demo.
+        chen1996, chen1996-new, chen1996-slope, wessel-fem, hwang, stepwise2017, precompensation, etve, random or demo.
     output : Path
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     seed : int
@@ -196,7 +200,8 @@ def fit(
         from thermocomp.cli import output as out
         from thermocomp.core.model import Support
         from thermocomp.files import modelfile
-    refuse_existing([output], overwrite)
+    refuse_existing([output], overwrite, recordings)
+    trouble = tell_trouble(tests)
     samples = study.samples(tests)
     protocol = study.protocol(samples)
     with _progress(n_pieces(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
@@ -205,7 +210,7 @@ def fit(
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
-        out.show_fit(result, output, _console, as_json=json)
+        out.show_fit(result, output, trouble, _console, as_json=json)
     return 0 if all(m.accepted for m in result.models) else 1
 
 
@@ -233,7 +238,7 @@ def assess(
     Returns
     -------
     int
-        0 every model accepted, 1 one was refused, 2 unusable input.
+        0 every model accepted, 1 one was refused or a recording was used to fit it, 2 unusable input.
     """
     tests = read_recordings(recordings, mapping)
     with needs("study"):
@@ -241,9 +246,10 @@ def assess(
         from thermocomp.cli import output as out
         from thermocomp.files import modelfile
     models = modelfile.read(model)
+    trouble = tell_trouble(tests)
     with _progress(len(models), json) as progress:
         judged = studies.assess(models, tests, progress=progress)
-    out.show_assess(judged, _console, as_json=json)
+    out.show_assess(judged, trouble, _console, as_json=json)
     return 0 if all(a.accepted for a in judged.assessments) else 1
 
 
@@ -284,7 +290,8 @@ def compare(
         from thermocomp.assessment import compare as comparing
         from thermocomp.cli import output as out
     if output is not None:
-        refuse_existing([output], overwrite)
+        refuse_existing([output], overwrite, recordings)
+    trouble = tell_trouble(tests)
     samples = study.samples(tests)
     protocol = study.protocol(samples)
     with _progress(comparing.n_pieces(samples, models, protocol), json) as progress:
@@ -293,13 +300,13 @@ def compare(
         with needs("study"):
             from thermocomp.report import html
         html.write(comparison, tests, output)
-    out.show_comparison(comparison, output, _console, as_json=json)
+    out.show_comparison(comparison, output, trouble, _console, as_json=json)
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1
 
 
 @contextmanager
 def _progress(total: int, hidden: bool) -> Iterator[Callable[[str], None]]:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
         task = bar.add_task("working", total=total)
         yield lambda text: bar.update(task, description=text, advance=1)

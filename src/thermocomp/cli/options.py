@@ -1,10 +1,13 @@
 """Options that several commands share, and what they stand for."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
+from rich.console import Console
+from rich.markup import escape
 
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import InputError
@@ -13,6 +16,8 @@ if TYPE_CHECKING:
     from thermocomp.assessment.splits import Protocol
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
+
+_stderr = Console(stderr=True, highlight=False)
 
 Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
 Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
@@ -61,6 +66,8 @@ class Study:
         """Stack the tests."""
         from thermocomp.recording.samples import stack
 
+        if self.jobs == 0:
+            raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
         return stack(tests, self.target, self.inputs, rezero=not self.absolute)
 
     def protocol(self, samples: "Samples") -> "Protocol":
@@ -86,8 +93,49 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
     return reader.read_all(paths, mappings.read_mapping(mapping) if mapping is not None else None)
 
 
-def refuse_existing(paths: list[Path], overwrite: bool) -> None:
-    """Raise `InputError` if a file is there already, before any work is done."""
+def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+    """Raise `InputError` if an output cannot be written, before any work is done.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        To be written.
+    overwrite : bool
+        Existing files may be replaced.
+    inputs : sequence of Path
+        What is read: never to be replaced.
+    """
     for path in paths:
+        if not path.parent.is_dir():
+            raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name a file")
+        if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
+            raise InputError(f"{path}: is also an input; choose another name")
         if path.exists() and not overwrite:
             raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
+
+
+def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
+    """Say on stderr what is wrong with recordings that are about to be used, and give it back.
+
+    Parameters
+    ----------
+    tests : sequence of Recording
+
+    Returns
+    -------
+    list of str
+        One line per trouble, and per column that was left out.
+    """
+    from thermocomp.recording.quality import check
+
+    lines = [
+        f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
+        for r in tests
+        for f in check(r)
+        if f.severity == "trouble" or f.kind == "left out"
+    ]
+    for line in lines:
+        _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
+    return lines

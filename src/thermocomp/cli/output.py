@@ -20,12 +20,15 @@ from thermocomp.recording.recording import Recording
 _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
 
-def show_comparison(comparison: Comparison, report: Path | None, console: Console, *, as_json: bool) -> None:
+def show_comparison(
+    comparison: Comparison, report: Path | None, trouble: Sequence[str], console: Console, *, as_json: bool
+) -> None:
     """Print a comparison of methods on unseen blocks."""
     if as_json:
         content = {
             "protocol": comparison.protocol.name,
             "condition_number": comparison.collinearity.condition_number,
+            "trouble": trouble,
             "results": [_result(a) for a in comparison.assessments],
         }
         _print_json(content, console)
@@ -35,25 +38,26 @@ def show_comparison(comparison: Comparison, report: Path | None, console: Consol
     console.print(_cycle_table(comparison.assessments))
     for a in comparison.overall():
         if not a.accepted:
-            console.print(f"[red]refused[/] {a.model} for {a.target}: {escape(a.reason)}")
+            console.print(f"[red]refused[/] {a.model} for {escape(a.target)}: {escape(a.reason)}")
     for target in dict.fromkeys(a.target for a in comparison.assessments):
         best = comparison.best(target)
         if best is None:
-            console.print(f"[bold red]{target}: no model may be used[/]")
+            console.print(f"[bold red]{escape(target)}: no model may be used[/]")
         else:
             console.print(
-                f"[bold green]{target}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
+                f"[bold green]{escape(target)}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
                 f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less)"
             )
     if report is not None:
         console.print(f"Report: {report}")
 
 
-def show_fit(fitted: Fitted, path: Path, console: Console, *, as_json: bool) -> None:
+def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
     """Print models that were fitted and written."""
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
-        _print_json({"protocol": fitted.comparison.protocol.name, "file": str(path), "models": models}, console)
+        content = {"protocol": fitted.comparison.protocol.name, "file": str(path), "trouble": trouble, "models": models}
+        _print_json(content, console)
         return
     console.print(f"Judged on: {fitted.comparison.protocol.name}")
     table = Table()
@@ -63,7 +67,7 @@ def show_fit(fitted: Fitted, path: Path, console: Console, *, as_json: bool) -> 
         honest = m.honest_error
         assert honest is not None
         table.add_row(
-            m.target,
+            escape(m.target),
             str(len(m.sensors)),
             f"{r2:.4f}",
             f"{honest.rms:.2f}",
@@ -73,14 +77,20 @@ def show_fit(fitted: Fitted, path: Path, console: Console, *, as_json: bool) -> 
     console.print(table)
     for m in fitted.models:
         if m.honest_error is not None and not m.accepted:
-            console.print(f"[red]refused[/] {m.target}: {escape(m.honest_error.reason)}")
+            console.print(f"[red]refused[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
     console.print(f"Model file: {path}")
 
 
-def show_assess(judged: Judged, console: Console, *, as_json: bool) -> None:
+def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
     """Print how models did on recordings."""
     if as_json:
-        _print_json({"seen_in_training": judged.seen, "results": [_result(a) for a in judged.assessments]}, console)
+        content = {
+            "seen_in_training": judged.seen,
+            "verdict_when_fitted": {m.target: m.honest_error.verdict for m in judged.models if m.honest_error},
+            "trouble": trouble,
+            "results": [_result(a) for a in judged.assessments],
+        }
+        _print_json(content, console)
         return
     console.print(_assessment_table(judged.assessments))
     console.print(_cycle_table(judged.assessments))
@@ -91,17 +101,18 @@ def show_assess(judged: Judged, console: Console, *, as_json: bool) -> None:
         if a.robustness is not None:
             name, lost = a.robustness.worst_lost
             table.add_row(
-                a.target,
+                escape(a.target),
                 f"{a.metric('rms'):.2f}",
                 *(f"{a.robustness.noise_rms[law][0]:.2f}" for law in ("uniform", "normal")),
-                f"{lost:.2f} ({name})",
+                f"{lost:.2f} ({escape(name)})",
                 f"{100 * a.robustness.outside:.1f} %",
             )
     console.print(table)
     for a in judged.overall():
-        console.print(f"{_verdict(_word(a))} {a.target}: {escape(a.reason)}")
-    if judged.seen:
-        console.print(f"[bold yellow]not an honest test:[/] a model was fitted to {', '.join(judged.seen)}")
+        console.print(f"{_verdict(_word(a))} {escape(a.target)}: {escape(a.reason)}")
+    for m in judged.models:
+        if m.honest_error is not None and not m.accepted:
+            console.print(f"[red]refused when it was fitted[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
 
 
 def show_check(
@@ -132,7 +143,8 @@ def show_check(
         for note in r.notes:
             console.print(f"[dim]note[/] {escape(note)}")
         for f in found:
-            console.print(f"[{_SEVERITY[f.severity]}]{f.severity}[/] {escape(f.text)}")
+            where = f"{escape(f.channel)} " if f.channel else ""
+            console.print(f"[{_SEVERITY[f.severity]}]{f.severity}[/] [bold]{where}[/]{escape(f.text)}")
         if not found:
             console.print("[green]nothing wrong found[/]")
 
@@ -153,7 +165,7 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Table:
     """Return a table with a section per target and a row per model."""
-    table = Table(caption="residual in um on what had not been learned from")
+    table = Table(caption="residual in um where it was judged")
     table.add_column("")
     for heading in ("MAE", "RMS", "max", "less", "sensors"):
         table.add_column(heading, justify="right", no_wrap=True)
@@ -172,7 +184,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Table:
 def _cycle_table(assessments: Sequence[Assessment]) -> Table:
     """Return the RMS in every unseen cycle, a section per target and a column per model."""
     models = list(dict.fromkeys(a.model for a in assessments))
-    table = Table(caption="RMS of the residual in um in each unseen cycle; ! = refused there")
+    table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = refused")
     table.add_column("")
     for heading in ("none", *models):
         table.add_column(heading, justify="right", no_wrap=True)

@@ -7,6 +7,7 @@ correction stays where it was.
 
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.model import ErrorModel, Input, State
 from thermocomp.core.reading import Reading
 
 #: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
@@ -23,6 +24,13 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "spindle_speed": (-500_000.0, 500_000.0),  # 1/min
     "position": (-100_000.0, 100_000.0),  # mm
 }
+
+#: how far the zero of a day may lie from the zero of the training [degC]
+DAY = 25.0
+#: least room beyond the trained range of a temperature [degC]
+MIN_SPAN = 10.0
+#: how far ahead of the clock a reading may be stamped [s]
+CLOCK_SKEW = 1.0
 
 
 class OnlineState(NamedTuple):
@@ -48,7 +56,7 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
     Raises
     ------
     InputError
-        Two models predict the same target, or a model does not predict micrometres.
+        Two models predict the same target, a model does not predict micrometres, or the do-no-harm gate refused it.
     """
     targets = [m.target for m in models]
     if len(set(targets)) != len(targets):
@@ -56,19 +64,24 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
     for m in models:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
+        if m.honest_error is not None and not m.accepted:
+            raise InputError(f"model of {m.target} was refused and will not run: {m.honest_error.reason}")
     return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
 
 
-def gate(models: Sequence[ErrorModel], reading: Reading, last: float | None, now: float, limits: Limits) -> str:
+def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
     """Say why a reading must not be used; the empty string if it may.
+
+    A temperature is plausible while it stays within its trained range widened by the whole span of that range, and the
+    first one, which decides what counts as zero, while it is within `DAY` of the zero of the training.
 
     Parameters
     ----------
     models : sequence of ErrorModel
         Their inputs have to be in the reading.
     reading : Reading
-    last : float or None
-        Time of the last reading that passed [s].
+    state : OnlineState
+        Before the reading.
     now : float
         The clock of the reading's source, now [s].
     limits : Limits
@@ -77,21 +90,48 @@ def gate(models: Sequence[ErrorModel], reading: Reading, last: float | None, now
     -------
     str
     """
-    if not math.isfinite(reading.time) or not math.isfinite(now):
-        return f"time {reading.time} or clock {now} is not a number"
-    if now - reading.time > limits.reading_age:
-        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
-    if last is not None and reading.time <= last:
-        return f"reading of {reading.time:g} s is not later than the last one of {last:g} s"
-    for model in models:
-        for channel in model.inputs:
+    untimely = _untimely(reading, state, now, limits)
+    if untimely:
+        return untimely
+    for model, memory in zip(models, state.models, strict=True):
+        for channel, zero in zip(model.inputs, memory.reference.tolist(), strict=True):
             value = reading.values.get(channel.name)
             if value is None:
                 return f"{channel.name} is missing"
-            low, high = PLAUSIBLE.get(channel.quantity, (-math.inf, math.inf))
-            if not (low <= value <= high and math.isfinite(value)):  # a nan fails every comparison
+            low, high = _plausible(channel, zero)
+            if not (_is_number(value) and low <= value <= high):
                 return f"{channel.name} = {value} {channel.unit} is not plausible"
     return ""
+
+
+def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
+    if not (_is_number(reading.time) and _is_number(now)):
+        return f"time {reading.time} or clock {now} is not a number"
+    if reading.time > now + CLOCK_SKEW:
+        return f"reading is {reading.time - now:.1f} s ahead of the clock"
+    if now - reading.time > limits.reading_age:
+        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
+    if state.time is not None and reading.time <= state.time:
+        return f"reading of {reading.time:g} s is not later than the last one of {state.time:g} s"
+    return ""
+
+
+def _plausible(channel: Input, zero: float) -> tuple[float, float]:
+    """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
+
+    `zero` is what counts as zero now; nan before the first reading, which decides it.
+    """
+    low, high = PLAUSIBLE.get(channel.quantity, (-math.inf, math.inf))
+    if channel.quantity != "temperature":
+        return low, high
+    if math.isnan(zero):
+        return max(low, channel.reference - DAY), min(high, channel.reference + DAY)
+    span = max(channel.high - channel.low, MIN_SPAN)
+    return max(low, zero + channel.low - span), min(high, zero + channel.high + span)
+
+
+def _is_number(value: object) -> bool:
+    return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)
 
 
 def step(
@@ -114,7 +154,7 @@ def step(
     state : OnlineState
     result : OnlineResult
     """
-    rejected = gate(models, reading, state.time, now, limits)
+    rejected = gate(models, reading, state, now, limits)
     if rejected:
         waiting = state._replace(clock=now) if math.isfinite(now) else state
         return waiting, _result(models, state.corrections, rejected, ())

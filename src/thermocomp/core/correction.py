@@ -77,7 +77,7 @@ class Limits:
     """
 
     magnitude: float = 500.0
-    rate: float = 1.0
+    rate: float = 0.1
     dead_band: float = 0.0
     reading_age: float = 60.0
 

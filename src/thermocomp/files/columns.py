@@ -23,8 +23,11 @@ _SUFFIXES = {
     "mm_min": "mm/min",
     "m_min": "m/min",
 }
-# In brackets anything but what would turn a frequency into a spindle speed, or a number into a channel.
-_NOT_IN_BRACKETS = ("", "1", "Hz", "1/s")
+# In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
+_NOT_IN_BRACKETS = ("", "1")
+_FREQUENCIES = ("Hz", "1/s")
+# A factor, such as the base of a level, turns one of these into another.
+_GEOMETRY = ("displacement", "angle", "position")
 _HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
 _BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
 _AXIS = re.compile(r"[xyzuvw]\d?")
@@ -108,6 +111,8 @@ class Plan:
         Position of the column of cycle labels.
     columns : tuple of Column
         One per channel.
+    left_out : tuple of int
+        Positions of the columns that neither a heading nor the mapping explains.
     aliases : dict of str to str
         Headings and names without unit to channel names.
     notes : tuple of str
@@ -118,6 +123,7 @@ class Plan:
     date: int | None
     cycle: int | None
     columns: tuple[Column, ...]
+    left_out: tuple[int, ...] = ()
     aliases: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
@@ -139,7 +145,8 @@ def understand(heading: str) -> Meaning | None:
     found = _BRACKETS.fullmatch(heading)
     if found:
         base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
-        if symbol in _NOT_IN_BRACKETS:
+        turning = any(word in base.casefold() for word in ("spindle", "speed"))
+        if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
             return None
         symbol = _SUFFIXES.get(symbol, symbol)
         try:
@@ -175,9 +182,10 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
     Raises
     ------
     RecordingError
-        A heading or channel name comes twice; there is no time column or no channel; a mapped column is not there.
+        A heading or channel name comes twice; there is no time column or no channel; a mapped column is not there, or
+        is mapped twice.
     UnitError
-        A unit is unknown.
+        A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
     for k, heading in enumerate(headings):
         if heading and heading in headings[:k]:
@@ -189,6 +197,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
     time, date, notes = _find_time(headings, meanings, mapping, source)
     cycle = _find_cycle(headings, mapping, source)
     columns: list[Column] = []
+    tables: dict[int, str] = {}
     ignored = {k for k in (time, date, cycle) if k is not None}
     for name, rule in mapping.columns.items():
         heading = rule.column or name
@@ -196,44 +205,82 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
             continue
         index = _position(heading, headings, f"[columns.{name}]", source)
         ignored.add(index)
-        if rule.role in ("ignore", "cycle"):
+        if rule.role == "ignore":
             continue
-        meaning = meanings[index]
-        meant = _meant(rule, meaning, f"{source}: mapping [columns.{name}]", heading)
+        other = tables.setdefault(index, name)
+        if other != name:
+            raise RecordingError(
+                f"{source}: mapping: [columns.{other}] and [columns.{name}] both take the column {heading!r}; "
+                "delete one of the two tables"
+            )
+        if rule.role == "cycle":
+            continue
+        meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
+        notes.extend([f"{name}: {note}"] if note else [])
         columns.append(Column(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
+    left_out: list[int] = []
     if not mapping.read.only_mapped:
         for k, meaning in enumerate(meanings):
             if k not in ignored and meaning is not None and meaning.unit.quantity != "time":
                 channel = Channel(meaning.name, meaning.unit.quantity, meaning.unit.house)
                 columns.append(Column(k, channel, meaning.unit, ColumnMap()))
                 ignored.add(k)
-        left_out = [h for k, h in enumerate(headings) if h and k not in ignored]
-        if left_out:
-            notes.append(f"left out, having no known unit in the heading and no mapping: {', '.join(left_out)}")
+        left_out = [k for k, h in enumerate(headings) if h and k not in ignored]
     _check_names(columns, headings, source)
     columns.sort(key=lambda c: c.index)
     time_meaning = meanings[time]
     time_unit = mapping.time.unit or ("timestamp" if mapping.time.format else "")
     if not time_unit and time_meaning is not None and time_meaning.unit.quantity == "time":
         time_unit = time_meaning.unit.symbol
-    return Plan(time, time_unit, date, cycle, tuple(columns), _aliases(columns, headings, meanings), tuple(notes))
+    aliases = _aliases(columns, headings, meanings)
+    return Plan(time, time_unit, date, cycle, tuple(columns), tuple(left_out), aliases, tuple(notes))
 
 
-def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> Unit:
-    """Return the unit of a mapped column: the mapping's, else the heading's, else the house unit of the role."""
-    if rule.unit or meaning is None:
-        meant = rule.conversion
+def why_left_out(heading: str) -> str:
+    """Say what a heading that `understand` makes nothing of lacks, and what to do."""
+    found = _BRACKETS.fullmatch(heading.strip())
+    symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
+    mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
+    ignore = 'role = "ignore" if it is of no use'
+    if not found and "_" not in heading:
+        return f"{heading!r} has no unit; put it behind the name (t1_C), or write {mapped} role and unit, or {ignore}"
+    try:
+        meant = unit(symbol)
+    except UnitError:
+        near = get_close_matches(symbol, _SUFFIXES, n=3, cutoff=0.5) or list(_HOUSE_SUFFIX)
+        return (
+            f"{heading!r}: {symbol!r} is no known unit, the nearest are {', '.join(near)}; correct the heading, or "
+            f"write {mapped} role and unit, or {ignore}"
+        )
+    return (
+        f"{heading!r}: {symbol!r} need not be a unit of {meant.quantity} here; if it is, write {mapped} "
+        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}", or {ignore}'
+    )
+
+
+def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:
+    """Return the unit of a mapped column, the mapping's before the heading's, and a note where the two differ."""
+    meant = rule.conversion
+    if meaning is None:
         if meant is None:
             raise RecordingError(f"{where}: give it a unit or a role; {heading!r} has none")
-        return meant
-    if rule.role not in HOUSE_UNITS:
-        return meaning.unit
+        return meant, ""
+    said = meaning.unit
+    if meant is None:
+        return said, ""
     try:
-        return unit(meaning.unit.symbol, rule.role)
+        said = unit(said.symbol, meant.quantity)
     except UnitError as e:
+        if rule.unit and rule.scale != 1 and {said.quantity, meant.quantity} <= set(_GEOMETRY):
+            return meant, ""
         raise UnitError(
-            f"{where}: the role is {rule.role}, but the heading {heading!r} says {meaning.unit.symbol}; give it a unit"
+            f"{where}: it is to be a {meant.quantity} in {meant.symbol}, but the heading {heading!r} says "
+            f"{said.symbol}, a unit of {said.quantity}; correct role and unit in the mapping, or the heading in the "
+            "file if that is wrong"
         ) from e
+    if not rule.unit or said == meant:
+        return said, ""
+    return meant, f"the heading {heading!r} says {said.symbol}, the mapping says {meant.symbol}; the mapping is obeyed"
 
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:

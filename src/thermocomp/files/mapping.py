@@ -168,9 +168,11 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping with what only `below` says about the time and the columns added."""
+        """Return this mapping with what only `below` says about the time and the file's columns added."""
         time = below.time if self.time == TimeColumn() else self.time
-        return replace(self, time=time, columns={**below.columns, **self.columns})
+        taken = {rule.column or name for name, rule in self.columns.items()}
+        added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
+        return replace(self, time=time, columns={**added, **self.columns})
 
 
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files

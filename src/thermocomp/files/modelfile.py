@@ -5,6 +5,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
@@ -56,6 +57,8 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     """
     try:
         content = json.loads(text)
+    except RecursionError as e:
+        raise ModelFileError(f"{source}: not a model file: nested too deeply") from e
     except json.JSONDecodeError as e:
         where = f"line {e.lineno}, column {e.colno}"
         if e.pos >= len(text.rstrip()) - 1 or "Unterminated" in e.msg:
@@ -90,9 +93,16 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     if target.exists() and not overwrite:
         raise InputError(f"{target}: exists already; choose another name or allow overwriting with --overwrite")
     # Written beside and moved, so that a crash never leaves half a model where a whole one was.
-    draft = target.with_name(target.name + ".part")
-    draft.write_text(dumps(models), encoding="utf-8")
-    draft.replace(target)
+    text = dumps(models)
+    with NamedTemporaryFile(
+        "w", dir=target.parent, prefix=".", suffix=".part", encoding="utf-8", delete=False
+    ) as draft:
+        draft.write(text)
+    try:
+        Path(draft.name).replace(target)
+    except OSError:
+        Path(draft.name).unlink()
+        raise
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

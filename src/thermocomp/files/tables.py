@@ -33,8 +33,8 @@ class Table(Protocol):
     def notes(self) -> tuple[str, ...]:
         """What a user should know."""
 
-    def is_number(self, column: int) -> bool:
-        """Return whether the first filled cell of a column is a number."""
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
         """Read some columns, as float64 and as they are; the table's columns are named by position.
@@ -73,10 +73,10 @@ class FrameTable:
     embedded: str = ""
     notes: tuple[str, ...] = ()
 
-    def is_number(self, column: int) -> bool:
-        """Return whether the first filled cell of a column is a number."""
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
         filled = self.frame[column].dropna()
-        return filled.empty or is_float(str(filled.iloc[0]))
+        return empty if filled.empty else is_float(str(filled.iloc[0]))
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
         """Read columns; see `Table.load`."""

@@ -60,11 +60,11 @@ class CsvTable:
     embedded: str
     notes: tuple[str, ...] = ()
 
-    def is_number(self, column: int) -> bool:
-        """Return whether the first filled cell of a column is a number."""
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if the first rows have none."""
         cells = (row[column].strip() for row in self.sample if column < len(row))
-        first = next((c for c in cells if c.casefold() not in MISSING_TEXT), "nan")
-        return is_float(first) or is_float(first.replace(",", "."))
+        first = next((c for c in cells if c.casefold() not in MISSING_TEXT), None)
+        return empty if first is None else is_float(first.replace(",", "."))
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
         """Read columns; see `thermocomp.files.tables.Table.load`."""

@@ -20,8 +20,8 @@ _ORDER: tuple[Severity, ...] = ("trouble", "warning", "info")
 CODES = (-9999.0, -999.0, 9999.0, 99999.0, -99999.0, -32768.0, 32767.0, 1e30, -1e30)
 #: the same for temperatures [degC]: absent thermistor, 0 K, DS18B20 unplugged and just switched on, open thermocouple
 TEMPERATURE_CODES = (-180.0, -273.15, -200.0, -127.0, 85.0, 850.0)
-#: no part of a machine tool is colder or hotter [degC]
-PLAUSIBLE_TEMPERATURE = (-60.0, 500.0)
+#: what a machine tool can show [degC], [um], [urad]; wide for angles, which may be turns of a rotary axis
+PLAUSIBLE = {"temperature": (-60.0, 400.0), "displacement": (-1e5, 1e5), "angle": (-1e9, 1e9)}
 #: what a sensor's noise never lets stand still; a spindle speed or a position may well
 _SENSED = ("temperature", "displacement", "angle")
 
@@ -65,7 +65,8 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     Thresholds are set so that a sound recording of a real machine raises no trouble; each check's docstring names its
     own.
     """
-    found = [*_sampling(recording.time), *_no_cycle(recording)]
+    found = [Finding("warning", "", "left out", note) for note in recording.notes if note.startswith("left out")]
+    found += [*_sampling(recording.time), *_no_cycle(recording)]
     prints: dict[int, str] = {}
     for channel in recording.channels:
         values = recording.table[channel.name].to_numpy(dtype=np.float64)
@@ -81,19 +82,27 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 def _channel(channel: Channel, values: FloatArray, time: FloatArray) -> Iterator[Finding]:
     """Yield all findings of one channel."""
     name = channel.name
-    coded = _coded(channel, values)
+    least, most = PLAUSIBLE.get(channel.quantity, (-np.inf, np.inf))
+    plausible = (values >= least) & (values <= most)
+    coded = _coded(channel, values, plausible)
     if coded.any():
         yield _code_finding(channel, values, coded, time)
-    rows: IntArray = np.flatnonzero(np.isfinite(values) & ~coded)
+    wild: IntArray = np.flatnonzero(np.isfinite(values) & ~plausible & ~coded)
+    if wild.size:
+        row = int(wild[np.argmax(np.abs(values[wild]))])
+        text = (
+            f"{_count(wild.size, 'value')} of {len(values)} beyond {least:g} to {most:g} {channel.unit}, the farthest "
+            f"{values[row]:g} at {_at(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and "
+            "sensor"
+        )
+        yield Finding("trouble", name, "implausible", text)
     yield from _missing(name, values, time)
+    # the other checks look at the rest: beside such values nothing else would stand out
+    rows: IntArray = np.flatnonzero(np.isfinite(values) & plausible & ~coded)
     if rows.size < 2:
         return
     x = values[rows]
     low, high = float(x.min()), float(x.max())
-    if channel.quantity == "temperature" and not (PLAUSIBLE_TEMPERATURE[0] <= low and high <= PLAUSIBLE_TEMPERATURE[1]):
-        row = int(rows[np.argmax(x) if high > PLAUSIBLE_TEMPERATURE[1] else np.argmin(x)])
-        text = f"{values[row]:g} degC at {_at(row, time)} is no temperature of a machine; check unit, scale and sensor"
-        yield Finding("trouble", name, "implausible", text)
     if low == high:
         sensed = channel.quantity in _SENSED
         advice = (
@@ -115,9 +124,11 @@ def _channel(channel: Channel, values: FloatArray, time: FloatArray) -> Iterator
 
 
 def _sampling(time: FloatArray) -> Iterator[Finding]:
-    """Yield gaps (over 5 times the interval that 90 % of the rows keep) and intervals that vary by over 20 %."""
+    """Yield fewer than 10 rows, gaps (over 5 times the interval that 90 % of the rows keep) and intervals that vary by over 20 %."""
+    if len(time) < 10:
+        text = f"has only {_count(len(time), 'row')}, too few to say anything; record a whole warm-up and cool-down"
+        yield Finding("warning", "", "short", text)
     if len(time) < 3:
-        yield Finding("warning", "", "short", f"has only {len(time)} rows; record a whole warm-up and cool-down")
         return
     steps = np.diff(time)
     # the 90 % quantile, not the median: probings that come in bursts are irregular, they have no gap every minute
@@ -150,7 +161,7 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
     yield Finding("info", "", "no cycle", text)
 
 
-def _coded(channel: Channel, values: FloatArray) -> NDArray[np.bool_]:
+def _coded(channel: Channel, values: FloatArray, plausible: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return where a known code stands, if it stands apart from the other values by half their span and by 5 units."""
     none = np.zeros(len(values), dtype=np.bool_)
     if channel.quantity not in _SENSED:
@@ -159,7 +170,7 @@ def _coded(channel: Channel, values: FloatArray) -> NDArray[np.bool_]:
     # a change of unit may have rounded a code
     hits = {c: np.abs(values - c) <= 1e-9 * abs(c) for c in codes}
     hits = {c: hit for c, hit in hits.items() if hit.any()}
-    rest = values[np.isfinite(values) & ~np.logical_or.reduce([none, *hits.values()])]
+    rest = values[plausible & ~np.logical_or.reduce([none, *hits.values()])]
     if rest.size:
         low, high = float(rest.min()), float(rest.max())
         margin = max(0.5 * (high - low), 5.0)

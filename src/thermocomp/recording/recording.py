@@ -1,8 +1,10 @@
 """`Recording`: the synchronised table of one test, with units, roles and thermal cycles."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import PurePath
 
 import numpy as np
@@ -114,6 +116,15 @@ class Recording:
     def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":
         """Return the same recording, split into other cycles."""
         return replace(self, cycles=tuple(cycles))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of times and values: the same for the same test, however its file was written."""
+        digest = hashlib.sha256(np.ascontiguousarray(self.time).tobytes())
+        for name in sorted(str(c) for c in self.table.columns):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(self.table[name].to_numpy(dtype=np.float64)).tobytes())
+        return digest.hexdigest()
 
     @property
     def sampling_interval(self) -> float:

@@ -37,7 +37,7 @@ class Samples:
         Index into `test_names`, index into `cycle_names`, row in the file's table.
     test_names, cycle_names : tuple of str
     hashes : tuple of str
-        SHA-256 of each test's file.
+        Fingerprint of each test: SHA-256 of its times and values.
     rezero : bool
         Temperatures are counted from the first row of each test.
     """
@@ -176,6 +176,9 @@ def stack(
             raise InputError(f"input {c.name} is a {c.quantity}: a machine in production has no displacement probe")
     if not input_channels:
         raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
+    _refuse_twins(recordings)
+    if inputs is None:
+        _refuse_different_inputs(recordings, input_channels)
     names = [r.name for r in recordings]
     if len(set(names)) != len(names):
         names = [f"{n}#{k}" for k, n in enumerate(names, start=1)]
@@ -196,6 +199,29 @@ def stack(
         row=np.concatenate([np.arange(len(r)) for r in recordings]),
         test_names=tuple(names),
         cycle_names=tuple(cycle_names),
-        hashes=tuple(r.sha256 for r in recordings),
+        hashes=tuple(r.fingerprint for r in recordings),
         rezero=rezero,
     )
+
+
+def _refuse_twins(recordings: Sequence[Recording]) -> None:
+    """Refuse a test that is given twice: it would be learned from and judged on at once."""
+    seen: dict[str, Recording] = {}
+    for r in recordings:
+        twin = seen.setdefault(r.fingerprint, r)
+        if twin is not r:
+            raise InputError(f"{r.source or r.name} holds the same test as {twin.source or twin.name}: give it once")
+
+
+def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[Channel]) -> None:
+    """Refuse sensors that only some tests have: the user leaves them out, not the order of the files."""
+    first = {c.name for c in inputs}
+    for r in recordings[1:]:
+        speed = r.speed
+        mine = {c.name for c in r.temperatures} | ({speed.name} if speed is not None else set())
+        if mine != first:
+            only = ", ".join(sorted(mine ^ first))
+            raise InputError(
+                f"{r.source or r.name} and {recordings[0].source or recordings[0].name} do not have the same sensors: "
+                f"only one of them has {only}. Name what to predict from with --inputs"
+            )

@@ -32,6 +32,7 @@ def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
         "version": __version__,
         "protocol": comparison.protocol.name,
         "verdict": verdict(comparison),
+        "cautions": cautions(comparison),
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t) for t in targets],
         "recordings": [_recording(r) for r in recordings],
@@ -63,6 +64,25 @@ def verdict(comparison: Comparison) -> str:
     if refused:
         text += f"; leave {_list(refused)} without compensation, no model is surely better than none there"
     return text + "."
+
+
+def cautions(comparison: Comparison) -> list[str]:
+    """Return what the verdict does not say: noise, lost sensors, readings outside the trained range."""
+    best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
+    known = [(a, a.robustness) for a in best if a.robustness is not None]
+    found = []
+    harmful = [f"{a.target} ({r.worst_lost[0]})" for a, r in known if r.worst_lost[1] >= a.none_metric("rms")]
+    if harmful:
+        found.append(f"a sensor that is cut off unnoticed makes it worse than none for {_list(harmful)}.")
+    loud = [(a, max(mean for mean, _ in r.noise_rms.values())) for a, r in known]
+    loud = [(a, noisy) for a, noisy in loud if noisy > 2 * a.metric("rms")]
+    if loud:
+        text = _list([f"{a.target} {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
+        found.append(f"noise of {known[0][1].noise:g} degC on every temperature raises the RMS [um] of {text}.")
+    beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
+    if beyond:
+        found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
+    return found
 
 
 def _models(comparison: Comparison) -> list[str]:
