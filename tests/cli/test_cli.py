@@ -146,7 +146,7 @@ def test_check(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert "-180" in text
 
 
-def altered(path: Path, **columns: object) -> Path:
+def altered(path: Path, **columns: Any) -> Path:
     """Write the small machine's recording with other columns."""
     recording = small_machine()
     table = recording.table.assign(**columns)

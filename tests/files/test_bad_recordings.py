@@ -137,7 +137,11 @@ def test_another_ending_is_told_with_those_that_are_read(tmp_path: Path, name: s
         (Mapping(TimeColumn("tme_s")), ["[time]", "no column 'tme_s'", "nearest are time_s"]),
         (Mapping(columns={"z": ColumnMap("drift")}), ["[columns.z]", "no column 'drift'", "drift_um"]),
         (Mapping(cycles=CycleRule("zzz")), ["[cycles]", "no column 'zzz'", "there are time_s, t1_C, drift_um"]),
-        (Mapping(columns={"z": ColumnMap("time_s", unit="mm"), "t1_C": ColumnMap("drift_um")}), ["'t1_C'"]),
+        (Mapping(columns={"t1_C": ColumnMap("drift_um")}), ["'drift_um' and 't1_C'", "both become channel 't1_C'"]),
+        (
+            Mapping(columns={"a": ColumnMap("t1_C"), "b": ColumnMap("t1_C", role="cycle")}),
+            ["[columns.a] and [columns.b]", "the column 't1_C'", "delete one"],
+        ),
         (Mapping(read=ReadOptions(only_mapped=True)), ["none of the columns"]),
         (Mapping(read=ReadOptions(delimiter=";")), ["only one column"]),
         (Mapping(TimeColumn("time_s", unit="timestamp")), ["line 2", "'time_s'", "not an ISO timestamp"]),
@@ -152,6 +156,48 @@ def test_a_mapping_that_does_not_fit_the_file_is_told(tmp_path: Path, mapping: M
 
     for part in ["bad.csv", *parts]:
         assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "parts"),
+    [
+        (
+            Mapping(columns={"fake_C": ColumnMap("drift_um", "degC", "temperature")}),
+            ["[columns.fake_C]", "a temperature in degC", "'drift_um' says um, a unit of displacement", "correct"],
+        ),
+        (Mapping(columns={"fake": ColumnMap("drift_um", unit="rpm", scale=2.0)}), ["[columns.fake]", "in 1/min"]),
+        (Mapping(columns={"fake": ColumnMap("drift_um", role="dimensionless")}), ["[columns.fake]", "says um"]),
+        (Mapping(columns={"a": ColumnMap("drift_um", unit="urad")}), ["[columns.a]", "in urad", "says um"]),
+        (Mapping(columns={"z": ColumnMap("t1_C", unit="um")}), ["a displacement in um", "'t1_C' says degC"]),
+        (Mapping(columns={"z": ColumnMap("time_s", unit="mm")}), ["a displacement in mm", "'time_s' says s"]),
+        (Mapping(TimeColumn("t1_C", unit="min")), ["[time]", "'t1_C' says degC", "not min"]),
+    ],
+)
+def test_a_mapping_that_contradicts_the_unit_of_the_heading_is_refused(
+    tmp_path: Path, mapping: Mapping, parts: list[str]
+) -> None:
+    path = _csv(tmp_path, GOOD)
+
+    with pytest.raises(UnitError) as caught:
+        read(path, mapping)
+
+    for part in ["bad.csv", *parts]:
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize("ending", ["", "Z"])
+@pytest.mark.parametrize(("interval", "back"), [(15, 3585), (600, 3000), (15, 1800)])
+def test_a_clock_that_was_set_back_is_hinted_at(tmp_path: Path, ending: str, interval: int, back: int) -> None:
+    before = [pd.Timestamp("2024-10-27T02:30") + pd.Timedelta(seconds=interval * k) for k in range(3)]
+    times = [*before, *(t - pd.Timedelta(seconds=back - 2 * interval) for t in before)]
+    path = _csv(tmp_path, "time,t1_C\n" + "".join(f"{t.isoformat()}{ending},20\n" for t in times))
+
+    with pytest.raises(RecordingError, match="line 5") as caught:
+        read(path)
+
+    assert ("daylight saving): use UTC, or timestamps with an offset" in str(caught.value)) == (
+        back + interval == 3600 and not ending
+    )
 
 
 def test_a_mapped_column_needs_a_unit_or_a_role(tmp_path: Path) -> None:

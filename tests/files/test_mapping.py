@@ -110,6 +110,12 @@ def test_one_mapping_over_another_keeps_what_only_the_other_says() -> None:
     assert both.read.missing == (-1.0,)
 
 
+def test_one_mapping_over_another_takes_a_column_under_another_name() -> None:
+    both = Mapping(columns={"mine": ColumnMap("A")}).over(Mapping(columns={"a": ColumnMap("A"), "A": ColumnMap()}))
+
+    assert both.columns == {"mine": ColumnMap("A")}
+
+
 def _toml(folder: Path, text: str) -> Path:
     path = folder / "map.toml"
     path.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Reading and writing recordings: dialects, headings, units, time, cycles, and two measured files."""
+"""Reading recordings: dialects, headings, units, time, cycles, and two measured files."""
 
 import hashlib
 import tempfile
@@ -11,14 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermocomp.core.exceptions import InputError, RecordingError, UnitError
-from thermocomp.core.machine import Channel
+from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.files.columns import understand
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
-from thermocomp.files.recordings import read, read_all, write
+from thermocomp.files.recordings import read, read_all
 from thermocomp.recording.cycles import Cycle, whole
 from thermocomp.recording.quality import check
-from thermocomp.recording.recording import Recording
 
 VORON = Path(__file__).parent / "voron.toml"
 NUMBERS = st.floats(allow_nan=True, allow_infinity=False)
@@ -82,6 +80,8 @@ def test_any_dialect_gives_the_same_table(
         ("x_um", "x_um", "displacement", 1.0),
         ("spindle_rpm", "spindle_rpm", "spindle_speed", 1.0),
         ("S [1/min]", "S_rpm", "spindle_speed", 1.0),
+        ("spindle [Hz]", "spindle_rpm", "spindle_speed", 60.0),
+        ("Main Speed (1/s)", "Main_Speed_rpm", "spindle_speed", 60.0),
         ("yaw_arcsec", "yaw_urad", "angle", 4.84813681109536),
         ("feed_mm_min", "feed_mm_min", "feed", 1.0),
     ],
@@ -109,9 +109,55 @@ def test_units_become_house_units_and_old_names_stay_valid(tmp_path: Path) -> No
     assert recording.time.tolist() == [0.0, 60.0]
     np.testing.assert_allclose(recording.table, [[20, 1, 5], [21, 2, 6]], rtol=1e-12)
     assert recording.channel("drift_mm") == recording.channel("drift") == recording.channel("drift_um")
-    assert recording.notes == ("left out, having no known unit in the heading and no mapping: note",)
+    assert recording.notes == ("not read, holding no numbers: note",)
     assert recording.name == "rec"
     assert recording.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("heading", "parts"),
+    [
+        ("t1 [furlong]", ["'furlong' is no known unit", "known are degC, um", 'role = "ignore"']),
+        ("t1_furlong", ["'furlong' is no known unit", 'column = "t1_furlong"']),
+        ("t1_mym", ["'mym' is no known unit", "the nearest are", "um"]),
+        ("mains [Hz]", ["spindle_speed only by a mapping", 'role = "spindle_speed" and unit = "Hz"']),
+        ("coolant_in", ["displacement only by a mapping", 'role = "displacement" and unit = "in"']),
+        ("load", ["has no unit", "put it behind the name"]),
+    ],
+)
+def test_a_column_of_numbers_that_is_left_out_is_warned_of(tmp_path: Path, heading: str, parts: list[str]) -> None:
+    rows = "".join(f"{15 * k};{20 + k};{k},5;a;\n" for k in range(12))
+    path = _csv(tmp_path, f"time_s;t0_C;{heading};remark;empty\n{rows}")
+
+    recording = read(path)
+    found = [f for f in check(recording) if f.kind == "left out"]
+
+    assert [(f.severity, f.text[:10]) for f in found] == [("warning", "left out: ")]
+    for part in [repr(heading), "[columns.NAME]", *parts]:
+        assert part in found[0].text
+    assert recording.notes == (found[0].text, "not read, holding no numbers: remark, empty")
+    ignoring = read(path, Mapping(columns={heading: ColumnMap(role="ignore")}))
+    assert not [f for f in check(ignoring) if f.kind == "left out"]
+
+
+def test_another_unit_of_the_same_quantity_in_the_mapping_is_obeyed_and_told(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_s,t [degF],z_um,r_mm,n_rpm\n0,20,1,2,3\n1,21,2,4,3\n")
+    columns = {
+        "t": ColumnMap("t [degF]", unit="degC"),
+        "z": ColumnMap("z_um", unit="µm"),
+        "pitch": ColumnMap("r_mm", unit="urad", scale=5.0),  # a lever turns one into the other
+        "n": ColumnMap("n_rpm", role="spindle_speed"),
+    }
+
+    recording = read(path, Mapping(TimeColumn("time_s", "min"), columns))
+
+    assert recording.notes == (
+        "t: the heading 't [degF]' says degF, the mapping says degC; the mapping is obeyed",
+        "time: the heading 'time_s' says s, the mapping says min; the mapping is obeyed",
+    )
+    assert recording.time.tolist() == [0.0, 60.0]
+    assert recording.table["t"].tolist() == [20.0, 21.0]
+    assert recording.table["pitch"].tolist() == [10.0, 20.0]
 
 
 def test_a_name_without_unit_that_two_columns_share_is_no_alias(tmp_path: Path) -> None:
@@ -267,68 +313,6 @@ def test_a_parquet_file_may_have_its_timestamps_as_index(tmp_path: Path) -> None
     assert recording.table["t1_C"].tolist() == [1.0, 2.0, 3.0]
 
 
-@settings(deadline=None)
-@given(
-    rows=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=12),
-    ending=st.sampled_from([".csv", ".parquet"]),
-    names=st.sampled_from([("t1_C", "drift_um"), ("x_um", "z_um"), ("Käfig", 'a, "b"'), ("t1", "t1_C")]),
-    kinds=st.sampled_from([("temperature", "displacement"), ("position", "angle"), ("dimensionless", "feed")]),
-    place=st.sampled_from(["", "front bearing"]),
-    start=st.sampled_from(["", "2024-05-01T10:00:00+02:00"]),
-    label=st.sampled_from(["whole test", "1", "1.0", "2 (100 1/min)", "NA"]),
-)
-def test_what_is_written_is_read_again(
-    rows: list[tuple[float, float]],
-    ending: str,
-    names: tuple[str, str],
-    kinds: tuple[str, str],
-    place: str,
-    start: str,
-    label: str,
-) -> None:
-    units = {"temperature": "degC", "displacement": "um", "position": "mm", "angle": "urad", "dimensionless": "1"}
-    channels = tuple(Channel(n, q, units.get(q, "mm/min"), place) for n, q in zip(names, kinds, strict=True))
-    time = np.cumsum(np.full(len(rows), 0.1)) - 0.1
-    cycles = (Cycle(label, 0, 1), Cycle("last", 1, len(rows)))
-    recording = Recording("r", time, pd.DataFrame(rows, columns=list(names)), channels, cycles, start=start)
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"r{ending}"
-        write(recording, path)
-        again = read(path)
-
-    np.testing.assert_array_equal(again.time, time)
-    np.testing.assert_array_equal(again.table.to_numpy(), recording.table.to_numpy())
-    assert (again.channels, again.cycles, again.start) == (channels, cycles, start)
-
-
-def test_writing_keeps_what_is_there_unless_told(tmp_path: Path) -> None:
-    path = _csv(tmp_path, "time_s,t1_C\n0,1\n")
-    recording = read(path)
-
-    with pytest.raises(InputError, match=r"rec\.csv: exists already"):
-        write(recording, path)
-    write(recording, path, overwrite=True)
-    assert path.read_text() == "time_s,t1_C,cycle\n0.0,1.0,whole test\n"
-    with pytest.raises(InputError, match=r"written as \.csv or \.parquet"):
-        write(recording, tmp_path / "rec.xlsx")
-    with pytest.raises(InputError, match="there is no folder"):
-        write(recording, tmp_path / "no" / "rec.csv")
-    named = Recording(
-        "r", recording.time, recording.table.set_axis(["cycle"], axis=1), (Channel("cycle", "angle", "urad"),), whole(1)
-    )
-    write(named, tmp_path / "odd.csv")
-    assert read(tmp_path / "odd.csv").channels == named.channels
-
-
-def test_cycles_of_one_name_are_numbered_when_written(tmp_path: Path) -> None:
-    recording = read(_csv(tmp_path, "time_s,t1_C\n0,1\n1,2\n")).with_cycles([Cycle("a", 0, 1), Cycle("a", 1, 2)])
-
-    write(recording, tmp_path / "out.csv")
-
-    assert read(tmp_path / "out.csv").cycles == (Cycle("1: a", 0, 1), Cycle("2: a", 1, 2))
-
-
 def test_the_measured_spindle_test(shared_data: Path) -> None:
     recording = read(shared_data / "fl_thermal" / "recording.csv")
 
@@ -390,5 +374,5 @@ def test_a_role_without_a_unit_takes_the_unit_of_the_heading(tmp_path: Path) -> 
     assert table["t2"].tolist() == pytest.approx([20.0, 25.0])
     assert table["z"].tolist() == pytest.approx([500.0, 600.0])
     assert table["frame"].tolist() == [20.0, 21.0]
-    with pytest.raises(UnitError, match=r"the role is displacement, but the heading 'T2 \[degF\]' says degF"):
+    with pytest.raises(UnitError, match=r"a displacement in um, but the heading 'T2 \[degF\]' says degF"):
         read(path, Mapping(columns={"t2": ColumnMap("T2 [degF]", role="displacement")}))

@@ -199,6 +199,47 @@ def test_an_implausible_temperature_is_trouble() -> None:
     assert (found.severity, found.kind) == ("trouble", "implausible")
 
 
+@pytest.mark.parametrize(
+    ("quantity", "value", "severity"),
+    [
+        ("temperature", 401.0, "trouble"),
+        ("temperature", -61.0, "trouble"),
+        ("displacement", -1.2e5, "trouble"),
+        ("displacement", 1e201, "trouble"),
+        ("angle", -1.7e308, "trouble"),
+    ],
+)
+def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, value: float, severity: str) -> None:
+    values = _warm_up()
+    values[[300, 1200]] = value
+    stuck = values.copy()
+    stuck[1500:] = stuck[1500]
+
+    (found,) = _check(values, quantity)
+
+    assert (found.severity, found.kind) == (severity, "implausible")
+    assert "2 values of 2000" in found.text
+    assert f"the farthest {value:g} at row 300 (4500 s)" in found.text
+    assert [f.kind for f in _check(stuck, quantity)] == ["implausible", "stuck"]
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    values=st.lists(st.floats(width=64), min_size=1, max_size=40),
+    quantity=st.sampled_from([q for q in HOUSE_UNITS if q != "time"]),
+)
+def test_any_numbers_are_looked_at_without_a_warning_of_numpy(values: list[float], quantity: str) -> None:
+    assert check(_recording(TIME[: len(values)], quantity, t1=np.array(values)))
+
+
+def test_what_the_reader_left_out_is_a_warning() -> None:
+    recording = replace(_recording(t1=_warm_up()), notes=("left out: 'P [kW]'", "t2: infinite", "left out: 'a'"))
+
+    found = [f for f in check(recording) if f.kind == "left out"]
+
+    assert found == [Finding("warning", "", "left out", f"left out: {name}") for name in ("'P [kW]'", "'a'")]
+
+
 def test_a_coarse_resolution_is_told() -> None:
     (found,) = _check(_warm_up(resolution=0.5))
 
@@ -256,7 +297,7 @@ def test_the_gravest_comes_first() -> None:
     assert [f.severity for f in check(recording)] == ["trouble", "warning", "warning", "info"]
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 8])
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 10])
 def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
     recording = _recording(TIME[:n], t1=_warm_up()[:n], t2=np.full(n, np.nan), t3=np.full(n, -180.0))
     short = replace(recording, cycles=whole(n))
@@ -264,5 +305,6 @@ def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
     kinds = {(f.channel, f.kind) for f in check(short)}
 
     assert {("t2", "missing values"), ("t3", "missing-value code"), ("", "no cycle")} <= kinds
-    assert (("", "short") in kinds) == (n < 3)
+    few = [(f.severity, f.text.split(",")[0]) for f in check(short) if f.kind == "short"]
+    assert few == ([("warning", f"has only {n} row{'s' * (n > 1)}")] if n < 10 else [])
     assert not {f for f in kinds if f[0] == "t1"}

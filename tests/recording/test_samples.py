@@ -114,8 +114,10 @@ def test_what_cannot_be_stacked_is_told() -> None:
         stack([recording], ["z_um"], ["t1_C", "z_um"])
     with pytest.raises(InputError, match="blind: no temperature and no spindle speed"):
         stack([blind], ["z_um"])
-    with pytest.raises(InputError, match=r"blind: no channel is named 't1_C'"):
+    with pytest.raises(InputError, match="only one of them has spindle_rpm, t1_C, t2_C"):
         stack([recording, blind], ["z_um"])
+    with pytest.raises(InputError, match=r"blind: no channel is named 't1_C'"):
+        stack([recording, blind], ["z_um"], ["t1_C"])
     with pytest.raises(RecordingError, match="a: no row has a number in all of the inputs"):
         stack([_test("a", [1.0], 1, first_missing=2)], ["z_um"]).reference()
 

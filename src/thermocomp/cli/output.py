@@ -140,7 +140,10 @@ def show_check(
         console.print(table)
         cycles = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
         console.print(f"{len(r.cycles)} thermal cycle(s): {escape(cycles)}")
+        told = {f.text for f in found}
         for note in r.notes:
+            if note in told:  # a column that was left out is a finding too
+                continue
             console.print(f"[dim]note[/] {escape(note)}")
         for f in found:
             where = f"{escape(f.channel)} " if f.channel else ""
@@ -172,11 +175,11 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Table:
     table.add_column("verdict", no_wrap=True)
     for mine in _by_target(assessments):
         table.add_section()
-        none = (f"{mine[0].none_metric(m):.2f}" for m in ("mae", "rms", "max_abs"))
+        none = (_number(mine[0].none_metric(m)) for m in ("mae", "rms", "max_abs"))
         table.add_row(f"[bold]{escape(mine[0].target)}[/], none", *none, style="dim")
         for a in mine:
-            figures = (f"{a.metric(m):.2f}" for m in ("mae", "rms", "max_abs"))
-            less = f"{a.metric('reduction'):.0f} %"
+            figures = (_number(a.metric(m)) for m in ("mae", "rms", "max_abs"))
+            less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
             table.add_row(a.model, *figures, less, str(len(a.sensors)), _verdict(_word(a)))
     return table
 
@@ -203,6 +206,10 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Table:
 def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:
     overall = [a for a in assessments if a.overall]
     return [[a for a in overall if a.target == t] for t in dict.fromkeys(a.target for a in overall)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else ""
 
 
 def _word(a: Assessment) -> str:

@@ -137,5 +137,5 @@ def unit(symbol: str, quantity: str | None = None) -> Unit:
         raise UnitError(f"unit {symbol!r} measures {measures}, not {quantity}; for {quantity} use one of {usable}")
     known = list(dict.fromkeys([u.symbol for u in _UNITS] + [a for a in _ALIASES if a]))
     near = get_close_matches(symbol, known, n=3, cutoff=0.5)
-    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    hint = f"; did you mean {' or '.join(near)}?" if near else "."
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import HOUSE_UNITS, Unit, unit
+from thermocomp.core.units import Unit, unit
 from thermocomp.files.mapping import ColumnMap, Mapping
 
 FloatArray = NDArray[np.float64]
@@ -228,10 +228,8 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
         left_out = [k for k, h in enumerate(headings) if h and k not in ignored]
     _check_names(columns, headings, source)
     columns.sort(key=lambda c: c.index)
-    time_meaning = meanings[time]
-    time_unit = mapping.time.unit or ("timestamp" if mapping.time.format else "")
-    if not time_unit and time_meaning is not None and time_meaning.unit.quantity == "time":
-        time_unit = time_meaning.unit.symbol
+    time_unit, note = _time_unit(headings[time], meanings[time], mapping, source)
+    notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
     return Plan(time, time_unit, date, cycle, tuple(columns), tuple(left_out), aliases, tuple(notes))
 
@@ -247,14 +245,15 @@ def why_left_out(heading: str) -> str:
     try:
         meant = unit(symbol)
     except UnitError:
-        near = get_close_matches(symbol, _SUFFIXES, n=3, cutoff=0.5) or list(_HOUSE_SUFFIX)
+        near = get_close_matches(symbol, _SUFFIXES, n=3, cutoff=0.5)
+        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(_HOUSE_SUFFIX)} and others"
         return (
-            f"{heading!r}: {symbol!r} is no known unit, the nearest are {', '.join(near)}; correct the heading, or "
-            f"write {mapped} role and unit, or {ignore}"
+            f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
+            f"or {ignore}"
         )
     return (
-        f"{heading!r}: {symbol!r} need not be a unit of {meant.quantity} here; if it is, write {mapped} "
-        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}", or {ignore}'
+        f"{heading!r}: {symbol!r} counts as a unit of {meant.quantity} only by a mapping; write {mapped} "
+        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
     )
 
 
@@ -323,6 +322,22 @@ def _find_time(
         f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
         'time_h, timestamp) in the heading line, or give a mapping with [time] column = "..." and unit = "s"'
     )
+
+
+def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: str) -> tuple[str, str]:
+    """Return the unit of time, the mapping's before the heading's, and a note where the two differ."""
+    given = mapping.time.unit or ("timestamp" if mapping.time.format else "")
+    if meaning is None:
+        return given, ""
+    said = meaning.unit
+    if said.quantity != "time":
+        raise UnitError(
+            f"{source}: mapping [time]: the heading {heading!r} says {said.symbol}, a unit of {said.quantity}, not "
+            f"{given or 's'}; take the column that holds the time, or correct the heading"
+        )
+    if given in ("", "timestamp") or unit(given, "time") == said:
+        return given or said.symbol, ""
+    return given, f"time: the heading {heading!r} says {said.symbol}, the mapping says {given}; the mapping is obeyed"
 
 
 def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int | None:

@@ -5,7 +5,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
@@ -14,6 +13,7 @@ from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.files.draft import draft
 
 FORMAT = "thermocomp-model"
 VERSION = 1
@@ -92,17 +92,9 @@ def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = F
     target = Path(path)
     if target.exists() and not overwrite:
         raise InputError(f"{target}: exists already; choose another name or allow overwriting with --overwrite")
-    # Written beside and moved, so that a crash never leaves half a model where a whole one was.
     text = dumps(models)
-    with NamedTemporaryFile(
-        "w", dir=target.parent, prefix=".", suffix=".part", encoding="utf-8", delete=False
-    ) as draft:
-        draft.write(text)
-    try:
-        Path(draft.name).replace(target)
-    except OSError:
-        Path(draft.name).unlink()
-        raise
+    with draft(target) as started:
+        started.write_text(text, encoding="utf-8")
 
 
 def read(path: str | Path) -> tuple[ErrorModel, ...]:

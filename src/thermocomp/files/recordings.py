@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 import pandas as pd
@@ -15,6 +14,7 @@ from pydantic import ValidationError
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.units import unit
 from thermocomp.files.columns import Plan, plan, understand, why_left_out
+from thermocomp.files.draft import draft
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.tables import EMBEDDED, Table, open_parquet, open_xlsx
 from thermocomp.files.textfile import open_csv
@@ -156,21 +156,15 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     embedded = Mapping(TimeColumn(column="time_s", unit="s", start=recording.start), described)
     needed = bool(described or recording.start)
     text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
-    # Written beside and moved, so that a crash never leaves half a recording where a whole one was. Not by tempfile,
-    # whose files nobody but their owner may read.
-    draft = target.with_name(f".{uuid4().hex}.part")
-    try:
+    with draft(target) as started:
         if target.suffix == ".csv":
-            with draft.open("x", encoding="utf-8", newline="") as f:
+            with started.open("x", encoding="utf-8", newline="") as f:
                 if text:
                     f.write(f"# {EMBEDDED}: {text}\n")
                 out.to_csv(f, index=False, lineterminator="\n")
         else:
             out.attrs = {EMBEDDED: text} if text else {}
-            out.to_parquet(draft, index=False)
-        draft.replace(target)
-    finally:
-        draft.unlink(missing_ok=True)
+            out.to_parquet(started, index=False)
 
 
 def _open(path: Path, options: ReadOptions) -> tuple[Table, str]:
@@ -228,15 +222,14 @@ def _time(
         row = int(wrong[0])
         what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
         more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
-        hint = ""
         steps = np.diff(time)
         # a clock that is set back falls by an hour less one interval
-        if is_stamp and pd.Timestamp(start).tzinfo is None and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
-            hint = ". Perhaps the clock was set back by an hour (end of summer time): use UTC, or timestamps with an offset"
+        falls_by_an_hour = abs(steps[row - 1] - np.median(steps) + 3600) < 300
+        if is_stamp and falls_by_an_hour and pd.Timestamp(start).tzinfo is None:
+            more += ", perhaps as the clock was set back (daylight saving): use UTC, or timestamps with an offset"
         raise RecordingError(
             f"{source}: {table.place(row)}, column {table.headings[columns.time]!r}: time {shown.iloc[row]} {what}, in "
             f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests"
-            f"{hint}"
         )
     return time, start
 

@@ -99,7 +99,7 @@ def method(name: str) -> Method:
     found = METHODS.get(name)
     if found is None:
         near = get_close_matches(name, METHODS, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else ""
+        hint = f"; did you mean {near[0]}?" if near else "."
         raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
     return found
 

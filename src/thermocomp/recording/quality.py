@@ -124,7 +124,10 @@ def _channel(channel: Channel, values: FloatArray, time: FloatArray) -> Iterator
 
 
 def _sampling(time: FloatArray) -> Iterator[Finding]:
-    """Yield fewer than 10 rows, gaps (over 5 times the interval that 90 % of the rows keep) and intervals that vary by over 20 %."""
+    """Yield too few rows, gaps, and irregular intervals.
+
+    Few is: under 10. A gap: over 5 times the interval that 90 % of the rows keep. Irregular: varying by over 20 %.
+    """
     if len(time) < 10:
         text = f"has only {_count(len(time), 'row')}, too few to say anything; record a whole warm-up and cool-down"
         yield Finding("warning", "", "short", text)

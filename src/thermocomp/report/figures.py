@@ -112,7 +112,7 @@ def overview(comparison: Comparison) -> str:
         ax.tick_params(axis="x", which="minor", labelsize=7)
         ax.set_yticks(range(len(targets)), targets)
         ax.set_ylim(len(targets) - 0.5, -0.5)
-        ax.set_xlabel("RMS of the residual on unseen cycles [um], smaller is better")
+        ax.set_xlabel("RMS of the residual where it was judged [um], smaller is better")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return _svg(figure)
 
@@ -193,7 +193,7 @@ def robustness(comparison: Comparison, model: str) -> str:
         ax.xaxis.set_minor_formatter("")
         ax.set_yticks(range(len(found)), [a.target for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
-        ax.set_xlabel(f"{model}: RMS of the residual on unseen cycles [um]")
+        ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return _svg(figure)
 
