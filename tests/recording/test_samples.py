@@ -122,6 +122,13 @@ def test_what_cannot_be_stacked_is_told() -> None:
         stack([_test("a", [1.0], 1, first_missing=2)], ["z_um"]).reference()
 
 
+def test_numbers_beyond_all_machines_are_refused() -> None:
+    recording = _test("a", [1.0], 1)
+    recording.table.loc[1, "z_um"] = 1e201
+    with pytest.raises(RecordingError, match=r"a: z_um is 1e\+201 um in row 1: correct it"):
+        stack([recording], ["z_um"])
+
+
 def test_a_recording_finds_its_channels_by_any_of_their_names() -> None:
     recording = _test("a", [1.0, 3.0], 1)
 

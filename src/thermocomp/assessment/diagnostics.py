@@ -48,7 +48,7 @@ def collinearity(values: FloatArray, names: tuple[str, ...]) -> Collinearity:
     singular, directions = np.linalg.svd(z / np.sqrt(len(z)), full_matrices=False)[1:]
     eigenvalues = singular**2
     smallest = eigenvalues[-1] if len(eigenvalues) == len(kept) else 0.0
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         condition = float(eigenvalues[0] / smallest) if smallest > 0 else float("inf")
         vif = (directions**2 / eigenvalues[:, None]).sum(axis=0)
-    return Collinearity(kept, condition, tuple(float(v) for v in vif))
+    return Collinearity(kept, condition, tuple(float(v) for v in np.nan_to_num(vif, nan=np.inf, posinf=np.inf)))

@@ -16,6 +16,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
+#: no temperature, speed or displacement of a machine reaches this, whatever its unit
+ABSURD = 1e9
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -182,6 +185,8 @@ def stack(
     names = [r.name for r in recordings]
     if len(set(names)) != len(names):
         names = [f"{n}#{k}" for k, n in enumerate(names, start=1)]
+    for r in recordings:
+        _refuse_the_absurd(r, [*input_channels, *target_channels])
     cycle_names = [
         c.name if len(recordings) == 1 else f"{n}: {c.name}"
         for n, r in zip(names, recordings, strict=True)
@@ -224,4 +229,16 @@ def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[C
             raise InputError(
                 f"{r.source or r.name} and {recordings[0].source or recordings[0].name} do not have the same sensors: "
                 f"only one of them has {only}. Name what to predict from with --inputs"
+            )
+
+
+def _refuse_the_absurd(recording: Recording, channels: Sequence[Channel]) -> None:
+    """Refuse numbers that no sensor means and that sums of squares cannot hold."""
+    for c in channels:
+        values = recording.values([recording.channel(c.name)])[:, 0]
+        beyond = np.flatnonzero(np.abs(values) > ABSURD)
+        if beyond.size:
+            raise RecordingError(
+                f"{recording.source or recording.name}: {c.name} is {values[beyond[0]]:g} {c.unit} in row {beyond[0]}: "
+                "correct it, or mark it as missing by a mapping"
             )
