@@ -6,6 +6,7 @@ correction stays where it was.
 """
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import NamedTuple
@@ -25,6 +26,8 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "position": (-100_000.0, 100_000.0),  # mm
 }
 
+#: any number at all; finite, so that an infinity is none
+ANY = (-sys.float_info.max, sys.float_info.max)
 #: how far the zero of a day may lie from the zero of the training [degC]
 DAY = 25.0
 #: least room beyond the trained range of a temperature [degC]
@@ -99,7 +102,8 @@ def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now
             if value is None:
                 return f"{channel.name} is missing"
             low, high = _plausible(channel, zero)
-            if not (_is_number(value) and low <= value <= high):
+            # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
+            if not ((type(value) is float or _is_number(value)) and low <= value <= high):
                 return f"{channel.name} = {value} {channel.unit} is not plausible"
     return ""
 
@@ -121,13 +125,15 @@ def _plausible(channel: Input, zero: float) -> tuple[float, float]:
 
     `zero` is what counts as zero now; nan before the first reading, which decides it.
     """
-    low, high = PLAUSIBLE.get(channel.quantity, (-math.inf, math.inf))
-    if channel.quantity != "temperature":
-        return low, high
-    if math.isnan(zero):
-        return max(low, channel.reference - DAY), min(high, channel.reference + DAY)
-    span = max(channel.high - channel.low, MIN_SPAN)
-    return max(low, zero + channel.low - span), min(high, zero + channel.high + span)
+    low, high = PLAUSIBLE.get(channel.quantity, ANY)
+    if channel.quantity == "temperature":
+        if math.isnan(zero):
+            around, below, above = channel.reference, -DAY, DAY
+        else:
+            span = max(channel.high - channel.low, MIN_SPAN)
+            around, below, above = zero, channel.low - span, channel.high + span
+        low, high = max(low, around + below), min(high, around + above)
+    return low, high
 
 
 def _is_number(value: object) -> bool:

@@ -62,7 +62,7 @@ def verdict(comparison: Comparison) -> str:
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
     text = f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
     if refused:
-        text += f"; leave {_list(refused)} without compensation, no model is surely better than none there"
+        text += f"; no model passed for {_list(refused)}, where at least one cycle might be worse than without"
     return text + "."
 
 
