@@ -28,6 +28,7 @@ def show_comparison(
         content = {
             "protocol": comparison.protocol.name,
             "condition_number": comparison.collinearity.condition_number,
+            "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
             "results": [_result(a) for a in comparison.assessments],
         }
@@ -110,6 +111,9 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     console.print(table)
     for a in judged.overall():
         console.print(f"{_verdict(_word(a))} {escape(a.target)}: {escape(a.reason)}")
+        if a.robustness is not None and a.robustness.outside > 0.1:
+            share = f"{100 * a.robustness.outside:.0f} % of the rows"
+            console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             console.print(f"[red]refused when it was fitted[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
