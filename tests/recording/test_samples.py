@@ -1,5 +1,7 @@
 """Recordings stacked into samples: references, time steps, what may be an input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -120,6 +122,14 @@ def test_what_cannot_be_stacked_is_told() -> None:
         stack([recording, blind], ["z_um"], ["t1_C"])
     with pytest.raises(RecordingError, match="a: no row has a number in all of the inputs"):
         stack([_test("a", [1.0], 1, first_missing=2)], ["z_um"]).reference()
+
+
+def test_a_position_is_no_input_yet() -> None:
+    """Nor a way in for a displacement that a mapping calls a position."""
+    recording = _test("a", [1.0], 1)
+    channels = tuple(replace(c, quantity="position", unit="mm") if c.name == "t2_C" else c for c in recording.channels)
+    with pytest.raises(InputError, match="input t2_C is a position"):
+        stack([replace(recording, channels=channels)], ["z_um"], ["t1_C", "t2_C"])
 
 
 def test_numbers_beyond_all_machines_are_refused() -> None:

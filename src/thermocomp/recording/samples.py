@@ -177,6 +177,8 @@ def stack(
     for c in input_channels:
         if c.quantity in ("displacement", "angle"):
             raise InputError(f"input {c.name} is a {c.quantity}: a machine in production has no displacement probe")
+        if c.quantity == "position":
+            raise InputError(f"input {c.name} is a position: models that depend on it are not built yet")
     if not input_channels:
         raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
     _refuse_twins(recordings)
