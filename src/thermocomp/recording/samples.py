@@ -16,6 +16,12 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
+#: quantities nothing is predicted from, and why
+NO_INPUTS = {
+    "displacement": "a machine in production has no displacement probe",
+    "angle": "a machine in production has no probe for angles",
+    "position": "models that depend on it are not built yet",
+}
 #: no temperature, speed or displacement of a machine reaches this, whatever its unit
 ABSURD = 1e9
 
@@ -175,10 +181,8 @@ def stack(
     else:
         input_channels = tuple(first.channel(name) for name in dict.fromkeys(inputs))
     for c in input_channels:
-        if c.quantity in ("displacement", "angle"):
-            raise InputError(f"input {c.name} is a {c.quantity}: a machine in production has no displacement probe")
-        if c.quantity == "position":
-            raise InputError(f"input {c.name} is a position: models that depend on it are not built yet")
+        if c.quantity in NO_INPUTS:
+            raise InputError(f"input {c.name} is a {c.quantity}: {NO_INPUTS[c.quantity]}")
     if not input_channels:
         raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
     _refuse_twins(recordings)
