@@ -15,7 +15,8 @@ from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.leastsquares import effective_sample_size
-from thermocomp.models.training import method, train
+from thermocomp.models.methods import expand
+from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -140,6 +141,7 @@ def compare(
     ----------
     samples : Samples
     methods : sequence of str
+        ``all`` stands for all of them.
     protocol : Protocol
         What is learned from and what is judged.
     support : Support
@@ -155,9 +157,7 @@ def compare(
     -------
     Comparison
     """
-    names = list(dict.fromkeys(methods))
-    for name in names:
-        method(name)  # an unknown one is told before the work starts, not after
+    names = expand(methods)
     pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in protocol.splits]
     done: list[Assessment] = []
     work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
@@ -177,7 +177,7 @@ def compare(
 
 def n_pieces(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:
     """Return the number of pieces of work of `compare`."""
-    return len(samples.targets) * len(dict.fromkeys(methods)) * len(protocol.splits)
+    return len(samples.targets) * len(expand(methods)) * len(protocol.splits)
 
 
 def judge(

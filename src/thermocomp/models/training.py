@@ -1,9 +1,8 @@
-"""The methods by name, and how one is trained on the rows it may learn from."""
+"""How a method is trained on the rows it may learn from."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -11,58 +10,13 @@ from numpy.typing import NDArray
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
-from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.dynamic import DynamicRidge
-from thermocomp.models.mra import StepwiseMRA
-from thermocomp.models.ols import LeastSquares
-from thermocomp.models.partial_f import PartialF
+from thermocomp.models.methods import Method, method
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Method:
-    """A way to get a model.
-
-    Parameters
-    ----------
-    name : str
-        On the command line.
-    summary : str
-        One line.
-    build : callable
-        Makes the estimator, given the names of the spindle speeds among its inputs.
-    uses_speed : bool
-        The spindle speed is one of its inputs.
-    dynamic : bool
-        Its estimator takes `dt` and `cycle`.
-    """
-
-    name: str
-    summary: str
-    build: Callable[[tuple[str, ...]], ThermalRegressor]
-    uses_speed: bool = False
-    dynamic: bool = False
-
-
-METHODS: dict[str, Method] = {
-    m.name: m
-    for m in (
-        Method("ols", "least squares on all temperatures", lambda _: LeastSquares()),
-        Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", lambda _: PartialF()),
-        Method("mra", "Chen's stepwise second-order regression", lambda _: StepwiseMRA()),
-        Method(
-            "dynamic",
-            "ridge on temperatures, their lagged copies and the lagged spindle speed",
-            lambda speeds: DynamicRidge(speed=speeds),
-            uses_speed=True,
-            dynamic=True,
-        ),
-    )
-}
 
 
 @dataclass(frozen=True)
@@ -86,22 +40,6 @@ class Trained:
     model: ErrorModel
     seconds: float
     r_squared: float
-
-
-def method(name: str) -> Method:
-    """Find a method.
-
-    Raises
-    ------
-    InputError
-        There is none of that name.
-    """
-    found = METHODS.get(name)
-    if found is None:
-        near = get_close_matches(name, METHODS, n=1, cutoff=0.4)
-        hint = f"; did you mean {near[0]}?" if near else "."
-        raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
-    return found
 
 
 def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support: Support = Support()) -> Trained:
@@ -130,7 +68,7 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
         Too few rows, or the method cannot be fitted to them.
     """
     how = method(name)
-    columns = [j for j, c in enumerate(samples.inputs) if how.uses_speed or c.quantity != "spindle_speed"]
+    columns = [j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed"]
     if not columns:
         raise FitError(f"{name}: there is no temperature to predict from")
     channel = samples.targets[target]
@@ -142,14 +80,12 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
     estimator = how.build(speeds)
     begin = time.perf_counter()
-    rows = samples.valid if how.dynamic else seen
+    rows = samples.valid if "dt" in how.takes else seen
     X, learned = samples.frame().iloc[rows, columns], seen[rows]
     y = np.where(learned, samples.deviations[rows, target], 0.0)
-    clock: dict[str, Any] = {}
-    cycles: dict[str, Any] = {}
-    if how.dynamic:
-        driven = samples.take(rows)
-        clock, cycles = {"dt": driven.dt()}, {"cycle": np.where(learned, driven.cycle, -1)}
+    driven = samples.take(rows)
+    clock: dict[str, Any] = {"dt": driven.dt()} if "dt" in how.takes else {}
+    cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
     try:
         estimator.fit(X, y, **clock, **cycles)
     except ValueError as e:  # what scikit-learn raises for data it cannot use

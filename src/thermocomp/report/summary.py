@@ -7,7 +7,7 @@ from thermocomp import __version__
 from thermocomp.assessment.compare import Assessment, Comparison
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.core.model import ErrorModel
-from thermocomp.models.training import METHODS
+from thermocomp.models.methods import METHODS
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 

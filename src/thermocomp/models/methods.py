@@ -1,0 +1,97 @@
+"""The methods by name: what each is, and how its estimator is made."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, Literal
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import ThermalRegressor
+
+#: asks for every method where names of methods are given
+ALL_METHODS = "all"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to get a model.
+
+    Parameters
+    ----------
+    name : str
+        On the command line.
+    summary : str
+        One line.
+    estimator : str
+        Module in `thermocomp.models` and class; imported when it is built, for some bring a compiler along.
+    speed : str
+        Its parameter that takes the names of the spindle speeds; empty for a method that has no use for them.
+    takes : tuple of {'dt', 'cycle'}
+        What its `fit` wants beside X and y. With ``dt`` it has a memory, and also gets the rows it may not learn from.
+    settings : dict of str to object
+        Other parameters than the estimator's own defaults.
+    """
+
+    name: str
+    summary: str
+    estimator: str
+    speed: str = ""
+    takes: tuple[Literal["dt", "cycle"], ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> type[ThermalRegressor]:
+        """Class of the estimator."""
+        module, _, name = self.estimator.rpartition(".")
+        found: type[ThermalRegressor] = getattr(import_module(f"thermocomp.models.{module}"), name)
+        return found
+
+    def build(self, speeds: Sequence[str]) -> ThermalRegressor:
+        """Make the estimator, given the names of the spindle speeds among its inputs."""
+        return self.kind(**self.settings, **({self.speed: tuple(speeds)} if self.speed else {}))
+
+
+METHODS: dict[str, Method] = {
+    m.name: m
+    for m in (
+        Method("ols", "least squares on all temperatures", "ols.LeastSquares"),
+        Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", "partial_f.PartialF"),
+        Method("mra", "Chen's stepwise second-order regression", "mra.StepwiseMRA"),
+        Method(
+            "dynamic",
+            "ridge on temperatures, their lagged copies and the lagged spindle speed",
+            "dynamic.DynamicRidge",
+            speed="speed",
+            takes=("dt", "cycle"),
+        ),
+    )
+}
+
+
+def method(name: str) -> Method:
+    """Find a method.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    found = METHODS.get(name)
+    if found is None:
+        near = get_close_matches(name, METHODS, n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else "."
+        raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
+    return found
+
+
+def expand(names: Sequence[str]) -> list[str]:
+    """Return names of methods once each, ``all`` standing for all of them.
+
+    Raises
+    ------
+    InputError
+        There is no method of one of the names.
+    """
+    listed = [n for name in names for n in (METHODS if name == ALL_METHODS else [name])]
+    return [method(name).name for name in dict.fromkeys(listed)]
