@@ -1,9 +1,11 @@
-"""What the data can carry at all: how far the inputs repeat each other."""
+"""What the data can carry at all: how far the inputs repeat each other, and what they have to do with the error."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from thermocomp.models.selection.collinearity import Spectrum, contributions, spectrum
 
 FloatArray = NDArray[np.float64]
 
@@ -16,7 +18,7 @@ class Collinearity:
     ----------
     names : tuple of str
     condition_number : float
-        Largest over smallest eigenvalue of the correlation matrix (H-16).
+        Largest over smallest eigenvalue of the correlation matrix; that of X'X itself is in `Diagnosis.spectrum`.
     vif : tuple of float
         Variance inflation factor of each input; inf for one that the others determine.
     """
@@ -52,3 +54,49 @@ def collinearity(values: FloatArray, names: tuple[str, ...]) -> Collinearity:
         condition = float(eigenvalues[0] / smallest) if smallest > 0 else float("inf")
         vif = (directions**2 / eigenvalues[:, None]).sum(axis=0)
     return Collinearity(kept, condition, tuple(float(v) for v in np.nan_to_num(vif, nan=np.inf, posinf=np.inf)))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Hwang's collinearity analysis of the variables of a linear model (section 3.2.3), to be printed with it (E-H10).
+
+    Parameters
+    ----------
+    names : tuple of str
+    spectrum : Spectrum
+        Eigenvalues of X'X without the column of ones, as in Table 3, with the smallest, the sum of inverses and the
+        condition number (H-14 to H-16, E-H6).
+    vif : tuple of float
+        Variance inflation factor of each variable; nan for a constant one.
+    contributions : tuple of float
+        Correlation of each variable with the error (Eq. 9; H-17); nan for a constant one.
+    """
+
+    names: tuple[str, ...]
+    spectrum: Spectrum
+    vif: tuple[float, ...]
+    contributions: tuple[float, ...]
+
+
+def diagnose(values: FloatArray, deviation: FloatArray, names: tuple[str, ...]) -> Diagnosis:
+    """Analyse the variables of a linear model.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_rows, n_variables)
+        Finite: temperatures minus their reference, as the model multiplies them [degC].
+    deviation : ndarray of shape (n_rows,)
+    names : tuple of str
+
+    Returns
+    -------
+    Diagnosis
+    """
+    found = collinearity(values, names)
+    vif = dict(zip(found.names, found.vif, strict=True))
+    return Diagnosis(
+        names=names,
+        spectrum=spectrum(values),
+        vif=tuple(vif.get(n, float("nan")) for n in names),
+        contributions=tuple(contributions(values, deviation).tolist()),
+    )

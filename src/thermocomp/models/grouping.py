@@ -1,0 +1,216 @@
+"""`grouping`: sensors by correlation grouping and successive regression (Hwang, Lee, Yang)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.terms import Variable
+from thermocomp.models.leastsquares import solve, table, triangle
+from thermocomp.models.linear import TermRegressor
+from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
+from thermocomp.models.selection.exhaustive import Subset
+from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
+from thermocomp.models.stepwise import ENOUGH
+
+FloatArray = NDArray[np.float64]
+
+
+class CorrelationGrouping(TermRegressor):
+    """Linear model of the temperatures that correlation grouping and successive regression choose (H-01).
+
+    Temperatures are grouped by their correlation; successive regression makes one of each group its representative; the
+    subset of representatives with the smallest residual mean square tells which groups take part; of all combinations
+    of members of these groups the one with the smallest residual mean square is the model. The rules for what the paper
+    leaves open are told by `thermocomp.models.selection.grouping.group`. The mean square takes the rows as
+    independent, which those of a time series are not: see `n_effective_`.
+
+    Grouping lessens collinearity and does not end it (E-H10): look at `spectrum_` and `condition_`.
+
+    With a `reference`, the temperatures themselves are grouped, without it, and regressed on are their differences from
+    it (section 3.2.1; H-08). A temperature that is constant, or constant but for the reference, is left out.
+
+    Parameters
+    ----------
+    threshold : float
+        Of the correlation, above which a temperature joins a group; from -1 to 1. The paper's is not known (E-H1);
+        `thermocomp.models.selection.grouping.sweep` shows what others give.
+    absolute : bool
+        Group by the magnitude of the correlation (E-H2).
+    reference : str or int, optional
+        Name (or index) of the temperature that is subtracted from the others, such as the bed's.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+
+    Attributes
+    ----------
+    correlation_ : ndarray of shape (n_candidates, n_candidates)
+        Of `candidates_`.
+    candidates_ : tuple of int
+        Features that were grouped.
+    left_out_ : tuple of int
+        Features that were not, because they are constant.
+    groups_ : tuple of tuple of int
+        Features of each group, in the order in which the groups were found.
+    representatives_ : tuple of int
+        One feature of each group, in the order of the successive regression.
+    curve_ : tuple of Subset
+        Best subset of 1, 2, ... representatives and its MSE_p (Fig. 4).
+    participating_ : tuple of int
+        Groups that take part, as indices of `groups_`.
+    selected_ : tuple of int
+        Features in the model, in rising order, without the reference.
+    mse_ : float
+        MSE_p of the model.
+    searched_ : tuple of (int, int)
+        Number of subsets and of combinations that were looked at (H-07).
+    terms_ : tuple of str
+        Names of the selected variables.
+    coef_ : ndarray of shape (n_selected,)
+        One for each of `terms_`.
+    intercept_ : float
+    contributions_ : ndarray of shape (n_selected,)
+        Correlation of each with the error (Eq. 9; H-17).
+    spectrum_ : Spectrum
+        Eigenvalues of X'X of the selected variables, as in Table 3 (H-16).
+    r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
+        See `thermocomp.models.linear.TermRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        threshold: float = 0.9,
+        absolute: bool = False,
+        reference: str | int | None = None,
+        fit_intercept: bool = True,
+    ) -> None:
+        self.threshold = threshold
+        self.absolute = absolute
+        self.reference = reference
+        self.fit_intercept = fit_intercept
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "CorrelationGrouping":
+        """Select and fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Temperatures minus their reference state.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        CorrelationGrouping
+
+        Raises
+        ------
+        InputError
+            A threshold beyond -1 to 1, or no such reference.
+        FitError
+            No temperature varies, there are fewer than three rows (two without intercept), or there is too much to
+            search.
+        """
+        change, deviation, _ = self._read(X, y)
+        names = self._names()
+        zero = self._reference_index(names)
+        values = change if zero is None else change - change[:, [zero]]
+        size = np.abs(change).max(axis=0)
+        moving = varying(change)
+        if zero is not None:
+            moving &= varying(values, np.maximum(size, size[zero]))
+        others = [i for i in range(len(names)) if i != zero]
+        self.candidates_ = tuple(i for i in others if moving[i])
+        self.left_out_ = tuple(i for i in others if not moving[i])
+        if not self.candidates_:
+            raise FitError(f"none of the {len(others)} temperatures varies: there is nothing to group")
+        self.correlation_ = correlation(change[:, self.candidates_])
+        tri = triangle(table(values[:, self.candidates_], deviation), intercept=self.fit_intercept)
+        choice = choose(tri, group(self.correlation_, self.threshold, absolute=self.absolute))
+
+        def features(columns: tuple[int, ...]) -> tuple[int, ...]:
+            return tuple(self.candidates_[k] for k in columns)
+
+        self.groups_ = tuple(features(g) for g in choice.groups)
+        self.representatives_ = features(choice.representatives)
+        self.curve_ = tuple(Subset(features(s.columns), s.mse) for s in choice.subsets.curve)
+        self.participating_ = choice.participating
+        self.selected_ = features(choice.selected)
+        self.mse_ = choice.members.best.mse
+        self.searched_ = (choice.subsets.count, choice.members.count)
+        chosen = values[:, self.selected_]
+        self.contributions_, self.spectrum_ = contributions(chosen, deviation), spectrum(chosen)
+        variables = [
+            Variable.single(names[i], i) if zero is None else Variable.difference(names, names[i], names[zero])
+            for i in self.selected_
+        ]
+        found = solve(values[:, self.candidates_], deviation, tri, columns=choice.selected, enough=ENOUGH)
+        self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total, self.fit_intercept)
+        return self
+
+    def log_text(self, target: str = "Y") -> str:
+        """Return as text the groups, the curve of MSE_p, the model and how far its variables repeat each other.
+
+        Parameters
+        ----------
+        target : str
+            Name of what is predicted.
+
+        Returns
+        -------
+        str
+        """
+        names = self._names()
+
+        def called(features: tuple[int, ...]) -> str:
+            return ", ".join(names[i] for i in features)
+
+        local = [[self.candidates_.index(i) for i in g] for g in self.groups_]
+        same = interval_of(local, intervals(self.correlation_, absolute=self.absolute))
+        lines = [f"CORRELATION GROUPING OF {len(self.candidates_)} TEMPERATURES ABOVE {self.threshold:g}"]
+        if same is not None:
+            lines.append(f"(THE SAME GROUPS FROM {same.low:.6f} TO BELOW {same.high:.6f})")
+        if self.left_out_:
+            lines.append(f"LEFT OUT BECAUSE CONSTANT: {called(self.left_out_)}")
+        lines += ["", "GROUP  REPRESENTATIVE IN STEP  TAKES PART  MEMBERS, REPRESENTATIVE MARKED *"]
+        for k, g in enumerate(self.groups_):
+            (own,) = set(g) & set(self.representatives_)
+            step = self.representatives_.index(own) + 1
+            members = ", ".join(names[i] + "*" * (i == own) for i in g)
+            lines.append(f"{k + 1:5d}  {step:22d}  {'YES' if k in self.participating_ else 'NO':>10}  {members}")
+        lines += ["", "VARIABLES           MSE  BEST REPRESENTATIVES"]
+        lines += [f"{p:9d}  {s.mse:12.6g}  {called(s.columns)}" for p, s in enumerate(self.curve_, start=1)]
+        lines += [
+            "",
+            f"LOOKED AT: {self.searched_[0]} SUBSETS OF REPRESENTATIVES, {self.searched_[1]} COMBINATIONS OF MEMBERS",
+            f"DEP VAR: {target}   N: {self.n_rows_}   SQUARED MULTIPLE R: {self.r_squared_:.4f}"
+            f" ({self.r_squared_kind_.upper()})   STANDARD ERROR OF ESTIMATE: {self.standard_error_:.3f}",
+            f"EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",
+            "",
+        ]
+        wide = max([len("VARIABLE"), *(len(t) for t in self.terms_)])
+        lines.append(f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}  CONTRIBUTION")
+        if self.fit_intercept:
+            lines.append(f"{'CONSTANT':<{wide}}  {self.intercept_:14.6g}")
+        lines += [
+            f"{name:<{wide}}  {value:14.6g}  {share:12.4f}"
+            for name, value, share in zip(self.terms_, self.coef_, self.contributions_, strict=True)
+        ]
+        s = self.spectrum_
+        lines += [
+            "",
+            f"EIGENVALUES OF X'X: {', '.join(f'{v:.4g}' for v in s.eigenvalues)}   SUM OF INVERSES: {s.sum_inverse:.4g}"
+            f"   CONDITION NUMBER: {s.condition_number:.3g}",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def _reference_index(self, names: tuple[str, ...]) -> int | None:
+        if self.reference is None:
+            return None
+        if isinstance(self.reference, str):
+            if self.reference not in names:
+                raise InputError(f"reference: no input is named {self.reference!r}; there are {', '.join(names)}")
+            return names.index(self.reference)
+        if not 0 <= self.reference < len(names):
+            raise InputError(f"reference {self.reference}: there are {len(names)} inputs, the first is 0")
+        return int(self.reference)

@@ -1,0 +1,136 @@
+"""How far variables repeat each other, and what each has to do with the error (Hwang, section 3.2.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: a channel that moves by no more than this share of its size is constant: rounding can do that
+ROUNDING = 64 * float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Eigenvalues of X'X, the columns as they are: neither centred nor scaled.
+
+    Hwang's Eq. 7 has p + 1 of them, his Table 3 only p: the column of ones was left out, and is here (E-H6).
+
+    Parameters
+    ----------
+    eigenvalues : tuple of float
+        Falling [degC^2]; 0 for what cannot be told from 0.
+    """
+
+    eigenvalues: tuple[float, ...]
+
+    @property
+    def smallest(self) -> float:
+        """Smallest eigenvalue [degC^2]; nan without any."""
+        return self.eigenvalues[-1] if self.eigenvalues else float("nan")
+
+    @property
+    def sum_inverse(self) -> float:
+        """Sum of 1/eigenvalue [1/degC^2]; times sigma^2 the sum of the coefficients' variances (Eq. 7, H-14)."""
+        return sum(1 / v if v > 0 else float("inf") for v in self.eigenvalues)
+
+    @property
+    def condition_number(self) -> float:
+        """Largest over smallest eigenvalue (H-16); nan without any."""
+        if not self.eigenvalues:
+            return float("nan")
+        return self.eigenvalues[0] / self.smallest if self.smallest > 0 else float("inf")
+
+
+def spectrum(X: FloatArray) -> Spectrum:
+    """Return the eigenvalues of X'X.
+
+    They are squares of singular values, never computed from X'X itself: that would lose half the digits.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_columns)
+        Or any matrix with the same X'X, such as a triangular factor.
+
+    Returns
+    -------
+    Spectrum
+    """
+    if X.shape[1] == 0:
+        return Spectrum(())
+    singular = np.linalg.svd(X, compute_uv=False)
+    singular = np.append(singular, np.zeros(X.shape[1] - len(singular)))
+    singular[singular <= ROUNDING * singular[0]] = 0.0
+    return Spectrum(tuple((singular**2).tolist()))
+
+
+def varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
+    """Say which columns are not constant.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_columns)
+    size : ndarray of shape (n_columns,), optional
+        Greatest magnitude of the numbers X was computed from; of X itself if not given.
+
+    Returns
+    -------
+    ndarray of bool of shape (n_columns,)
+    """
+    largest = np.abs(X).max(axis=0) if size is None else size
+    return np.asarray(np.ptp(X, axis=0) > ROUNDING * largest)
+
+
+def correlation(X: FloatArray) -> FloatArray:
+    """Return the correlation coefficients of the columns (Hwang, Eq. 1; H-02).
+
+    C_ij = Z_i' Z_j, Z being the column with its mean taken out and scaled to length 1, so C is Pearson's r. It is
+    rounded to 12 decimals: equal channels then have equal coefficients, whatever the order of summation.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_columns)
+
+    Returns
+    -------
+    ndarray of shape (n_columns, n_columns)
+        Symmetric, ones in the diagonal.
+
+    Raises
+    ------
+    FitError
+        A column is constant: it has no correlation with anything.
+    """
+    constant = np.flatnonzero(~varying(X))
+    if constant.size:
+        raise FitError(f"column {constant[0]} is constant and has no correlation with the others: leave it out")
+    Z = X - X.mean(axis=0)
+    Z /= np.linalg.norm(Z, axis=0)
+    C = np.clip(np.round(Z.T @ Z, 12), -1.0, 1.0)
+    C = np.triu(C, 1)
+    return np.asarray(C + C.T + np.eye(X.shape[1]))
+
+
+def contributions(X: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the correlation of each column with the error (Hwang, Eq. 9; H-17).
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_columns)
+    y : ndarray of shape (n_rows,)
+
+    Returns
+    -------
+    ndarray of shape (n_columns,)
+        nan for a constant column, or if y is constant.
+    """
+    both = np.column_stack([X, y])
+    moves = varying(both)
+    found = np.full(X.shape[1], np.nan)
+    if moves[-1]:
+        found[moves[:-1]] = correlation(both[:, moves])[-1, :-1]
+    return found

@@ -1,0 +1,224 @@
+"""Sets of sensors that are as good as the best (Wessel et al. 2004, Appendix B; W-11, W-12).
+
+The maximal correlation psi of every set of sensors on every data set comes in; which sets are the best for every
+displacement, or nearly the same by the Wilcoxon test for paired samples, comes out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import rankdata
+
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+_DECIMALS = 12  # differences of psi are compared to so many: the rest is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Equivalents:
+    """What the comparison of the sets found.
+
+    Parameters
+    ----------
+    subsets : tuple of tuple of int
+        Sets of sensors.
+    summed : ndarray of shape (n_displacements, n_subsets)
+        Psi summed over the data sets.
+    best : tuple of int
+        Per displacement the set with the greatest sum, as index of `subsets`.
+    p_values : ndarray of shape (n_displacements, n_subsets)
+        Of the Wilcoxon test against the best.
+    equivalent : ndarray of bool of shape (n_displacements, n_subsets)
+        Not told from the best by the test.
+    notes : tuple of str
+        What the test cannot do with these data.
+    """
+
+    subsets: tuple[tuple[int, ...], ...]
+    summed: FloatArray
+    best: tuple[int, ...]
+    p_values: FloatArray
+    equivalent: BoolArray
+    notes: tuple[str, ...]
+
+    @property
+    def common(self) -> tuple[tuple[int, ...], ...]:
+        """Sets that are equivalent to the best for every displacement; the choice among them is the user's (W-11)."""
+        return tuple(self.subsets[k] for k in np.flatnonzero(self.equivalent.all(axis=0)))
+
+    def table(self) -> tuple["Row", ...]:
+        """Return a row per set: first those that are equivalent for most displacements, then by the sum of psi."""
+        total = self.summed.sum(axis=0)
+        order = np.lexsort((-total, -self.equivalent.sum(axis=0)))
+        return tuple(
+            Row(
+                subset=self.subsets[k],
+                summed=tuple(self.summed[:, k].tolist()),
+                p_values=tuple(self.p_values[:, k].tolist()),
+                equivalent=tuple(np.flatnonzero(self.equivalent[:, k]).tolist()),
+            )
+            for k in order
+        )
+
+
+@dataclass(frozen=True)
+class Row:
+    """One set of sensors.
+
+    Parameters
+    ----------
+    subset : tuple of int
+    summed, p_values : tuple of float
+        Per displacement.
+    equivalent : tuple of int
+        Displacements for which the set is as good as the best.
+    """
+
+    subset: tuple[int, ...]
+    summed: tuple[float, ...]
+    p_values: tuple[float, ...]
+    equivalent: tuple[int, ...]
+
+
+def equivalents(
+    psi: Sequence[ArrayLike], subsets: Sequence[Sequence[int]], *, level: float = 0.05, holm: bool = False
+) -> Equivalents:
+    """Find the sets of sensors that are nearly as good as the best, for every displacement (W-11).
+
+    For each displacement the best set has the greatest psi summed over the data sets; of equal sums the first. Another
+    set is equivalent if the two-sided Wilcoxon signed-rank test does not tell its psi from those of the best. To be not
+    told apart is no proof of being equal: with few data sets nothing is ever told apart, and a note says so.
+
+    Parameters
+    ----------
+    psi : sequence of array-like of shape (n_subsets, n_tests)
+        One per displacement; the number of data sets may differ.
+    subsets : sequence of sequence of int
+        The sets of sensors, in the order of the rows of `psi`.
+    level : float
+        Of significance; the paper gives none (E-W6).
+    holm : bool
+        True: Holm's step-down correction for the number of sets that are compared with the best. Fewer sets are
+        rejected, so more remain.
+
+    Returns
+    -------
+    Equivalents
+
+    Raises
+    ------
+    InputError
+        The numbers do not fit together or are not finite, or the level is not between 0 and 1.
+    """
+    sets = tuple(tuple(s) for s in subsets)
+    if not 0 < level < 1:
+        raise InputError(f"level {level}: want a significance between 0 and 1, such as 0.05")
+    if not psi or not sets:
+        raise InputError("psi: want at least one displacement and one set of sensors")
+    summed, p_values = np.empty((2, len(psi), len(sets)))
+    equivalent = np.empty((len(psi), len(sets)), dtype=np.bool_)
+    best, notes = [], []
+    for d, given in enumerate(psi):
+        values = np.asarray(given, dtype=np.float64)
+        if values.ndim != 2 or len(values) != len(sets) or values.shape[1] == 0:
+            raise InputError(f"psi of displacement {d}: want {len(sets)} sets by data sets, found {values.shape}")
+        if not np.isfinite(values).all():
+            k, test = np.argwhere(~np.isfinite(values))[0]
+            raise InputError(f"psi of displacement {d}, set {sets[k]}, data set {test}: {values[k, test]} is no number")
+        summed[d] = values.sum(axis=1)
+        top = int(np.argmax(np.round(summed[d], _DECIMALS)))
+        best.append(top)
+        p_values[d] = signed_rank_p(values - values[top])
+        others = np.delete(np.arange(len(sets)), top)
+        rejected = np.zeros(len(sets), dtype=np.bool_)
+        rejected[others] = _rejected(p_values[d, others], level, holm)
+        equivalent[d] = ~rejected
+        n_tests = values.shape[1]
+        least, wanted = 2.0 ** (1 - n_tests), level / max(others.size, 1) if holm else level
+        if least > wanted:
+            notes.append(
+                f"displacement {d}: {n_tests} data sets are too few: the smallest p value there can be is {least:.2g}, "
+                f"above {wanted:.2g}{' (Holm)' if holm else ''}, so that every set counts as equivalent"
+            )
+    return Equivalents(sets, summed, tuple(best), p_values, equivalent, tuple(notes))
+
+
+def signed_rank_p(differences: FloatArray) -> FloatArray:
+    """Return the two-sided p values of Wilcoxon's signed-rank test, one per row.
+
+    Exact also with ties: under the null hypothesis every sign is equally likely, whatever the ranks, and the
+    distribution of the sum of the positive ranks follows by adding one pair after the other. `scipy.stats.wilcoxon`
+    does the same without ties; with ties it draws signs or takes the normal approximation, which for five pairs gives
+    0.04 where no p below 0.0625 exists. Differences of zero are left out before ranking (Wilcoxon's own rule); if none
+    is left, p = 1.
+
+    Parameters
+    ----------
+    differences : ndarray of shape (n_rows, n_pairs)
+        Rounded to 12 decimals before they are compared.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
+    rounded = np.round(differences, _DECIMALS)
+    size, zero = np.abs(rounded), rounded == 0
+    # zeros have the lowest ranks; what is left of the others' ranks is as if they were not there. Twice: half ranks
+    ranks = 2 * np.asarray(rankdata(size, axis=1)) - 2 * zero.sum(axis=1, keepdims=True)
+    doubled = np.where(zero, 0, np.rint(ranks)).astype(np.intp)
+    positive = (doubled * (rounded > 0)).sum(axis=1)
+    smaller = np.minimum(positive, doubled.sum(axis=1) - positive)
+    p = np.empty(len(rounded))
+    kinds, which = np.unique(np.sort(doubled, axis=1), axis=0, return_inverse=True)
+    for k, kind in enumerate(kinds):
+        those = which == k
+        p[those] = np.minimum(1.0, 2 * _below(kind)[smaller[those]])
+    return p
+
+
+def _below(ranks: NDArray[np.intp]) -> FloatArray:
+    """Return the probability that the sum of the positive ranks is at most 0, 1, 2, ..."""
+    chance = np.zeros(int(ranks.sum()) + 1)
+    chance[0] = 1.0
+    for r in ranks[ranks > 0]:
+        moved = np.zeros_like(chance)
+        moved[r:] = chance[: len(chance) - r]
+        chance = 0.5 * (chance + moved)
+    return np.asarray(np.cumsum(chance))
+
+
+def _rejected(p: FloatArray, level: float, holm: bool) -> BoolArray:
+    """Say which hypotheses are rejected, with or without Holm's step-down rule."""
+    if not holm:
+        return np.asarray(p <= level)
+    order = np.argsort(p, kind="stable")
+    holds = p[order] <= level / np.arange(len(p), 0, -1)
+    rejected = np.zeros(len(p), dtype=np.bool_)
+    rejected[order[: int(np.argmin(np.append(holds, False)))]] = True
+    return rejected
+
+
+def enough_sensors(psi: Sequence[ArrayLike], subsets: Sequence[Sequence[int]], *, least: float = 0.99) -> int | None:
+    """Return the number of sensors beyond which there is no need to look (W-12).
+
+    Parameters
+    ----------
+    psi : sequence of array-like of shape (n_subsets, n_tests)
+        One per displacement.
+    subsets : sequence of sequence of int
+    least : float
+        What the mean psi of the best set must exceed; the paper stopped at triples, with more than 0.99.
+
+    Returns
+    -------
+    int or None
+        Smallest size of a set that does so for every displacement; None if there is none.
+    """
+    sizes = np.array([len(s) for s in subsets])
+    means = np.array([np.asarray(values, dtype=np.float64).mean(axis=1) for values in psi])
+    return next((int(s) for s in np.unique(sizes) if (means[:, sizes == s].max(axis=1) > least).all()), None)

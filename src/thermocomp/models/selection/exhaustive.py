@@ -1,0 +1,193 @@
+"""Exhaustive searches by the residual mean square: all subsets, and all combinations of one member of each group.
+
+Hwang, sections 2.3 and 2.4 (H-05 to H-07). Columns are told by their indices. All is done on the small triangular
+factor (`thermocomp.models.leastsquares.triangle`), never on a Gram matrix: sensors that nearly repeat each other are
+what the method is about.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.models.leastsquares import Triangle
+
+FloatArray = NDArray[np.float64]
+
+#: most subsets (or combinations) that are searched
+LIMIT = 2**20
+#: sums of squares that differ by a smaller share are equal, and the first is taken whatever the rounding
+SAME = 1e-10
+_BATCH = 2**12  # candidates worked on at once: bounds the memory
+
+
+@dataclass(frozen=True)
+class Subset:
+    """A set of variables.
+
+    Parameters
+    ----------
+    columns : tuple of int
+    mse : float
+        MSE_p = SSE_p / (n - p - 1) (Eq. 4), n - p without an intercept [square of the unit of y].
+    """
+
+    columns: tuple[int, ...]
+    mse: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """Outcome of a search.
+
+    Parameters
+    ----------
+    best : Subset
+        With the smallest MSE_p.
+    curve : tuple of Subset
+        The best of each number of variables 1, 2, ... (Fig. 4), as far as a degree of freedom is left.
+    count : int
+        Number of sets looked at.
+    """
+
+    best: Subset
+    curve: tuple[Subset, ...]
+    count: int
+
+
+def search_subsets(tri: Triangle, columns: Sequence[int], *, limit: int = LIMIT) -> Search:
+    """Find the subset with the smallest MSE_p among all subsets that are not empty (Hwang, Eq. 5; H-05, H-07).
+
+    Of equally good subsets the smaller is taken, then the one with the earlier columns. Exact, and not slower for
+    sensors that repeat each other: one that adds nothing but rounding leaves the sum of squares as it is.
+
+    Parameters
+    ----------
+    tri : Triangle
+        Of [X y].
+    columns : sequence of int
+        Candidates, in the order of preference.
+    limit : int
+        Most subsets that are searched.
+
+    Returns
+    -------
+    Search
+
+    Raises
+    ------
+    FitError
+        More subsets than `limit`, or no degree of freedom left.
+    """
+    g = len(columns)
+    count = 2**g - 1
+    if count > limit:
+        raise FitError(
+            f"{g} representatives have {count} subsets, more than {limit}: lower the threshold of the correlation, so "
+            "that there are fewer groups"
+        )
+    free = _free(tri, 1)
+    squares = _squares(tri, [(c,) for c in columns], skip=True)
+    sizes = g - np.bitwise_count(np.arange(2**g))  # a one stands for a column that is left out
+    curve = []
+    for p in range(1, min(g, free - 1) + 1):
+        mine = np.flatnonzero(sizes == p)
+        place = int(mine[_first(squares[mine])])
+        taken = tuple(c for k, c in enumerate(columns) if not place >> (g - 1 - k) & 1)
+        curve.append(Subset(taken, float(squares[place]) / (free - p)))
+    best = curve[_first(np.array([s.mse for s in curve]))]
+    return Search(best, tuple(curve), count)
+
+
+def search_members(tri: Triangle, groups: Sequence[Sequence[int]], *, limit: int = LIMIT) -> Search:
+    """Find the best combination of one member of each group (Hwang, section 2.4 and Fig. 2; H-06).
+
+    Of equally good combinations the first is taken.
+
+    Parameters
+    ----------
+    tri : Triangle
+        Of [X y].
+    groups : sequence of sequence of int
+        Those that take part.
+    limit : int
+        Most combinations that are searched.
+
+    Returns
+    -------
+    Search
+        Its curve holds the best combination alone.
+
+    Raises
+    ------
+    FitError
+        More combinations than `limit`, or no degree of freedom left.
+    """
+    count = math.prod(len(g) for g in groups)
+    if count > limit:
+        raise FitError(
+            f"the groups that take part have {count} combinations of members, more than {limit}: raise the threshold "
+            "of the correlation, so that the groups are smaller, or leave sensors out"
+        )
+    free = _free(tri, len(groups))
+    squares = _squares(tri, groups, skip=False)
+    place = _first(squares)
+    members = np.unravel_index(place, [len(g) for g in groups])
+    taken = tuple(g[int(k)] for g, k in zip(groups, members, strict=True))
+    best = Subset(taken, float(squares[place]) / (free - len(groups)))
+    return Search(best, (best,), count)
+
+
+def _free(tri: Triangle, needed: int) -> int:
+    """Return the rows less the constant; refuse if `needed` variables leave no degree of freedom."""
+    free = tri.n_rows - int(tri.intercept)
+    if free <= needed:
+        raise FitError(
+            f"{tri.n_rows} rows are too few for {needed} variables: want at least {needed + 1 + int(tri.intercept)}"
+        )
+    return free
+
+
+def _first(values: FloatArray) -> int:
+    """Return the first place of the smallest value, but for rounding."""
+    return int(np.argmax(values <= values.min() * (1 + SAME)))
+
+
+def _squares(tri: Triangle, levels: Sequence[Sequence[int]], *, skip: bool) -> FloatArray:
+    """Return the residual sum of squares for one column of each level, or `skip`, the last choice, none of it.
+
+    Shape (n_choices of level 0 * n_choices of level 1 * ...,), the last level varying fastest; 0 for what cannot be
+    told from rounding.
+    """
+    columns = [c for level in levels for c in level]
+    least = tri.noise[columns] ** 2
+    left = tri.factor[None][:, :, [*columns, -1]]
+    found = _deflated(left, [len(level) for level in levels], least, skip)
+    found[found <= tri.noise[-1] ** 2] = 0.0
+    return found
+
+
+def _deflated(left: FloatArray, sizes: Sequence[int], least: FloatArray, skip: bool) -> FloatArray:
+    """Choose a column of the first level and take it out of those of later levels and of y (modified Gram-Schmidt).
+
+    `left`, of shape (n_choices_so_far, n_rows, n_columns + 1), is what earlier choices left of the columns and of y.
+    """
+    if not sizes:
+        return np.asarray(np.einsum("sm,sm->s", left[:, :, -1], left[:, :, -1]))
+    own, rest = left[:, :, : sizes[0]], left[:, :, sizes[0] :]
+    parts = []
+    for k in range(sizes[0]):
+        v = own[:, :, k]
+        square = np.einsum("sm,sm->s", v, v)
+        share = np.einsum("sm,smw->sw", v, rest) / np.where(square > least[k], square, np.inf)[:, None]
+        parts.append(rest - v[:, :, None] * share[:, None, :])
+    if skip:
+        parts.append(rest)
+    later, least = sizes[1:], least[sizes[0] :]
+    if len(left) * len(parts) > _BATCH:
+        done = [_deflated(part, later, least, skip).reshape(len(left), -1) for part in parts]
+        return np.stack(done, axis=1).ravel()
+    return _deflated(np.stack(parts, axis=1).reshape(-1, *rest.shape[1:]), later, least, skip)

@@ -1,0 +1,313 @@
+"""Sensors by correlation grouping and successive regression (Hwang, Lee, Yang; H-01 to H-07).
+
+Fig. 1 of the paper: groups of temperatures that behave alike -> one representative of each group -> the groups that
+take part in the model -> the best member of each. Columns are told by their indices.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.selection.collinearity import Spectrum, correlation, spectrum
+from thermocomp.models.selection.exhaustive import LIMIT, SAME, Search, search_members, search_subsets
+
+FloatArray = NDArray[np.float64]
+Groups = tuple[tuple[int, ...], ...]
+
+
+# -- groups (H-03) -----------------------------------------------------------------------------------------------------
+
+
+def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) -> Groups:
+    """Group variables by their correlation (Hwang, section 2.1; H-03).
+
+    The two variables with the smallest correlation are the seeds of two groups; each of the others joins a seed if its
+    correlation with it is above the threshold. Then the same with what is left, until nothing is. The paper leaves open
+    some cases; the rules here are:
+
+    - above the threshold for both seeds: the larger correlation decides (E-H3); if equal, the first seed;
+    - seeds that are themselves above the threshold: then so is every pair that is left, and all of it is one group.
+      (Two groups that are as close as that would contradict the threshold, and no threshold would give one group.)
+    - one variable left: a group of its own;
+    - several pairs with the smallest correlation: the first, by the lower index, then by the higher.
+
+    Groups come in the order of their seeds, two and two as in the paper's Table 1, where only the order within a pair
+    is not known: here the lower index is first. Within a group the seed is first (both, if all is one group), then the
+    others in rising order.
+
+    Parameters
+    ----------
+    correlation : ndarray of shape (n_variables, n_variables)
+        Symmetric.
+    threshold : float
+        From -1 to 1. The paper does not give its own (E-H1).
+    absolute : bool
+        Go by the magnitude of the correlation, for two sensors that move against each other are not thermally far; the
+        paper goes by the signed one (E-H2).
+
+    Returns
+    -------
+    tuple of tuple of int
+
+    Raises
+    ------
+    InputError
+        A threshold beyond -1 to 1, or not a correlation matrix.
+    """
+    close = _checked(correlation, absolute)
+    if not -1 <= threshold <= 1:
+        raise InputError(f"threshold {threshold}: a correlation is from -1 to 1")
+    groups: list[tuple[int, ...]] = []
+    left = np.arange(len(close))
+    while left.size > 1:
+        among = close[np.ix_(left, left)]
+        rows, columns = np.triu_indices(left.size, 1)
+        smallest = int(np.argmin(among[rows, columns]))
+        a, b = rows[smallest], columns[smallest]
+        others = np.delete(np.arange(left.size), [a, b])
+        if among[a, b] > threshold:
+            groups.append(tuple(left[[a, b, *others]].tolist()))
+            break
+        joins_a = (among[a] > threshold) & (among[a] >= among[b])
+        joins_b = (among[b] > threshold) & (among[b] > among[a])
+        for seed, joins in ((a, joins_a), (b, joins_b)):
+            groups.append((int(left[seed]), *left[others[joins[others]]].tolist()))
+        left = left[others[~(joins_a | joins_b)[others]]]
+    else:
+        groups += [(k,) for k in left.tolist()]
+    return tuple(groups)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Thresholds that give the same groups.
+
+    Parameters
+    ----------
+    low, high : float
+        low <= threshold < high; the last interval includes its end, 1.
+    groups : tuple of tuple of int
+    """
+
+    low: float
+    high: float
+    groups: Groups
+
+
+def intervals(correlation: FloatArray, *, absolute: bool = False) -> tuple[Interval, ...]:
+    """Return all groupings there are, with the thresholds that give them (E-H1).
+
+    A threshold is only ever compared with correlations, so the groups change nowhere else, and the intervals are exact.
+
+    Parameters
+    ----------
+    correlation : ndarray of shape (n_variables, n_variables)
+    absolute : bool
+        As in `group`.
+
+    Returns
+    -------
+    tuple of Interval
+        Rising, without gaps, from -1 (or 0, if `absolute`) to 1.
+    """
+    close = _checked(correlation, absolute)
+    start = 0.0 if absolute else -1.0
+    breaks = np.unique(np.append(close[np.triu_indices(len(close), 1)], start)).tolist()
+    found: list[Interval] = []
+    for low, high in zip(breaks, [*breaks[1:], 1.0], strict=True):
+        groups = group(close, low)
+        if found and found[-1].groups == groups:
+            found[-1] = Interval(found[-1].low, high, groups)
+        else:
+            found.append(Interval(low, high, groups))
+    return tuple(found)
+
+
+def interval_of(groups: Sequence[Sequence[int]], found: Sequence[Interval]) -> Interval | None:
+    """Return the interval of thresholds that gives certain groups, whatever their order; None if none does.
+
+    Parameters
+    ----------
+    groups : sequence of sequence of int
+        Such as those of the paper's Table 1.
+    found : sequence of Interval
+        From `intervals`.
+
+    Returns
+    -------
+    Interval or None
+    """
+    wanted = {frozenset(g) for g in groups}
+    return next((i for i in found if {frozenset(g) for g in i.groups} == wanted), None)
+
+
+def _checked(correlation: FloatArray, absolute: bool) -> FloatArray:
+    C = np.asarray(correlation, dtype=np.float64)
+    if C.ndim != 2 or C.shape[0] != C.shape[1] or not np.isfinite(C).all() or not np.array_equal(C, C.T):
+        raise InputError(f"a correlation matrix is square, symmetric and finite; found one of shape {C.shape}")
+    return np.abs(C) if absolute else C
+
+
+# -- representatives (H-04) --------------------------------------------------------------------------------------------
+
+
+def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
+    """Choose one variable of each group by successive regression (Hwang, Eq. 2; H-04).
+
+    The variable that explains most of the error represents its group; then, of the other groups, the one that explains
+    most of what that left; and so on. As printed, only the first regression has a constant (E-H9), none has one if
+    `tri` has no intercept. Of equally good variables the first is taken.
+
+    Parameters
+    ----------
+    tri : Triangle
+        Of [X y].
+    groups : tuple of tuple of int
+        Columns of X.
+
+    Returns
+    -------
+    tuple of int
+        In the order of the regressions.
+    """
+    images = uncentred(tri)
+    rounding = float(tri.noise[-1]) ** 2
+    home = {column: number for number, members in enumerate(groups) for column in members}
+    residual = images[:, -1].copy()
+    residual[0] = 0.0  # what the constant of the first line takes
+    found: list[int] = []
+    open_groups = set(range(len(groups)))
+    while open_groups:
+        columns = sorted(c for c, number in home.items() if number in open_groups)
+        basis = images[:, columns]
+        if not found:
+            basis[0] = 0.0
+        squares = np.einsum("ij,ij->j", basis, basis)
+        slopes = np.divide(residual @ basis, squares, out=np.zeros(len(columns)), where=squares > 0)
+        gains = slopes**2 * squares
+        best = int(np.argmax(gains >= gains.max() * (1 - SAME) - rounding))
+        residual -= slopes[best] * basis[:, best]
+        found.append(columns[best])
+        open_groups.remove(home[columns[best]])
+    return tuple(found)
+
+
+def uncentred(tri: Triangle) -> FloatArray:
+    """Return a small matrix with the same products as [X y] before it was centred; row 0 holds the means."""
+    return np.vstack([np.sqrt(tri.n_rows) * tri.centre, tri.factor])
+
+
+# -- the whole way -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What Hwang's method chose.
+
+    Parameters
+    ----------
+    groups : tuple of tuple of int
+    representatives : tuple of int
+        In the order of the successive regression.
+    subsets : Search
+        Among the representatives.
+    participating : tuple of int
+        Groups that take part in the model, as indices of `groups`, in rising order.
+    members : Search
+        Among the combinations of members of these groups.
+    """
+
+    groups: Groups
+    representatives: tuple[int, ...]
+    subsets: Search
+    participating: tuple[int, ...]
+    members: Search
+
+    @property
+    def selected(self) -> tuple[int, ...]:
+        """Columns in the model, in rising order."""
+        return tuple(sorted(self.members.best.columns))
+
+
+def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Choice:
+    """Go from groups to the best variables (Hwang, Fig. 1; H-04 to H-06).
+
+    Parameters
+    ----------
+    tri : Triangle
+        Of [X y].
+    groups : tuple of tuple of int
+        From `group`.
+    limit : int
+        Most subsets, and most combinations, that are searched.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    FitError
+        Too much to search, or too few rows.
+    """
+    chosen = representatives(tri, groups)
+    subsets = search_subsets(tri, chosen, limit=limit)
+    participating = tuple(k for k, g in enumerate(groups) if set(g) & set(subsets.best.columns))
+    members = search_members(tri, [groups[k] for k in participating], limit=limit)
+    return Choice(groups, chosen, subsets, participating, members)
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What an interval of thresholds leads to.
+
+    Parameters
+    ----------
+    interval : Interval
+    choice : Choice or None
+        None where nothing could be chosen.
+    spectrum : Spectrum or None
+        Of the chosen variables.
+    failure : str
+        Why nothing could be chosen, such as too much to search; empty if it could.
+    """
+
+    interval: Interval
+    choice: Choice | None
+    spectrum: Spectrum | None
+    failure: str = ""
+
+
+def sweep(temperatures: FloatArray, tri: Triangle, *, absolute: bool = False, limit: int = 2**14) -> tuple[Swept, ...]:
+    """Go through all thresholds there are (E-H1).
+
+    Parameters
+    ----------
+    temperatures : ndarray of shape (n_rows, n_columns)
+        What is grouped; none of them constant.
+    tri : Triangle
+        Of [X y], X being what is regressed on: the temperatures, or their differences from a reference.
+    absolute : bool
+        As in `group`.
+    limit : int
+        Most subsets, and most combinations, that are searched at a threshold.
+
+    Returns
+    -------
+    tuple of Swept
+        By rising threshold.
+    """
+    images = uncentred(tri)
+    found = []
+    for interval in intervals(correlation(temperatures), absolute=absolute):
+        try:
+            choice = choose(tri, interval.groups, limit=limit)
+        except FitError as e:
+            found.append(Swept(interval, None, None, str(e)))
+        else:
+            found.append(Swept(interval, choice, spectrum(images[:, choice.selected])))
+    return tuple(found)
