@@ -10,6 +10,7 @@ from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
 from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
@@ -67,7 +68,14 @@ def fit(
     Returns
     -------
     Fitted
+
+    Raises
+    ------
+    InputError
+        The method is unknown, or cannot be frozen, so there would be no model.
     """
+    if not find(method).kind.freezable:
+        raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
     comparison = compare(samples, [method], protocol, support=support, robustness=False, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)

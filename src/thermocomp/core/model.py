@@ -271,7 +271,7 @@ class ErrorModel(ABC):
         clipped = np.minimum(np.maximum(change, low), high)
         outside = clipped != change
         if memory is None:
-            memory = self._begin(clipped)
+            memory, dt = self._begin(clipped), 0.0
         memory, deviation = self._advance(memory, clipped, dt)
         if self.support.policy != "clip" and outside.any():
             if self.support.policy == "hold":

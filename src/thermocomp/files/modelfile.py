@@ -9,9 +9,12 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
+from thermocomp.core.additive import Additive
+from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.network import Network
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files.draft import draft
 
@@ -19,7 +22,9 @@ FORMAT = "thermocomp-model"
 VERSION = 1
 
 #: every family that a file may hold
-FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in (Polynomial, LinearDynamic)}
+FAMILIES: dict[str, type[ErrorModel]] = {
+    f.family: f for f in (Polynomial, LinearDynamic, Network, Additive, Autoregressive, AutoregressiveNet)
+}
 
 
 def _adapter(family: type[ErrorModel]) -> TypeAdapter[ErrorModel]:
@@ -31,7 +36,18 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     """Return models as the text of a model file.
 
     Floats are written so that reading gives the same bits.
+
+    Raises
+    ------
+    ModelFileError
+        A model is of a family that no file holds: not plain numbers, such as a Gaussian process.
     """
+    for m in models:
+        if m.family not in FAMILIES:
+            raise ModelFileError(
+                f"model of {m.target}: the family {m.family!r} cannot be written, it is not plain numbers; "
+                f"a file may hold {', '.join(FAMILIES)}"
+            )
     body = [{"family": m.family, **asdict(m)} for m in models]
     content = {"format": FORMAT, "version": VERSION, "sha256": _digest(body), "models": body}
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
@@ -17,6 +17,8 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     The columns of X are the inputs minus their reference ("change"). `fit` leaves the trained range behind, as
     ``data_min_`` and ``data_max_`` of shape (n_features,).
     """
+
+    freezable: ClassVar[bool] = True  #: False: can be compared, not deployed; see `thermocomp.models.unfrozen`
 
     def freeze(
         self,
@@ -53,6 +55,8 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
         ------
         InputError
             `inputs` are not as many as the features.
+        FitError
+            The method cannot be frozen; see `freezable`.
         """
         return self._frozen(
             self._inputs(inputs), {"target": target, "unit": unit, "support": support, "provenance": provenance}

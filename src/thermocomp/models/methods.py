@@ -65,6 +65,21 @@ METHODS: dict[str, Method] = {
             speed="speed",
             takes=("dt", "cycle"),
         ),
+        Method("grouping", "Hwang's correlation grouping and successive regression", "grouping.CorrelationGrouping"),
+        Method("mlp", "Chen's sigmoid net of 20 hidden nodes, trained by back-propagation", "mlp.SigmoidNet"),
+        Method("mlp-sklearn", "scikit-learn's net with one hidden layer", "mlp_sklearn.SklearnNet"),
+        Method("ridge", "ridge regression on all temperatures", "ridge_regression.Ridge", takes=("cycle",)),
+        Method("pcr", "regression on the first principal components", "pcr.PrincipalComponents", takes=("cycle",)),
+        Method("pls", "partial least squares", "pls.PartialLeastSquares", takes=("cycle",)),
+        Method("lasso", "regression that drops temperatures by itself", "lasso.Lasso", takes=("cycle",)),
+        Method(
+            "elastic-net",
+            "a lasso that keeps or drops collinear temperatures together",
+            "lasso.ElasticNet",
+            takes=("cycle",),
+        ),
+        Method("ppr", "projection pursuit regression", "ppr.ProjectionPursuit", takes=("cycle",)),
+        Method("gp", "Gaussian process; for comparison only, cannot be deployed", "gp.GaussianProcess"),
     )
 }
 

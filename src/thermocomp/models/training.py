@@ -14,6 +14,7 @@ from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import Method, method
+from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]
@@ -28,7 +29,7 @@ class Trained:
     method : str
     estimator : ThermalRegressor
     model : ErrorModel
-        Frozen.
+        Frozen, unless the method cannot be: see `thermocomp.models.unfrozen`.
     seconds : float
         The fit took [s].
     r_squared : float
@@ -92,7 +93,8 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
         raise FitError(f"{name} cannot be fitted to {channel.name}: {e}") from e
     seconds = time.perf_counter() - begin
     r_squared = float(r2_score(y[learned], estimator.predict(X, **clock)[learned]))
-    model = estimator.freeze(
+    freeze = estimator.unfrozen if isinstance(estimator, UnfrozenRegressor) else estimator.freeze
+    model = freeze(
         target=channel.name,
         unit=channel.unit,
         inputs=samples.model_inputs(columns, seen),

@@ -205,7 +205,7 @@ def uncentred(tri: Triangle) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Grouped:
     """What Hwang's method chose.
 
     Parameters
@@ -233,7 +233,7 @@ class Choice:
         return tuple(sorted(self.members.best.columns))
 
 
-def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Choice:
+def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Grouped:
     """Go from groups to the best variables (Hwang, Fig. 1; H-04 to H-06).
 
     Parameters
@@ -247,7 +247,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Choice:
 
     Returns
     -------
-    Choice
+    Grouped
 
     Raises
     ------
@@ -258,7 +258,7 @@ def choose(tri: Triangle, groups: Groups, *, limit: int = LIMIT) -> Choice:
     subsets = search_subsets(tri, chosen, limit=limit)
     participating = tuple(k for k, g in enumerate(groups) if set(g) & set(subsets.best.columns))
     members = search_members(tri, [groups[k] for k in participating], limit=limit)
-    return Choice(groups, chosen, subsets, participating, members)
+    return Grouped(groups, chosen, subsets, participating, members)
 
 
 @dataclass(frozen=True)
@@ -268,7 +268,7 @@ class Swept:
     Parameters
     ----------
     interval : Interval
-    choice : Choice or None
+    choice : Grouped or None
         None where nothing could be chosen.
     spectrum : Spectrum or None
         Of the chosen variables.
@@ -277,7 +277,7 @@ class Swept:
     """
 
     interval: Interval
-    choice: Choice | None
+    choice: Grouped | None
     spectrum: Spectrum | None
     failure: str = ""
 

@@ -1,0 +1,151 @@
+"""Additive family: one curve per variable, their sum through one more curve; no memory."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+from thermocomp.core.terms import Variable
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A function of one variable, constant beyond its ends.
+
+    ``linear`` joins the points (x, y) by straight lines. ``step`` is constant between the breaks x: ``y[0]``
+    below ``x[0]``, ``y[i]`` from ``x[i-1]`` on. That is the exact form of a k-nearest-neighbour estimate from a table of
+    one variable: the neighbours change only half way between two entries that are k apart.
+
+    Parameters
+    ----------
+    x : tuple of float
+        Strictly rising.
+    y : tuple of float
+        As many as `x`; one more if it is a ``step``.
+    kind : {'linear', 'step'}
+
+    Raises
+    ------
+    InputError
+        Numbers are not finite, not rising, or too few.
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    kind: Literal["linear", "step"] = "linear"
+
+    def __post_init__(self) -> None:
+        check_finite(f"{self.kind} curve", x=self.x, y=self.y)
+        if len(self.y) != len(self.x) + (self.kind == "step") or not self.y:
+            more = ", one y more than x" if self.kind == "step" else ", equally many"
+            raise InputError(f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: want at least one y{more}")
+        if any(not a < b for a, b in pairwise(self.x)):
+            raise InputError(f"{self.kind} curve: x must rise strictly")
+        if not np.isfinite(self._pieces[2]).all():
+            raise InputError(f"{self.kind} curve: two x are so close that the slope between them is no number")
+
+    @cached_property
+    def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Break points; then the value at the left end, the slope and the left end of each piece."""
+        x, y = np.array(self.x, dtype=np.float64), np.array(self.y, dtype=np.float64)
+        if self.kind == "step":
+            return x, y, np.zeros(len(y)), np.zeros(len(y))
+        with np.errstate(over="ignore"):
+            slope = np.concatenate([[0.0], np.diff(y) / np.diff(x), [0.0]])
+        return x, np.concatenate([y[:1], y]), slope, np.concatenate([x[:1], x])
+
+    @property
+    def constant(self) -> bool:
+        """True if the variable has no influence."""
+        return min(self.y) == max(self.y)
+
+    @property
+    def span(self) -> float:
+        """Greatest minus least value."""
+        return max(self.y) - min(self.y)
+
+    def __call__(self, variable: FloatArray) -> FloatArray:
+        """Return the values at `variable`, element by element: the same alone as in a batch, to the last bit."""
+        breaks, value, slope, left = self._pieces
+        piece = breaks.searchsorted(variable, side="right")
+        if self.kind == "step":
+            return np.asarray(value[piece])
+        return np.asarray(value[piece] + slope[piece] * (variable - left[piece]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Additive(ErrorModel):
+    """Deviation = intercept + response(curve_1(variable_1) + curve_2(variable_2) + ...) (Wessel 2004, Eq. 5; W-05).
+
+    Curves are constant beyond their ends: peaks outside the trained range are cropped (W-07), and ``State.outside``
+    tells which input was.
+
+    Parameters
+    ----------
+    variables : tuple of Variable
+        Linear combinations of the inputs: single sensors, or projections.
+    curves : tuple of Curve
+        One per variable.
+    response : Curve or None
+        What the sum goes through, such as the inverse of theta; None: nothing.
+    """
+
+    family: ClassVar[str] = "additive"
+    remembers: ClassVar[bool] = False
+
+    variables: tuple[Variable, ...]
+    curves: tuple[Curve, ...]
+    response: Curve | None = None
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        if len(self.variables) != len(self.curves):
+            raise InputError(f"{owner}: {len(self.variables)} variables but {len(self.curves)} curves")
+        check_finite(owner, intercept=self.intercept)
+        for v in self.variables:
+            check_finite(f"{owner}, variable {v.name}", weights=[w for _, w in v.weights])
+            if not v.weights or any(not 0 <= i < len(self.inputs) for i, _ in v.weights):
+                raise InputError(f"{owner}: variable {v.name} refers to an input beyond the {len(self.inputs)} given")
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return np.empty((*change.shape[:-1], 0))
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        # Term by term, not as a matrix product: that one rounds a single reading otherwise than a batch of them.
+        total = np.zeros(change.shape[:-1])
+        for v, curve in zip(self.variables, self.curves, strict=True):
+            (first, weight), *others = v.weights
+            value = change[..., first] if weight == 1.0 else weight * change[..., first]
+            for i, w in others:
+                value = value + w * change[..., i]
+            total = total + curve(value)
+        if self.response is not None:
+            total = self.response(total)
+        return memory, total + self.intercept
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+        if self.response is not None and self.response.constant:
+            return ()
+        active = [v for v, c in zip(self.variables, self.curves, strict=True) if not c.constant]
+        used = {i for v in active for i, w in v.weights if w != 0}
+        return tuple(self.inputs[i].name for i in sorted(used))
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return the span (greatest minus least value) of each curve, before the response."""
+        return {name: c.span for name, c in zip(self._names(), self.curves, strict=True)}
+
+    def formula(self) -> str:
+        """Return the model as one line of text, such as ``theta^-1(phi1(T1) + phi2(T2))``."""
+        text = " + ".join(self._names()) or "0"
+        if self.response is not None:
+            text = f"theta^-1({text})"
+        return f"{self.intercept:.6g} + {text}" if self.intercept else text
+
+    def _names(self) -> list[str]:
+        return [f"phi{k}({v.name})" for k, v in enumerate(self.variables, start=1)]

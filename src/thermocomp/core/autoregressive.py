@@ -1,0 +1,350 @@
+"""Autoregressive families: the deviation from its own past and from inputs, in steps of a fixed interval (P-01).
+
+The model's clock ticks every `interval`; readings may come at any time:
+
+- A reading stands for the time since the reading before it, as for the lags of `thermocomp.core.lagbank`. What drives
+  a tick is the mean of the inputs over the interval that ends there. Where readings come once per interval, this is the
+  reading itself.
+- Ticks are made when they are due, several at once after a gap. The work is bounded: once the inputs in the memory are
+  all the same, the rest of a gap is one matrix power (or, for a net, ends where the net has come to rest).
+- Between two ticks the deviation goes in a straight line from the last one towards the one that would come if the
+  inputs went on as they were since. It is continuous in time, so a reading at 14.9 s or 15.1 s makes no difference
+  worth mentioning, and at the tick it is exact.
+
+The past of the deviation is the model's own, never a measured one (P-05, E-P3). `ErrorModel.init` starts cold: no
+deviation and inputs at zero before the first reading. What an earlier job has left (E-P5) is carried over either by
+going on with its `State`, or by `begin_at`.
+"""
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray, State, check_finite
+from thermocomp.core.network import Affine, Perceptron
+
+#: share of the interval by which a reading may come early and still make the tick: rounding of clocks, nothing else
+EARLY = 1e-6
+#: ticks of a net made at once, at most: a day of 15 s; after that the machine is taken to have settled
+MOST_TICKS = 5760
+
+
+def slowest(a: ArrayLike) -> float:
+    """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run decays."""
+    roots = np.linalg.eigvals(companion(np.asarray(a, dtype=np.float64)))
+    return float(np.abs(roots).max(initial=0.0))
+
+
+def companion(a: FloatArray) -> FloatArray:
+    """Return the matrix that takes the last k deviations one tick further, without inputs."""
+    matrix = np.eye(len(a), k=-1)
+    matrix[:1] = a
+    return matrix
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ticking(ErrorModel):
+    """What the autoregressive families share: the clock and the memory.
+
+    The runs of a batch share their clock.
+
+    Parameters
+    ----------
+    interval : float
+        h, time from tick to tick [s].
+    """
+
+    remembers: ClassVar[bool] = True
+
+    interval: float
+
+    @property
+    @abstractmethod
+    def orders(self) -> tuple[int, int]:
+        """How many past deviations (k) and past values of each input (m) one tick is made of."""
+
+    @abstractmethod
+    def _tick(self, regressors: FloatArray) -> FloatArray:
+        """Return the next deviation from [dz(t-h) .. dz(t-kh), inputs(t), inputs(t-h) .. inputs(t-mh)]."""
+
+    @abstractmethod
+    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
+        """Return the last deviations `ticks` later, all inputs `driven` staying the same."""
+
+    def begin_at(
+        self, deviation: ArrayLike, inputs: ArrayLike | None = None, reference: ArrayLike | None = None
+    ) -> State:
+        """Return the state of a machine whose deviation is known: what the last job has left (E-P5).
+
+        Parameters
+        ----------
+        deviation : array-like of shape (...)
+            Known deviation, taken to have been the same for as long as the model remembers [unit].
+        inputs : array-like of shape (..., n_inputs), optional
+            Values the inputs had all that time; at their reference without it.
+        reference : array-like of shape (n_inputs,), optional
+            Values that count as zero; those in the model without it.
+
+        Returns
+        -------
+        State
+            The next `step` counts its `dt` from here.
+
+        Raises
+        ------
+        InputError
+            A number is not finite, or there are not as many as inputs.
+        """
+        zero = np.array([i.reference for i in self.inputs]) if reference is None else np.asarray(reference, np.float64)
+        given = zero if inputs is None else np.asarray(inputs, dtype=np.float64)
+        known = np.asarray(deviation, dtype=np.float64)
+        if zero.shape != (len(self.inputs),) or given.shape[-1:] != zero.shape:
+            raise InputError(f"start of the model of {self.target}: want {len(self.inputs)} inputs and references")
+        if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
+            raise InputError(f"start of the model of {self.target}: deviation, inputs or reference not finite")
+        low, high = self._bounds
+        change = np.clip(given - zero, low, high)
+        k, m = self.orders
+        shape = np.broadcast_shapes(known.shape, change.shape[:-1])
+        own = np.broadcast_to(known[..., None], (*shape, max(k, 1)))
+        past = np.broadcast_to(np.tile(change, m), (*shape, m * len(self.inputs)))
+        clock = np.zeros((*shape, 1 + len(self.inputs)))
+        memory = np.concatenate([clock, own, past], axis=-1)
+        return State(zero, memory, own[..., 0].copy(), np.zeros(len(self.inputs), dtype=np.bool_))
+
+    def _check_interval(self) -> None:
+        if not 0 < self.interval < math.inf:
+            raise InputError(f"model of {self.target}: interval {self.interval} s must be positive and finite")
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        # [time since the last tick, inputs summed over it, own past, inputs of the last m ticks]
+        k, m = self.orders
+        n = len(self.inputs)
+        memory = np.zeros((*change.shape[:-1], 1 + n + max(k, 1) + m * n))
+        if m:
+            memory[..., -m * n : memory.shape[-1] - (m - 1) * n] = change
+        return memory
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        if change.shape[:-1] != memory.shape[:-1]:  # one start for many runs, or many starts with the same inputs
+            shape = np.broadcast_shapes(change.shape[:-1], memory.shape[:-1])
+            memory = np.broadcast_to(memory, (*shape, memory.shape[-1]))
+            change = np.broadcast_to(change, (*shape, change.shape[-1]))
+        n, (k, m) = len(self.inputs), self.orders
+        phase = self._phase(memory)
+        total, own, past = (
+            memory[..., 1 : 1 + n],
+            memory[..., 1 + n : 1 + n + max(k, 1)],
+            memory[..., 1 + n + max(k, 1) :],
+        )
+        h = self.interval
+        ticks = math.floor((phase + dt) / h + EARLY)
+        if ticks == 0:
+            phase, total = phase + dt, total + dt * change
+        else:
+            mean = (total + (h - phase) * change) / h  # over the interval that ends at the first tick
+            for _ in range(min(ticks, m + 1)):
+                own, past = self._one(own, mean, past)
+                mean = change
+            if ticks > m + 1:
+                own = self._coast(own, np.concatenate([change, past], axis=-1), ticks - m - 1)
+            phase = min(max(phase + dt - ticks * h, -EARLY * h), h)  # bounds: rounding of a very long gap
+            total = phase * change
+        deviation = own[..., 0]
+        if phase > EARLY * h:
+            ahead = self._tick(np.concatenate([own[..., :k], total / phase, past], axis=-1))
+            deviation = deviation + (phase / h) * (ahead - deviation)
+        clock = np.full((*own.shape[:-1], 1), phase)
+        return np.concatenate([clock, total, own, past], axis=-1), deviation
+
+    def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Make one tick; return the own past and the inputs of the last m ticks, newest first."""
+        k, m = self.orders
+        value = self._tick(np.concatenate([own[..., :k], mean, past], axis=-1))
+        own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
+        return own, np.concatenate([mean, past], axis=-1)[..., : m * len(self.inputs)]
+
+    def _phase(self, memory: FloatArray) -> float:
+        """Return the time since the last tick."""
+        clocks = memory[..., 0]
+        if clocks.ndim == 0:
+            return float(clocks)
+        first = float(clocks.flat[0]) if clocks.size else 0.0
+        if (clocks != first).any():
+            raise InputError(f"model of {self.target}: the runs of a batch must have been started at the same time")
+        return first
+
+    def _regressor_names(self) -> list[str]:
+        """Return what `_tick` takes, such as ``dz(t-1)`` and ``n(t-2)``, the time being counted in ticks."""
+        k, m = self.orders
+        return [f"dz(t-{i})" for i in range(1, k + 1)] + [
+            f"{x.name}(t-{i})" if i else f"{x.name}(t)" for i in range(m + 1) for x in self.inputs
+        ]
+
+    def _every(self) -> str:
+        return f"; t in steps of {self.interval:g} s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Autoregressive(Ticking):
+    """dz(t) = intercept + sum_i a_i dz(t - ih) + sum over inputs j, sum_i b_ji n_j(t - ih) (P-01).
+
+    A polynomial that does not decay is refused: in free run it would run away.
+
+    Parameters
+    ----------
+    a : tuple of float
+        a_1 .. a_k, of the past deviations.
+    b : tuple of tuple of float
+        Per input, b_0 .. b_m [unit per unit of the input].
+    """
+
+    family: ClassVar[str] = "autoregressive"
+
+    a: tuple[float, ...]
+    b: tuple[tuple[float, ...], ...]
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        self._check_interval()
+        if len(self.b) != len(self.inputs) or not self.b or len({len(b) for b in self.b}) != 1 or not self.b[0]:
+            raise InputError(
+                f"{owner}: want b_0 .. b_m, equally many, for each of {len(self.inputs)} inputs: at least one"
+            )
+        check_finite(owner, a=self.a, intercept=self.intercept)
+        for b in self.b:
+            check_finite(owner, b=b)
+        largest = slowest(self.a)
+        if not largest < 1:
+            raise InputError(
+                f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, want < 1"
+            )
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Orders k and m."""
+        return len(self.a), len(self.b[0]) - 1
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        return np.concatenate([np.array(self.a, dtype=np.float64), np.array(self.b, dtype=np.float64).T.ravel()])
+
+    @cached_property
+    def _companion(self) -> FloatArray:
+        return companion(np.array(self.a or (0.0,), dtype=np.float64))
+
+    def _tick(self, regressors: FloatArray) -> FloatArray:
+        value: FloatArray = regressors @ self._weights + self.intercept
+        return value
+
+    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
+        # the rest from where it settles shrinks by the companion matrix
+        settled = (driven @ self._weights[len(self.a) :] + self.intercept) / (1.0 - sum(self.a))
+        rest = own - settled[..., None]
+        left: FloatArray = rest @ np.linalg.matrix_power(self._companion, ticks).T
+        return settled[..., None] + left
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+        return tuple(x.name for x, b in zip(self.inputs, self.b, strict=True) if any(b))
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return a_i as ``dz(t-i)`` and b_i as ``input(t-i)``; the time is counted in intervals."""
+        return {n: c for n, c in zip(self._regressor_names(), self._weights.tolist(), strict=True) if c != 0}
+
+    def formula(self) -> str:
+        """Return the model as one line of text."""
+        return super().formula() + self._every()
+
+
+@dataclass(frozen=True, kw_only=True)
+class AutoregressiveNet(Ticking):
+    """dz(t) = intercept + the output of a net for dz(t-h) .. dz(t-kh) and each input at t .. t-mh (P-03, E-P2).
+
+    The output must be a sigmoid or tanh: it cannot leave the ends of its scaling, so the free run cannot run away.
+
+    Parameters
+    ----------
+    k, m : int
+        How many past deviations, and how many past values of each input.
+    net : Perceptron
+        With one output; its inputs are dz(t-h) .. dz(t-kh), all inputs at t, all inputs at t-h, ...
+    input_scaling : Affine
+        Of the same, to what the net takes.
+    output_scaling : Affine
+        From what the net gives to the deviation [unit].
+    """
+
+    family: ClassVar[str] = "autoregressive-network"
+
+    k: int
+    m: int
+    net: Perceptron
+    input_scaling: Affine
+    output_scaling: Affine
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        self._check_interval()
+        check_finite(owner, intercept=self.intercept)
+        wanted = self.k + (self.m + 1) * len(self.inputs)
+        n_inputs, _, n_outputs = self.net.shape
+        if self.k < 0 or self.m < 0 or not self.inputs or not n_inputs == wanted == len(self.input_scaling.gain):
+            raise InputError(
+                f"{owner}: k = {self.k}, m = {self.m} and {len(self.inputs)} inputs want a net of {wanted} inputs; "
+                f"found {n_inputs}, and scaling of {len(self.input_scaling.gain)}"
+            )
+        if n_outputs != 1 or len(self.output_scaling.gain) != 1:
+            raise InputError(f"{owner}: want one output, found {n_outputs}")
+        if self.net.output == "identity":
+            raise InputError(f"{owner}: an identity output has no bounds: its free run could run away")
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Orders k and m."""
+        return self.k, self.m
+
+    def _tick(self, regressors: FloatArray) -> FloatArray:
+        scaled = self.net.evaluate(self.input_scaling(regressors))
+        return self.output_scaling(scaled)[..., 0] + self.intercept
+
+    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
+        past = driven[..., len(self.inputs) :]
+        for _ in range(min(ticks, MOST_TICKS)):
+            before = own
+            own, _ = self._one(own, driven[..., : len(self.inputs)], past)
+            if np.array_equal(own, before):
+                break
+        return own
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation: a weight that is not zero on the way out."""
+        out = np.array(self.net.output_weights[0]) != 0
+        reached = (np.array(self.net.hidden_weights)[out] != 0).any(axis=0) & (np.array(self.input_scaling.gain) != 0)
+        alive = reached[self.k :].reshape(self.m + 1, -1).any(axis=0) & (self.output_scaling.gain[0] != 0)
+        return tuple(x.name for x, used in zip(self.inputs, alive.tolist(), strict=True) if used)
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return all weights and thresholds; ``w(dz(t-1), h2)`` leads from the last deviation to hidden node 2."""
+        names, net = self._regressor_names(), self.net
+        found: dict[str, float] = {}
+        for j, (weights, threshold) in enumerate(zip(net.hidden_weights, net.hidden_thresholds, strict=True), start=1):
+            found |= {f"w({x}, h{j})": w for x, w in zip(names, weights, strict=True)}
+            found[f"th(h{j})"] = threshold
+        found |= {f"w(h{j}, out)": w for j, w in enumerate(net.output_weights[0], start=1)}
+        return found | {"th(out)": net.output_thresholds[0]}
+
+    def formula(self) -> str:
+        """Return the model as one line of text."""
+        shape = "-".join(map(str, self.net.shape))
+        kind = self.net.hidden if self.net.hidden == self.net.output else f"{self.net.hidden}-{self.net.output}"
+        constant = f"{self.intercept:.6g} + " if self.intercept else ""
+        return f"{constant}{kind} net {shape} of {', '.join(self._regressor_names())}{self._every()}"

@@ -1,0 +1,243 @@
+"""Network family: a net with one hidden layer; no memory."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+
+Activation = Literal["sigmoid", "tanh", "identity"]
+
+
+def sigmoid(net: FloatArray) -> FloatArray:
+    """Return 1 / (1 + exp(-net)) (C-25), written such that nothing overflows."""
+    return 0.5 + 0.5 * np.tanh(0.5 * net)
+
+
+_FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "sigmoid": sigmoid,
+    "tanh": np.tanh,
+    "identity": lambda net: net,
+}
+
+
+@dataclass(frozen=True)
+class Affine:
+    """Scaling of channels: gain * value + offset.
+
+    Parameters
+    ----------
+    gain, offset : tuple of float
+        One each per channel. A gain of 0 cuts the channel off.
+    """
+
+    gain: tuple[float, ...]
+    offset: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.gain) != len(self.offset):
+            raise InputError(f"scaling: {len(self.gain)} gains but {len(self.offset)} offsets")
+        check_finite("scaling", gain=self.gain, offset=self.offset)
+
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, FloatArray]:
+        return np.array(self.gain, dtype=np.float64), np.array(self.offset, dtype=np.float64)
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return `values`, of shape (..., n_channels), scaled."""
+        gain, offset = self._arrays
+        return values * gain + offset
+
+
+@dataclass(frozen=True)
+class Perceptron:
+    """Net with one hidden layer: OUT = F(NET), NET = sum x_i w_i + th, in both layers (Chen 1996, Eqs. 9-10; C-25).
+
+    Parameters
+    ----------
+    hidden_weights : tuple of tuple of float
+        Per hidden node, the weight of each input.
+    hidden_thresholds : tuple of float
+        One per hidden node.
+    output_weights : tuple of tuple of float
+        Per output, the weight of each hidden node.
+    output_thresholds : tuple of float
+        One per output.
+    hidden, output : {'sigmoid', 'tanh', 'identity'}
+        Activation function F of the hidden nodes and of the outputs.
+    """
+
+    hidden_weights: tuple[tuple[float, ...], ...]
+    hidden_thresholds: tuple[float, ...]
+    output_weights: tuple[tuple[float, ...], ...]
+    output_thresholds: tuple[float, ...]
+    hidden: Activation = "sigmoid"
+    output: Activation = "sigmoid"
+
+    def __post_init__(self) -> None:
+        n_inputs, n_hidden, n_outputs = self.shape
+        if n_hidden == 0 or n_outputs == 0 or n_hidden != len(self.hidden_weights):
+            raise InputError(
+                f"net: weights of {len(self.hidden_weights)} hidden nodes and {len(self.output_weights)} outputs, but "
+                f"thresholds of {n_hidden} and {n_outputs}; both layers need at least one node"
+            )
+        if any(len(w) != n_inputs for w in self.hidden_weights):
+            raise InputError(f"net: every hidden node wants {n_inputs} weights, one per input")
+        if len(self.output_weights) != n_outputs or any(len(w) != n_hidden for w in self.output_weights):
+            raise InputError(f"net: every one of {n_outputs} outputs wants {n_hidden} weights, one per hidden node")
+        for layer in (self.hidden, self.output):
+            if layer not in _FUNCTIONS:
+                raise InputError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
+        for w in (*self.hidden_weights, *self.output_weights):
+            check_finite("net", weights=w)
+        check_finite("net", thresholds=(*self.hidden_thresholds, *self.output_thresholds))
+
+    @classmethod
+    def of(
+        cls,
+        hidden_weights: FloatArray,
+        hidden_thresholds: FloatArray,
+        output_weights: FloatArray,
+        output_thresholds: FloatArray,
+        *,
+        hidden: Activation = "sigmoid",
+        output: Activation = "sigmoid",
+    ) -> "Perceptron":
+        """Make a net of arrays.
+
+        Parameters
+        ----------
+        hidden_weights : ndarray of shape (n_hidden, n_inputs)
+        hidden_thresholds : ndarray of shape (n_hidden,)
+        output_weights : ndarray of shape (n_outputs, n_hidden)
+        output_thresholds : ndarray of shape (n_outputs,)
+        hidden, output : {'sigmoid', 'tanh', 'identity'}
+
+        Returns
+        -------
+        Perceptron
+        """
+        return cls(
+            tuple(tuple(w) for w in hidden_weights.tolist()),
+            tuple(hidden_thresholds.tolist()),
+            tuple(tuple(w) for w in output_weights.tolist()),
+            tuple(output_thresholds.tolist()),
+            hidden,
+            output,
+        )
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of inputs, of hidden nodes and of outputs."""
+        n_inputs = len(self.hidden_weights[0]) if self.hidden_weights else 0
+        return n_inputs, len(self.hidden_thresholds), len(self.output_thresholds)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of weights and thresholds: 263 for Chen's 9-20-3 (C-26), 57 for his 5-8-1 (C-27)."""
+        n_inputs, n_hidden, n_outputs = self.shape
+        return (n_inputs + 1) * n_hidden + (n_hidden + 1) * n_outputs
+
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        # transposed once: (n_inputs, n_hidden) and (n_hidden, n_outputs)
+        return (
+            np.array(self.hidden_weights, dtype=np.float64).reshape(self.shape[1], -1).T.copy(),
+            np.array(self.hidden_thresholds, dtype=np.float64),
+            np.array(self.output_weights, dtype=np.float64).T.copy(),
+            np.array(self.output_thresholds, dtype=np.float64),
+        )
+
+    def evaluate(self, x: FloatArray) -> FloatArray:
+        """Return the outputs for scaled inputs.
+
+        Parameters
+        ----------
+        x : ndarray of shape (..., n_inputs)
+            Scaled.
+
+        Returns
+        -------
+        ndarray of shape (..., n_outputs)
+            Scaled.
+        """
+        first, first_thresholds, second, second_thresholds = self._arrays
+        inner = _FUNCTIONS[self.hidden](x @ first + first_thresholds)
+        return _FUNCTIONS[self.output](inner @ second + second_thresholds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Network(ErrorModel):
+    """Deviation = intercept + the one output of a net with one hidden layer (Chen 1996, section 4; C-25).
+
+    A sigmoid output cannot leave 0 to 1: the deviation saturates at the ends of its scaling, ``output_scaling.offset``
+    and ``offset + gain``, whatever the inputs.
+
+    Parameters
+    ----------
+    net : Perceptron
+        With one output.
+    input_scaling : Affine
+        From the inputs minus their reference to what the net takes.
+    output_scaling : Affine
+        From what the net gives to the deviation [unit].
+    """
+
+    family: ClassVar[str] = "network"
+    remembers: ClassVar[bool] = False
+
+    net: Perceptron
+    input_scaling: Affine
+    output_scaling: Affine
+
+    def _check(self) -> None:
+        owner = f"model of {self.target}"
+        n_inputs, _, n_outputs = self.net.shape
+        if n_inputs != len(self.inputs) or n_inputs != len(self.input_scaling.gain):
+            raise InputError(
+                f"{owner}: {len(self.inputs)} inputs, scaling of {len(self.input_scaling.gain)} and a net that takes "
+                f"{n_inputs}: must be equally many"
+            )
+        if n_outputs != 1 or len(self.output_scaling.gain) != 1:
+            raise InputError(
+                f"{owner}: a net of {n_outputs} outputs with scaling of {len(self.output_scaling.gain)}: want 1; make "
+                "one model of each output"
+            )
+        check_finite(owner, intercept=self.intercept)
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return np.empty((*change.shape[:-1], 0))
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        scaled = self.net.evaluate(self.input_scaling(change))
+        return memory, self.output_scaling(scaled)[..., 0] + self.intercept
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation: a weight that is not zero on the way out."""
+        first, _, second, _ = self.net._arrays
+        reached = (first != 0) & (second[:, 0] != 0)
+        alive = reached.any(axis=1) & (np.array(self.input_scaling.gain) != 0) & (self.output_scaling.gain[0] != 0)
+        return tuple(x.name for x, used in zip(self.inputs, alive.tolist(), strict=True) if used)
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return all weights and thresholds; ``w(T1, h2)`` leads from input T1 to the second hidden node."""
+        net = self.net
+        found: dict[str, float] = {}
+        for j, (weights, threshold) in enumerate(zip(net.hidden_weights, net.hidden_thresholds, strict=True), start=1):
+            found |= {f"w({x.name}, h{j})": w for x, w in zip(self.inputs, weights, strict=True)}
+            found[f"th(h{j})"] = threshold
+        found |= {f"w(h{j}, out)": w for j, w in enumerate(net.output_weights[0], start=1)}
+        return found | {"th(out)": net.output_thresholds[0]}
+
+    def formula(self) -> str:
+        """Return the model as one line of text, such as ``sigmoid net 9-20-1 of T1 .. T9``."""
+        kind = self.net.hidden if self.net.hidden == self.net.output else f"{self.net.hidden}-{self.net.output}"
+        names = [x.name for x in self.inputs]
+        listed = f"{names[0]} .. {names[-1]}" if len(names) > 3 else ", ".join(names) or "nothing"
+        text = f"{kind} net {'-'.join(map(str, self.net.shape))} of {listed}"
+        return f"{self.intercept:.6g} + {text}" if self.intercept else text

@@ -1,0 +1,180 @@
+"""Nets with one hidden layer trained by backpropagation (Chen 1996, section 4), and the scaling they need."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.network import Affine, Perceptron
+
+FloatArray = NDArray[np.float64]
+
+#: range that inputs and targets are scaled to (C-28)
+LOW, HIGH = 0.1, 0.9
+#: bound of the initial weights (C-29)
+INITIAL = 0.3
+
+
+def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
+    """Return the scaling of channels from their ranges to 0.1 .. 0.9 (C-28).
+
+    A channel whose range is nothing but rounding is constant: it becomes 0.5 for ever, so the net cannot react to it.
+
+    Parameters
+    ----------
+    low, high : ndarray of shape (n_channels,)
+
+    Returns
+    -------
+    Affine
+    """
+    still = constant(low, high)
+    gain = np.where(still, 0.0, (HIGH - LOW) / np.where(still, 1.0, high - low))
+    return Affine(tuple(gain.tolist()), tuple(np.where(still, 0.5, LOW - gain * low).tolist()))
+
+
+def scaling_out(low: FloatArray, high: FloatArray) -> Affine:
+    """Return the scaling of channels from 0.1 .. 0.9 back to their ranges; a constant one gets its value.
+
+    Parameters
+    ----------
+    low, high : ndarray of shape (n_channels,)
+
+    Returns
+    -------
+    Affine
+    """
+    still = constant(low, high)
+    gain = np.where(still, 0.0, (high - low) / (HIGH - LOW))
+    return Affine(tuple(gain.tolist()), tuple(np.where(still, low, low - gain * LOW).tolist()))
+
+
+def constant(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
+    """Return which channels have no range but rounding."""
+    return np.asarray(high - low <= 1e-12 * np.maximum(np.abs(low), np.abs(high)))
+
+
+def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> FloatArray:
+    """Return the learning rate of each epoch; it falls at every epoch from `start` to `end`.
+
+    Parameters
+    ----------
+    n_epochs : int
+    start, end : float
+        Equal ones give a constant rate.
+    schedule : {'geometric', 'harmonic'}
+        By the same factor at every epoch; or like 1 / (1 + c epoch), which is soon small and then falls slowly.
+
+    Returns
+    -------
+    ndarray of shape (n_epochs,)
+
+    Raises
+    ------
+    InputError
+        Unless ``start >= end > 0`` and there is an epoch.
+    """
+    if n_epochs < 1 or not 0 < end <= start < np.inf:
+        raise InputError(
+            f"{n_epochs} epochs with learning rates from {start} to {end}: want at least one epoch and start >= end > 0"
+        )
+    part = np.linspace(0.0, 1.0, n_epochs)
+    if schedule == "geometric":
+        return np.asarray(start * (end / start) ** part)
+    if schedule == "harmonic":
+        return np.asarray(start / (1.0 + (start / end - 1.0) * part))
+    raise InputError(f"learning rate schedule {schedule!r}: known are geometric and harmonic")
+
+
+@dataclass(frozen=True)
+class TrainedNet:
+    """What `train_net` gives.
+
+    Parameters
+    ----------
+    net : Perceptron
+        From scaled inputs to scaled outputs.
+    losses : ndarray of shape (n_epochs run,)
+        Mean of the squared errors in each epoch [scaled units]; each pattern's error is taken before the weights
+        change for it.
+    """
+
+    net: Perceptron
+    losses: FloatArray
+
+
+def train_net(
+    inputs: FloatArray,
+    targets: FloatArray,
+    n_hidden: int,
+    *,
+    rng: np.random.Generator,
+    rates: FloatArray,
+    update: Literal["pattern", "batch"] = "pattern",
+    order: Literal["shuffled", "fixed"] = "shuffled",
+    momentum: float = 0.0,
+    goal: float = 0.0,
+) -> TrainedNet:
+    """Train a net with sigmoids in both layers by backpropagation (C-25 to C-30).
+
+    The interpreter is free while it runs, so nets can be trained in threads.
+
+    Parameters
+    ----------
+    inputs : ndarray of shape (n_patterns, n_inputs)
+        Scaled, see `scaling_in`.
+    targets : ndarray of shape (n_patterns, n_outputs)
+        Scaled.
+    n_hidden : int
+        Number of hidden nodes.
+    rng : numpy.random.Generator
+        Draws the initial weights and thresholds, uniform in -0.3 .. 0.3 (C-29), and what shuffles the patterns.
+    rates : ndarray of shape (n_epochs,)
+        Learning rate of each epoch, see `learning_rates`.
+    update : {'pattern', 'batch'}
+        Change the weights after every pattern; or once an epoch, by the mean over the patterns (C-30).
+    order : {'shuffled', 'fixed'}
+        Patterns in a new random order in every epoch, or as they come. As they come, the rows of a drift test are
+        nearly the same for a long time, and a net that learns at a rate of 0.5 forgets the morning by the evening.
+    momentum : float
+        Part of the previous change that is added to the next one.
+    goal : float
+        Stop after the first epoch with a loss not above this.
+
+    Returns
+    -------
+    TrainedNet
+
+    Raises
+    ------
+    FitError
+        `inputs` and `targets` are no tables of equally many rows, or hold numbers that are not finite.
+    InputError
+        A setting is out of its range.
+    """
+    from thermocomp.models.kernels import backprop  # numba takes long to import
+
+    inputs, targets = (np.ascontiguousarray(a, dtype=np.float64) for a in (inputs, targets))
+    if inputs.ndim != 2 or targets.ndim != 2 or not 0 < len(inputs) == len(targets) or targets.shape[1] == 0:
+        raise FitError(f"net: inputs of shape {inputs.shape} and targets of shape {targets.shape}; want as many rows")
+    if not (np.isfinite(inputs).all() and np.isfinite(targets).all()):
+        raise FitError("net: inputs and targets must be finite numbers")
+    if n_hidden < 1:
+        raise InputError(f"{n_hidden} hidden nodes: want at least one")
+    if update not in ("pattern", "batch") or order not in ("shuffled", "fixed") or not 0 <= momentum < 1:
+        raise InputError(
+            f"update {update!r}, order {order!r}, momentum {momentum}: want 'pattern' or 'batch', 'shuffled' or "
+            "'fixed', and 0 <= momentum < 1"
+        )
+    n_inputs, n_outputs = inputs.shape[1], targets.shape[1]
+    split = (n_inputs + 1) * n_hidden
+    weights = rng.uniform(-INITIAL, INITIAL, split + n_outputs * (n_hidden + 1))
+    seed = rng.integers(2**64, dtype=np.uint64)
+    losses = backprop.train(
+        weights, n_hidden, inputs, targets, rates, momentum, update == "batch", order == "shuffled", seed, goal
+    )
+    first = weights[:split].reshape(n_inputs + 1, n_hidden)
+    second = weights[split:-n_outputs].reshape(n_outputs, n_hidden)
+    return TrainedNet(Perceptron.of(first[1:].T, first[0], second, weights[-n_outputs:]), losses)

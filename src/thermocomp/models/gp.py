@@ -1,0 +1,128 @@
+"""`gp`: Gaussian process regression."""
+
+import warnings
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
+from sklearn.utils.validation import validate_data
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.shrinkage import scaling
+from thermocomp.models.unfrozen import UnfrozenRegressor
+
+FloatArray = NDArray[np.float64]
+
+_CHUNK = 2_000  # rows predicted at once: bounds the memory
+
+
+class GaussianProcess(UnfrozenRegressor):
+    """Gaussian process regression (Rasmussen and Williams 2006) on standardised inputs.
+
+    scikit-learn's `GaussianProcessRegressor`: a plane, a smooth deviation from it (squared-exponential kernel, one
+    length for all inputs) and white noise, weighed by their likelihood from one start, so that the same data give the
+    same model. The likelihood takes rows as independent, which those of a drift test are not. It needs its training
+    rows to predict, so it cannot be frozen.
+
+    Parameters
+    ----------
+    max_rows : int
+        Rows that are learned from, thinned evenly: the fit grows with their cube.
+
+    Attributes
+    ----------
+    kernel_ : sklearn.gaussian_process.kernels.Kernel
+        With what was found; the inputs and the deviation standardised.
+    n_rows_ : int
+        Rows that were learned from.
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range: of all rows given to `fit`.
+    """
+
+    name: ClassVar[str] = "gp"
+
+    def __init__(self, *, max_rows: int = 500) -> None:
+        self.max_rows = max_rows
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "GaussianProcess":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        GaussianProcess
+
+        Raises
+        ------
+        InputError
+            `max_rows` is less than 2.
+        """
+        if self.max_rows < 2:
+            raise InputError(f"max_rows {self.max_rows}: want at least 2")
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        change: FloatArray = checked[0]
+        deviation = np.asarray(checked[1], dtype=np.float64)
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        rows = np.linspace(0, len(change) - 1, min(self.max_rows, len(change))).round().astype(np.intp)
+        self.n_rows_ = len(rows)
+        self._centre, self._scale = scaling(change[rows])
+        process = GaussianProcessRegressor(
+            ConstantKernel(1.0, (1e-4, 1e4)) * RBF(np.sqrt(change.shape[1]), (1e-1, 1e3))
+            + ConstantKernel(1.0, (1e-6, 1e4)) * DotProduct(1.0, "fixed")
+            + WhiteKernel(1e-2, (1e-6, 1e1))
+        )
+        (mean,), (spread,) = scaling(deviation[rows, None])
+        spread = spread if np.isfinite(spread) else 1.0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)  # a part that is not needed ends at its bound
+            process.fit((change[rows] - self._centre) / self._scale, (deviation[rows] - mean) / spread)
+        self.kernel_ = process.kernel_
+        self._prepare(process, mean, spread)
+        return self
+
+    def _prepare(self, process: GaussianProcessRegressor, mean: float, spread: float) -> None:
+        """Collect what a prediction needs: the plane as coefficients, the rest as a sum over the training rows."""
+        smooth, plane = process.kernel_.k1.k1, process.kernel_.k1.k2
+        rows: FloatArray = process.X_train_
+        alpha: FloatArray = spread * process.alpha_
+        slope = plane.k1.constant_value
+        self._plane = slope * (alpha @ rows)
+        self._level = mean + slope * plane.k2.sigma_0**2 * float(alpha.sum())
+        self._length = float(smooth.k2.length_scale)
+        self._rows = rows / self._length
+        self._weights = smooth.k1.constant_value * alpha
+
+    def evaluate(self, change: FloatArray) -> FloatArray:
+        """Predict for rows that were checked before.
+
+        Parameters
+        ----------
+        change : ndarray of shape (n_rows, n_features)
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        Z = (change - self._centre) / self._scale
+        deviation = Z @ self._plane + self._level
+        half = 0.5 * np.einsum("ij,ij->i", self._rows, self._rows)
+        for start in range(0, len(Z), _CHUNK):
+            part = Z[start : start + _CHUNK] / self._length
+            exponent = part @ self._rows.T  # minus half the squared distance, term by term
+            exponent -= half
+            exponent -= 0.5 * np.einsum("ij,ij->i", part, part)[:, None]
+            deviation[start : start + _CHUNK] += np.exp(exponent, out=exponent) @ self._weights
+        return np.asarray(deviation)
+
+    def _bulk(self) -> str:
+        numbers = self._rows.size + self._weights.size
+        return f"it carries its {self.n_rows_} training rows along ({numbers} numbers)"

@@ -1,0 +1,140 @@
+"""`lasso` and `elastic-net`: regressions that drop inputs by themselves."""
+
+import warnings
+from abc import abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import enet_path
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
+
+FloatArray = NDArray[np.float64]
+
+#: shares of the strength at which the last input drops out
+SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
+_TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; a change of either moves no figure
+
+
+class _Sparse(ShrunkRegressor):
+    """Linear regression with a penalty on the coefficients' absolute values."""
+
+    strengths: Sequence[float]
+
+    @abstractmethod
+    def _ratios(self) -> tuple[float, ...]:
+        """Return the shares of the absolute values in the penalty."""
+
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        shares, ratios = sorted_strengths(self.strengths), self._ratios()
+        steepest = float(np.abs(y @ Z).max()) / len(y)
+        paths = np.zeros((len(ratios), shares.size, Z.shape[1]))
+        if steepest == 0:  # nothing to follow
+            return paths
+        for path, ratio in zip(paths, ratios, strict=True):
+            with warnings.catch_warnings():
+                # a strength so small that it does not converge is judged on the cycles left out like any other
+                warnings.simplefilter("ignore", ConvergenceWarning)
+                path[:] = enet_path(
+                    Z, y, l1_ratio=ratio, alphas=shares * (steepest / ratio), tol=_TOL, max_iter=_SWEEPS
+                )[1].T
+        return paths
+
+    def _note(self, which: int, setting: int) -> None:
+        self.l1_ratio_ = self._ratios()[which]
+        self.strength_ = float(sorted_strengths(self.strengths)[setting])
+
+    @property
+    def selected_(self) -> tuple[str, ...]:
+        """Names of the inputs that were not dropped."""
+        return tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c != 0)
+
+
+class Lasso(_Sparse):
+    """The lasso (Tibshirani 1996) on standardised inputs: a selector and a regression in one.
+
+    scikit-learn's coordinate descent along the whole path; the strength is chosen by leaving thermal cycles out.
+
+    Parameters
+    ----------
+    strengths : sequence of float
+        To choose from, as shares of the strength at which the last input drops out.
+    rule : {'one-standard-error', 'minimum'}
+        How the strength is chosen.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+
+    Attributes
+    ----------
+    strength_ : float
+        Chosen strength.
+    selected_ : tuple of str
+        Names of the inputs that were not dropped.
+    cv_rms_, chosen_by_ : float, str
+        See `thermocomp.models.shrinkage.ShrunkRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        strengths: Sequence[float] = SHARES,
+        rule: Rule = "one-standard-error",
+        fit_intercept: bool = True,
+    ) -> None:
+        self.strengths = strengths
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+
+    def _ratios(self) -> tuple[float, ...]:
+        return (1.0,)
+
+
+class ElasticNet(_Sparse):
+    """The elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
+
+    scikit-learn's coordinate descent along the whole path; strength and share are chosen by leaving thermal cycles out.
+
+    Parameters
+    ----------
+    l1_ratios : sequence of float
+        Shares of the absolute values in the penalty to choose from; the rest are squares. 1 is the lasso.
+    strengths : sequence of float
+        To choose from, as shares of the strength at which the last input drops out.
+    rule : {'one-standard-error', 'minimum'}
+        How the strength is chosen, within the best share.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+
+    Attributes
+    ----------
+    l1_ratio_ : float
+        Chosen share.
+    strength_ : float
+        Chosen strength.
+    selected_ : tuple of str
+        Names of the inputs that were not dropped.
+    cv_rms_, chosen_by_ : float, str
+        See `thermocomp.models.shrinkage.ShrunkRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        l1_ratios: Sequence[float] = (0.1, 0.5, 0.9),
+        strengths: Sequence[float] = SHARES,
+        rule: Rule = "one-standard-error",
+        fit_intercept: bool = True,
+    ) -> None:
+        self.l1_ratios = l1_ratios
+        self.strengths = strengths
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+
+    def _ratios(self) -> tuple[float, ...]:
+        ratios = tuple(float(r) for r in self.l1_ratios)
+        if not ratios or not all(0 < r <= 1 for r in ratios):
+            raise InputError(f"l1_ratios {self.l1_ratios}: want numbers above 0 and up to 1")
+        return ratios

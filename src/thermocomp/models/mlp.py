@@ -1,0 +1,251 @@
+"""`mlp`: Chen's net, sigmoids in both layers, trained by backpropagation (Chen, Yuan, Ni 1996, section 4)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.network import Affine
+from thermocomp.models import ridge
+from thermocomp.models.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
+from thermocomp.models.nets import NetRegressor, thinned
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: hidden counts in a row that bring no gain and end a sweep
+PATIENCE = 2
+
+
+@dataclass(frozen=True)
+class HiddenCount:
+    """One step of a sweep over the number of hidden nodes.
+
+    Parameters
+    ----------
+    n_hidden : int
+    rms : tuple of float
+        Of the residual in each cycle that was left out, over all outputs [unit of y].
+    """
+
+    n_hidden: int
+    rms: tuple[float, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean over the cycles."""
+        return float(np.mean(self.rms))
+
+    @property
+    def standard_error(self) -> float:
+        """Standard error of `mean`."""
+        return float(np.std(self.rms, ddof=1) / np.sqrt(len(self.rms))) if len(self.rms) > 1 else 0.0
+
+
+class SigmoidNet(NetRegressor):
+    """Chen's artificial neural network: i-h-o with sigmoids in hidden nodes and outputs, trained by backpropagation.
+
+    Inputs and targets are scaled to 0.1 .. 0.9 (C-28), a channel that does not change to 0.5. As a sigmoid stays
+    between 0 and 1, a prediction cannot leave the range of y by more than an eighth of it at either end: the net
+    saturates where others extrapolate.
+
+    Initial weights are uniform in -0.3 .. 0.3 (C-29). Chen starts with a learning rate of 0.5 and decreases it
+    continuously, he does not say how: here it falls to `final_learning_rate` by `schedule`. Nor does he say in which
+    order the patterns come, or how many epochs he ran.
+
+    Parameters
+    ----------
+    hidden : int or sequence of int
+        Number of hidden nodes; 20 is Chen's for the spindle drifts, 8 for the slope (C-26, C-27). Of several numbers
+        the best is chosen by leaving out whole thermal cycles of the data given to `fit`: they are tried in rising
+        order until two in a row bring no gain, and the smallest is taken whose mean RMS is within one standard error
+        of the best.
+    n_epochs : int
+        How often each pattern is seen.
+    learning_rate, final_learning_rate : float
+        In the first and in the last epoch.
+    schedule : {'geometric', 'harmonic'}
+        See `thermocomp.models.backprop.learning_rates`.
+    update : {'pattern', 'batch'}
+        Change the weights after every pattern, Chen's choice; or once an epoch, by the mean over all patterns (C-30).
+    order : {'shuffled', 'fixed'}
+        Of the patterns, see `thermocomp.models.backprop.train_net`.
+    momentum : float
+        Part of the previous change of the weights that is added to the next; Chen has none.
+    scaling : {'channel', 'common'}
+        Scale each input by its own range, which Chen found to be better; or all by the range they have together.
+        Targets are always scaled each by its own.
+    max_patterns : int
+        Of more rows than these only so many are learned, spread evenly in time: neighbours in a drift test are nearly
+        the same, and time goes with their number.
+    goal : float
+        Stop after the first epoch whose loss is not above this; see `loss_history_`.
+    seed : int
+        Of initial weights and order.
+    jobs : int
+        Threads of a sweep; -1 for all cores.
+
+    Attributes
+    ----------
+    n_hidden_ : int
+        Number of hidden nodes.
+    loss_history_ : ndarray of shape (n_epochs run,)
+        Mean of the squared errors in each epoch [scaled units], taken while the weights change.
+    sweep_ : tuple of HiddenCount
+        What was tried; empty if `hidden` is one number.
+    chosen_by_ : str
+        What was left out to choose.
+    net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
+        See `thermocomp.models.nets.NetRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        hidden: int | Sequence[int] = 20,
+        n_epochs: int = 5000,
+        learning_rate: float = 0.5,
+        final_learning_rate: float = 0.01,
+        schedule: Literal["geometric", "harmonic"] = "geometric",
+        update: Literal["pattern", "batch"] = "pattern",
+        order: Literal["shuffled", "fixed"] = "shuffled",
+        momentum: float = 0.0,
+        scaling: Literal["channel", "common"] = "channel",
+        max_patterns: int = 2000,
+        goal: float = 0.0,
+        seed: int = 0,
+        jobs: int = -1,
+    ) -> None:
+        self.hidden = hidden
+        self.n_epochs = n_epochs
+        self.learning_rate = learning_rate
+        self.final_learning_rate = final_learning_rate
+        self.schedule = schedule
+        self.update = update
+        self.order = order
+        self.momentum = momentum
+        self.scaling = scaling
+        self.max_patterns = max_patterns
+        self.goal = goal
+        self.seed = seed
+        self.jobs = jobs
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        cycle: ArrayLike | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> "SigmoidNet":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,) or (n_rows, n_outputs)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row, by which the number of hidden nodes is chosen; rows of cycle -1 are not learned.
+            Without it five stretches of equal length take the place of the cycles.
+        progress : callable, optional
+            Is told what a sweep has found so far. A sweep that is interrupted (KeyboardInterrupt) after its first
+            count goes on with what it has, and says so in `chosen_by_`.
+
+        Returns
+        -------
+        SigmoidNet
+
+        Raises
+        ------
+        FitError
+            No row to learn from.
+        InputError
+            A setting is out of its range.
+        """
+        change, deviation = self._read(X, y)
+        folds, left_out = ridge.number_folds(cycle, len(change))
+        learned = folds >= 0
+        change, deviation, folds = change[learned], deviation[learned], folds[learned]
+        self.sweep_: tuple[HiddenCount, ...] = ()
+        if np.ndim(self.hidden):
+            self._sweep(change, deviation, folds, left_out, progress)
+        else:
+            self.n_hidden_, self.chosen_by_ = int(np.asarray(self.hidden)), "given"
+        trained, into, out_of = self._trained(change, deviation, self.n_hidden_, np.random.default_rng(self.seed))
+        self.loss_history_ = trained.losses
+        self._keep(trained.net, into, out_of, change, deviation, min(len(change), self.max_patterns))
+        return self
+
+    def _trained(
+        self, X: FloatArray, y: FloatArray, n_hidden: int, rng: np.random.Generator
+    ) -> tuple[TrainedNet, Affine, Affine]:
+        """Train a net; return it, the scaling of its inputs and that of its outputs."""
+        into, out_of = self._input_scaling(X), scaling_out(y.min(axis=0), y.max(axis=0))
+        rows = thinned(len(X), self.max_patterns)
+        trained = train_net(
+            into(X[rows]),
+            scaling_in(y.min(axis=0), y.max(axis=0))(y[rows]),
+            n_hidden,
+            rng=rng,
+            rates=learning_rates(self.n_epochs, self.learning_rate, self.final_learning_rate, self.schedule),
+            update=self.update,
+            order=self.order,
+            momentum=self.momentum,
+            goal=self.goal,
+        )
+        return trained, into, out_of
+
+    def _input_scaling(self, X: FloatArray) -> Affine:
+        low, high = X.min(axis=0), X.max(axis=0)
+        if self.scaling == "common":
+            moving = ~constant(low, high)
+            if moving.any():
+                low[moving], high[moving] = low[moving].min(), high[moving].max()
+        elif self.scaling != "channel":
+            raise InputError(f"scaling {self.scaling!r}: known are channel and common")
+        return scaling_in(low, high)
+
+    def _sweep(
+        self,
+        X: FloatArray,
+        y: FloatArray,
+        folds: IntArray,
+        left_out: str,
+        progress: Callable[[str], None] | None,
+    ) -> None:
+        """Choose the number of hidden nodes (C-26)."""
+        counts = sorted({int(h) for h in np.atleast_1d(np.asarray(self.hidden))})
+        if not counts:
+            raise InputError("hidden: no number of hidden nodes to choose from")
+
+        def rms(n_hidden: int, fold: int) -> float:
+            rest, mine = folds != fold, folds == fold
+            rng = np.random.default_rng([self.seed, n_hidden, fold])
+            trained, into, out_of = self._trained(X[rest], y[rest], n_hidden, rng)
+            residual = y[mine] - out_of(trained.net.evaluate(into(X[mine])))
+            return float(np.sqrt(np.mean(residual**2)))
+
+        tried: list[HiddenCount] = []
+        self.chosen_by_ = left_out
+        numbers = range(int(folds.max()) + 1)
+        try:
+            with Parallel(n_jobs=self.jobs, prefer="threads") as pool:
+                for n_hidden in counts:
+                    tried.append(HiddenCount(n_hidden, tuple(pool(delayed(rms)(n_hidden, k) for k in numbers))))
+                    if progress is not None:
+                        progress(f"{n_hidden} hidden nodes: RMS {tried[-1].mean:.4g} in {left_out}")
+                    if len(tried) - 1 - int(np.argmin([t.mean for t in tried])) >= PATIENCE:
+                        break
+        except KeyboardInterrupt:
+            if not tried:
+                raise
+            self.chosen_by_ += f"; interrupted after {tried[-1].n_hidden} hidden nodes"
+        best = min(tried, key=lambda t: t.mean)
+        self.sweep_ = tuple(tried)
+        self.n_hidden_ = min(t.n_hidden for t in tried if t.mean <= best.mean + best.standard_error)

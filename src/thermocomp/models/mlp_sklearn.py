@@ -1,0 +1,122 @@
+"""`mlp-sklearn`: the net of scikit-learn, to compare with."""
+
+import warnings
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from sklearn.exceptions import ConvergenceWarning
+
+from thermocomp.core.network import Activation, Affine, Perceptron
+from thermocomp.models.backprop import constant
+from thermocomp.models.nets import FloatArray, NetRegressor, thinned
+
+_NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
+
+
+class SklearnNet(NetRegressor):
+    """`sklearn.neural_network.MLPRegressor` with one hidden layer, inputs and targets standardised.
+
+    Its output is linear: beyond the trained range it goes on where Chen's net saturates. A channel that does not
+    change is cut off.
+
+    Parameters
+    ----------
+    hidden : int
+        Number of hidden nodes.
+    activation : {'logistic', 'tanh'}
+        Of the hidden nodes.
+    solver : {'lbfgs', 'adam', 'sgd'}
+    alpha : float
+        Strength of the penalty on squared weights.
+    max_iter : int
+        Most iterations of the solver.
+    max_patterns : int
+        Of more rows than these only so many are learned, spread evenly in time.
+    seed : int
+        Of initial weights and order.
+
+    Attributes
+    ----------
+    converged_ : bool
+        False: the solver gave up, and `caution_` says so.
+    n_iter_ : int
+        Iterations of the solver.
+    net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
+        See `thermocomp.models.nets.NetRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        hidden: int = 20,
+        activation: Literal["logistic", "tanh"] = "logistic",
+        solver: Literal["lbfgs", "adam", "sgd"] = "lbfgs",
+        alpha: float = 1e-4,
+        max_iter: int = 1000,
+        max_patterns: int = 2000,
+        seed: int = 0,
+    ) -> None:
+        self.hidden = hidden
+        self.activation = activation
+        self.solver = solver
+        self.alpha = alpha
+        self.max_iter = max_iter
+        self.max_patterns = max_patterns
+        self.seed = seed
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "SklearnNet":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,) or (n_rows, n_outputs)
+            Deviation.
+
+        Returns
+        -------
+        SklearnNet
+        """
+        from sklearn.neural_network import MLPRegressor  # not needed by the other methods, and slow to import
+
+        change, deviation = self._read(X, y)
+        (gain, offset, _), (out_gain, out_offset, unit) = _standard(change), _standard(deviation)
+        into = Affine(tuple(gain.tolist()), tuple(offset.tolist()))
+        rows = thinned(len(change), self.max_patterns)
+        targets = deviation[rows] * out_gain + out_offset
+        peer = MLPRegressor(
+            hidden_layer_sizes=(self.hidden,),
+            activation=self.activation,
+            solver=self.solver,
+            alpha=self.alpha,
+            max_iter=self.max_iter,
+            random_state=self.seed,
+        )
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ConvergenceWarning)
+            peer.fit(into(change[rows]), targets[:, 0] if targets.shape[1] == 1 else targets)
+        unfinished = [w for w in caught if issubclass(w.category, ConvergenceWarning)]
+        for other in caught:
+            if other not in unfinished:
+                warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)
+        (first, second), (first_thresholds, second_thresholds) = peer.coefs_, peer.intercepts_
+        net = Perceptron.of(
+            first.T, first_thresholds, second.T, second_thresholds, hidden=_NAMES[self.activation], output="identity"
+        )
+        out_of = Affine(tuple(unit.tolist()), tuple(deviation.mean(axis=0).tolist()))
+        self._keep(net, into, out_of, change, deviation, rows.size)
+        self.converged_, self.n_iter_ = not unfinished, int(peer.n_iter_)
+        if unfinished:
+            first_line = str(unfinished[0].message).splitlines()[0].rstrip(":.")
+            self.caution_ = "; ".join(filter(None, [f"scikit-learn's solver gave up: {first_line}", self.caution_]))
+        return self
+
+
+def _standard(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return gain and offset to mean 0 and standard deviation 1, and that deviation; all 0 for what is constant."""
+    still = constant(values.min(axis=0), values.max(axis=0))
+    deviation = np.where(still, 0.0, values.std(axis=0))
+    gain = 1.0 / np.where(still, np.inf, deviation)
+    return gain, -gain * values.mean(axis=0), deviation

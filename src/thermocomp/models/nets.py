@@ -1,0 +1,161 @@
+"""What the nets share, whoever trains them: reading, scaling, the caution about too many weights, and `freeze`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import Tags
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.network import Affine, Network, Perceptron
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.leastsquares import effective_sample_size
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+class NetRegressor(ThermalRegressor):
+    """A net with one hidden layer; one for several outputs at once, if y has several columns.
+
+    Attributes
+    ----------
+    net_ : Perceptron
+        From scaled inputs to scaled outputs.
+    input_scaling_, output_scaling_ : Affine
+        To what the net takes, and from what it gives.
+    n_parameters_ : int
+        Number of weights and thresholds.
+    n_patterns_ : int
+        Number of rows that were learned.
+    n_effective_ : float
+        How many independent rows they stand for, by the autocorrelation of the residual (E-C12); of several outputs,
+        the smallest.
+    caution_ : str
+        What speaks against trusting the net, above all more parameters than independent rows (C-27); else empty.
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range.
+    """
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,) or (n_rows, n_outputs)
+            As y in `fit`.
+        """
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        deviation = self.output_scaling_(self.net_.evaluate(self.input_scaling_(change)))
+        return deviation[:, 0] if self._one_dimensional else deviation
+
+    def freeze(
+        self,
+        *,
+        target: str,
+        unit: str = "um",
+        inputs: Sequence[Input] | None = None,
+        support: Support = Support(),
+        provenance: Provenance | None = None,
+        output: int | None = None,
+    ) -> Network:
+        """Return one output of the fitted net as plain numbers, without the inputs that never changed in training.
+
+        Parameters
+        ----------
+        target : str
+            Displacement channel (or error component) it predicts.
+        unit : str
+            Unit of the deviation it gives.
+        inputs : sequence of Input, optional
+            One per feature; see `ThermalRegressor.freeze`.
+        support : Support
+            What the model does outside its trained range.
+        provenance : Provenance, optional
+            Where it comes from.
+        output : int, optional
+            Column of y; must be given if y had several. Each column makes a model of its own.
+
+        Returns
+        -------
+        Network
+
+        Raises
+        ------
+        InputError
+            `inputs` are not as many as the features, or there is no such output.
+        """
+        header = {"target": target, "unit": unit, "support": support, "provenance": provenance}
+        return self._frozen(self._inputs(inputs), header, output)
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any], output: int | None = None) -> Network:
+        net, into, out_of = self.net_, self.input_scaling_, self.output_scaling_
+        n_outputs = net.shape[2]
+        if output is None and n_outputs == 1:
+            output = 0
+        if output is None or not 0 <= output < n_outputs:
+            raise InputError(
+                f"output {output}: the net has {n_outputs}; freeze each on its own, with output=0 .. {n_outputs - 1}"
+            )
+        # an input of gain 0 is as good as a part of the thresholds
+        kept = [i for i, gain in enumerate(into.gain) if gain != 0 and out_of.gain[output] != 0]
+        weights = np.array(net.hidden_weights)
+        fixed = np.where(np.isin(np.arange(weights.shape[1]), kept), 0.0, into.offset)
+        return Network(
+            **header,
+            inputs=tuple(inputs[i] for i in kept),
+            net=Perceptron.of(
+                weights[:, kept],
+                np.array(net.hidden_thresholds) + weights @ fixed,
+                np.array(net.output_weights[output : output + 1]),
+                np.array(net.output_thresholds[output : output + 1]),
+                hidden=net.hidden,
+                output=net.output,
+            ),
+            input_scaling=Affine(tuple(into.gain[i] for i in kept), tuple(into.offset[i] for i in kept)),
+            output_scaling=Affine(out_of.gain[output : output + 1], out_of.offset[output : output + 1]),
+        )
+
+    def __sklearn_tags__(self) -> Tags:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.multi_output = True
+        return tags
+
+    # -- for those who train -----------------------------------------------------------------------------------------
+
+    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Check the training data; return X, and y as a table of shape (n_rows, n_outputs)."""
+        checked = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        deviation = np.asarray(checked[1], dtype=np.float64)
+        self._one_dimensional = deviation.ndim == 1
+        return checked[0], deviation.reshape(len(deviation), -1)
+
+    def _keep(self, net: Perceptron, into: Affine, out_of: Affine, X: FloatArray, y: FloatArray, n_rows: int) -> None:
+        """Note the net, and how it stands to the `n_rows` patterns taken from X and y."""
+        self.net_, self.input_scaling_, self.output_scaling_ = net, into, out_of
+        self.data_min_, self.data_max_ = X.min(axis=0), X.max(axis=0)
+        self.n_parameters_, self.n_patterns_ = net.n_parameters, n_rows
+        residual = y - out_of(net.evaluate(into(X)))
+        self.n_effective_ = min(float(n_rows), *(effective_sample_size(r) for r in residual.T))
+        self.caution_ = ""
+        if self.n_parameters_ > self.n_effective_:
+            self.caution_ = (
+                f"the net has {self.n_parameters_} weights and thresholds, but the {n_rows} rows it learned count as "
+                f"{self.n_effective_:.0f} independent ones: it may know them by heart; trust it on unseen cycles only"
+            )
+
+
+def thinned(n_rows: int, n_most: int) -> IntArray:
+    """Return the indices of at most `n_most` of `n_rows` rows, spread evenly, the first and the last among them."""
+    if n_most < 2:
+        raise InputError(f"at most {n_most} patterns: want at least 2")
+    return np.linspace(0, n_rows - 1, min(n_rows, n_most)).round().astype(np.intp)

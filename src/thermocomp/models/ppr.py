@@ -1,0 +1,346 @@
+"""`ppr`: projection pursuit regression."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import Input
+from thermocomp.core.terms import Variable
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.shrinkage import Rule, choose, learned_rows, scaling
+
+FloatArray = NDArray[np.float64]
+
+_KNOTS = 25  # of a curve, evenly over its projection; the penalty, not their number, makes it smooth
+_DAMPING = 1e-4  # of a Gauss-Newton step, in units of the mean curvature: collinear inputs leave some at nearly none
+_HALVINGS = 4  # of a step that makes things worse
+_STEPS = 20  # of Gauss-Newton for a new term; one per term in a sweep of backfitting
+_SWEEPS = 20  # of backfitting after each new term
+_GAIN = 1e-3  # less of the residual sum of squares per step or sweep is not worth another one
+
+
+class ProjectionPursuit(ThermalRegressor):
+    """Projection pursuit regression (Friedman and Stuetzle 1981), the comparison of stepwise2017 (T-08).
+
+    Deviation = intercept + f1(a1 . x) + f2(a2 . x) + ... One term after the other is added to what the others leave:
+    its direction by Gauss-Newton steps, its curve by a smoother; after each new term all are fitted again in turn
+    (backfitting), as in Friedman's SMART (1984) and R's ``ppr``. Different from these: the curves are penalised linear
+    splines, so that the frozen model holds them exactly and tied temperatures need no rule; terms are only added, never
+    dropped again; and how many there are and how much they may bend is chosen by leaving thermal cycles out.
+
+    Beyond what its projection reached in training, a curve is constant.
+
+    Parameters
+    ----------
+    max_terms : int
+    degrees : sequence of float
+        Degrees of freedom of each curve to choose from, above 2 (a straight line).
+    rule : {'one-standard-error', 'minimum'}
+        How the number of terms is chosen, within the best degrees of freedom.
+
+    Attributes
+    ----------
+    n_terms_ : int
+        Chosen number of terms; fewer if nothing is left to explain.
+    degrees_ : float
+        Chosen degrees of freedom of each curve.
+    intercept_ : float
+    directions_ : ndarray of shape (n_terms_, n_features)
+        On raw inputs.
+    curves_ : tuple of Curve
+        One per direction.
+    r_squared_ : float
+        In the training data; nan if the deviation does not change.
+    cv_rms_ : float
+        Mean over the cycles left out of their RMS, at the choice [unit of y].
+    chosen_by_ : str
+        What was left out to choose.
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range.
+    """
+
+    def __init__(
+        self, *, max_terms: int = 5, degrees: Sequence[float] = (3.0, 6.0), rule: Rule = "one-standard-error"
+    ) -> None:
+        self.max_terms = max_terms
+        self.degrees = degrees
+        self.rule = rule
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "ProjectionPursuit":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
+            take the place of the cycles.
+
+        Returns
+        -------
+        ProjectionPursuit
+
+        Raises
+        ------
+        FitError
+            Fewer than two rows to learn from.
+        InputError
+            A setting that is none.
+        """
+        degrees = self._settings()
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        change, deviation, folds, self.chosen_by_ = learned_rows(
+            checked[0], np.asarray(checked[1], dtype=np.float64), cycle
+        )
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        rms = np.empty((len(degrees), self.max_terms, int(folds.max()) + 1))
+        for k in range(rms.shape[2]):
+            out = folds == k
+            for i, df in enumerate(degrees):
+                for j, model in enumerate(_path(change[~out], deviation[~out], self.max_terms, df)):
+                    rms[i, j, k] = np.sqrt(np.mean((deviation[out] - model.predict(change[out])) ** 2))
+        which, setting = choose(rms, self.rule)
+        self.cv_rms_ = float(rms[which, setting].mean())
+        self.degrees_ = degrees[which]
+        found = _path(change, deviation, setting + 1, self.degrees_)[-1]
+        self.intercept_, self.directions_, self.curves_ = found.intercept, found.directions, found.curves
+        self.n_terms_ = len(self.curves_)
+        total = float(np.sum((deviation - deviation.mean()) ** 2))
+        residual = deviation - found.predict(change)
+        self.r_squared_ = 1 - float(residual @ residual) / total if total > 0 else float("nan")
+        return self
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        return _Model(self.intercept_, self.directions_, self.curves_).predict(change)
+
+    def _settings(self) -> tuple[float, ...]:
+        degrees = tuple(float(d) for d in self.degrees)
+        if self.max_terms < 1:
+            raise InputError(f"max_terms {self.max_terms}: want at least 1")
+        if not degrees or not all(2 < d < _KNOTS for d in degrees):
+            raise InputError(f"degrees {self.degrees}: want degrees of freedom above 2 and below {_KNOTS}")
+        return degrees
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Additive:
+        sensors = np.flatnonzero(self.directions_.any(axis=0)).tolist()
+        variables = []
+        for direction in self.directions_.tolist():
+            weights = tuple((k, direction[i]) for k, i in enumerate(sensors) if direction[i] != 0)
+            name = " ".join(f"{w:+.3g} {inputs[sensors[k]].name}" for k, w in weights)
+            variables.append(Variable(name.removeprefix("+"), weights))
+        return Additive(
+            **header,
+            inputs=tuple(inputs[i] for i in sensors),
+            variables=tuple(variables),
+            curves=self.curves_,
+            intercept=self.intercept_,
+        )
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What is fitted, on raw inputs."""
+
+    intercept: float
+    directions: FloatArray
+    curves: tuple[Curve, ...]
+
+    def predict(self, X: FloatArray) -> FloatArray:
+        total = np.full(len(X), self.intercept)
+        for direction, curve in zip(self.directions, self.curves, strict=True):
+            total += curve(X @ direction)
+        return total
+
+
+@dataclass(frozen=True)
+class _Smooth:
+    """A curve fitted to a scatter: where its knots lie, its values there, and at the rows value and slope."""
+
+    low: float
+    high: float
+    knots: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+
+
+@dataclass(frozen=True)
+class _Term:
+    """A direction on standardised inputs, its curve, and the penalty this was fitted with."""
+
+    direction: FloatArray
+    smooth: _Smooth
+    penalty: float
+
+
+_BEND = np.diff(np.eye(_KNOTS), 2, axis=0)  # second differences of a curve's values at its knots
+_BENDING = _BEND.T @ _BEND
+_BANDS = np.array([np.r_[np.zeros(2 - k), np.diag(_BENDING, 2 - k)] for k in range(3)])
+_SLOPES = np.gradient(np.eye(_KNOTS), axis=0)
+_PENALTIES = np.logspace(-10, 6, 65)
+
+
+def _normal(u: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
+    """Return the normal matrix of a linear spline by its upper bands, and where each row lies between two knots."""
+    low, high = u.min(), u.max()
+    place = (u - low) * ((_KNOTS - 1) / (high - low))
+    piece = np.minimum(place.astype(np.intp), _KNOTS - 2)
+    share = place - piece
+    rest = 1 - share
+    bands = np.zeros((3, _KNOTS))
+    bands[2] = np.bincount(piece, rest * rest, _KNOTS)
+    bands[2, 1:] += np.bincount(piece, share * share, _KNOTS)[:-1]
+    bands[1, 1:] = np.bincount(piece, share * rest, _KNOTS)[:-1]
+    bands /= len(u)
+    bands[2] += 1e-9 / _KNOTS  # two different values alone do not make a curve
+    return bands, piece, share
+
+
+def _penalty(u: FloatArray, degrees: float) -> float:
+    """Return the penalty on bending that leaves a curve so many degrees of freedom."""
+    bands = _normal(u)[0]
+    gram = np.diag(bands[2]) + np.diag(bands[1, 1:], 1) + np.diag(bands[1, 1:], -1)
+    bending = linalg.eigh(_BENDING, gram, eigvals_only=True)
+    free = np.sum(1 / (1 + _PENALTIES[:, None] * np.maximum(bending, 0.0)), axis=1)
+    return float(np.exp(np.interp(-degrees, -free, np.log(_PENALTIES))))
+
+
+def _smooth(u: FloatArray, r: FloatArray, penalty: float) -> _Smooth:
+    """Smooth a scatter by a penalised linear spline, about zero."""
+    bands, piece, share = _normal(u)
+    right = np.bincount(piece, (1 - share) * r, _KNOTS)
+    right[1:] += np.bincount(piece, share * r, _KNOTS)[:-1]
+    knots: FloatArray = linalg.solveh_banded(bands + penalty * _BANDS, right / len(u), check_finite=False)
+    low, high = float(u.min()), float(u.max())
+    slopes = _SLOPES @ knots * ((_KNOTS - 1) / (high - low))
+    values = knots[piece] + share * np.diff(knots)[piece]
+    mean = values.mean()
+    return _Smooth(low, high, knots - mean, values - mean, slopes[piece] + share * np.diff(slopes)[piece])
+
+
+def _bends(u: FloatArray) -> bool:
+    """Return whether a projection has room for a curve."""
+    low, high = u.min(), u.max()
+    return bool(high - low > 1e-12 * max(abs(low), abs(high)))
+
+
+def _pursue(Z: FloatArray, r: FloatArray, term: _Term, steps: int) -> _Term:
+    """Turn the direction of a term by Gauss-Newton steps, its curve following."""
+    residual = r - term.smooth.values
+    rss = float(residual @ residual)
+    for _ in range(steps):
+        weighted = Z * term.smooth.slopes[:, None]
+        curvature = weighted.T @ weighted
+        mean = float(np.trace(curvature)) / len(curvature)
+        if not mean > 0:
+            break
+        curvature.flat[:: len(curvature) + 1] += _DAMPING * mean
+        turn = np.linalg.solve(curvature, weighted.T @ residual)
+        better = None
+        for halving in range(_HALVINGS + 1):
+            direction = term.direction + turn / 2**halving
+            direction /= np.linalg.norm(direction)
+            u = Z @ direction
+            if not _bends(u):
+                continue
+            smooth = _smooth(u, r, term.penalty)
+            left = r - smooth.values
+            if (new := float(left @ left)) < rss:
+                better = _Term(direction, smooth, term.penalty)
+                break
+        if better is None:
+            break
+        gain = rss - new
+        term, residual, rss = better, left, new
+        if gain < _GAIN * rss:
+            break
+    return term
+
+
+def _starts(Z: FloatArray, r: FloatArray) -> list[FloatArray]:
+    """Return directions to start from: of the steepest rise, and of the strongest bend (Li 1992) of what is left."""
+    gram = Z.T @ Z / len(Z)
+    values, vectors = linalg.eigh(gram)
+    kept = values > 1e-6 * values[-1]
+    white = vectors[:, kept] / np.sqrt(values[kept])
+    rise = white @ (white.T @ (Z.T @ r))
+    W = Z @ white
+    bends, axes = linalg.eigh((W * r[:, None]).T @ W)
+    strongest = white @ axes[:, np.argmax(np.abs(bends))]
+    return [d / np.linalg.norm(d) for d in (rise, strongest) if np.linalg.norm(d) > 0]
+
+
+def _new_term(Z: FloatArray, r: FloatArray, degrees: float) -> _Term | None:
+    """Return the term that explains most of what is left; None if nothing bends."""
+    found = []
+    for direction in _starts(Z, r):
+        u = Z @ direction
+        if _bends(u):
+            penalty = _penalty(u, degrees)
+            found.append(_pursue(Z, r, _Term(direction, _smooth(u, r, penalty), penalty), _STEPS))
+    return min(found, key=lambda t: float(np.sum((r - t.smooth.values) ** 2)), default=None)
+
+
+def _path(X: FloatArray, y: FloatArray, max_terms: int, degrees: float) -> list[_Model]:
+    """Return models with 1, 2, ... terms; the last one again where nothing is left to explain."""
+    centre, scale = scaling(X)
+    Z = (X - centre) / scale
+    mean = float(y.mean())
+    left = y - mean
+    enough = 1e-24 * float(y @ y)
+    terms: list[_Term] = []
+    models: list[_Model] = []
+    for _ in range(max_terms):
+        new = _new_term(Z, left, degrees) if Z.any() and left @ left > enough else None
+        if new is not None:
+            terms.append(new)
+            left = left - new.smooth.values
+            left = _backfit(Z, left, terms)
+        models.append(_raw(terms, mean, centre, scale))
+    return models
+
+
+def _backfit(Z: FloatArray, left: FloatArray, terms: list[_Term]) -> FloatArray:
+    """Fit all terms again in turn, each to what the others leave; return what all leave."""
+    for _ in range(_SWEEPS if len(terms) > 1 else 0):
+        before = float(left @ left)
+        for k, term in enumerate(terms):
+            r = left + term.smooth.values
+            again = _Term(term.direction, _smooth(Z @ term.direction, r, term.penalty), term.penalty)
+            terms[k] = _pursue(Z, r, again, 1)
+            left = r - terms[k].smooth.values
+        if before - float(left @ left) < _GAIN * before:
+            break
+    return left
+
+
+def _raw(terms: Sequence[_Term], mean: float, centre: FloatArray, scale: FloatArray) -> _Model:
+    """Return terms on raw inputs."""
+    directions = np.array([t.direction / scale for t in terms]).reshape(len(terms), len(scale))
+    curves = []
+    for direction, t in zip(directions, terms, strict=True):
+        x = np.linspace(t.smooth.low, t.smooth.high, _KNOTS) + direction @ centre
+        curves.append(Curve(tuple(x.tolist()), tuple(t.smooth.knots.tolist())))
+    return _Model(mean, directions, tuple(curves))

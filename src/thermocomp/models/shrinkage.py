@@ -1,0 +1,207 @@
+"""What linear regressions share that are chosen from a path of ever richer ones by leaving thermal cycles out."""
+
+from abc import abstractmethod
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.terms import Variable
+from thermocomp.models import ridge
+from thermocomp.models.leastsquares import Solution
+from thermocomp.models.linear import TermRegressor
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+Rule = Literal["one-standard-error", "minimum"]
+
+
+def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Return what to subtract from each column and what to divide it by, so that its mean square is 1.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_features)
+    centred : bool
+        False: the columns keep their zero.
+
+    Returns
+    -------
+    centre : ndarray of shape (n_features,)
+    scale : ndarray of shape (n_features,)
+        inf for a column that does not change: divided by it, it says nothing.
+    """
+    centre = X.mean(axis=0) if centred else np.zeros(X.shape[1])
+    scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))
+    scale[scale <= 1e-12 * np.abs(X).max(axis=0)] = np.inf
+    return centre, scale
+
+
+def learned_rows(X: FloatArray, y: FloatArray, cycle: ArrayLike | None) -> tuple[FloatArray, FloatArray, IntArray, str]:
+    """Return the rows that may be learned from, the fold of each, and what is left out in turn, in words.
+
+    Raises
+    ------
+    FitError
+        Fewer than two such rows.
+    """
+    folds, description = ridge.number_folds(cycle, len(X))
+    learned = folds >= 0
+    if learned.sum() < 2:
+        raise FitError("a single row to learn from: at least 2 are needed")
+    return X[learned], y[learned], folds[learned], description
+
+
+def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
+    """Choose a setting by the errors on what was left out.
+
+    Parameters
+    ----------
+    rms : ndarray of shape (n_sets, n_settings, n_folds)
+        In each set from the simplest to the richest setting.
+    rule : {'one-standard-error', 'minimum'}
+        The smallest mean, or in its set the simplest setting whose mean is within one standard error of it (Breiman
+        et al. 1984).
+
+    Returns
+    -------
+    which_set, setting : int
+    """
+    if rule not in ("one-standard-error", "minimum"):
+        raise InputError(f"rule {rule!r}: want 'one-standard-error' or 'minimum'")
+    mean = rms.mean(axis=2)
+    i, j = (int(k) for k in np.unravel_index(np.argmin(mean), mean.shape))
+    if rule == "one-standard-error":
+        limit = mean[i, j] + rms[i, j].std(ddof=1) / np.sqrt(rms.shape[2])
+        j = int(np.argmax(mean[i] <= limit))
+    return i, j
+
+
+class ShrunkRegressor(TermRegressor):
+    """Linear regression on standardised inputs; how rich it is, is chosen by leaving thermal cycles out.
+
+    Each thermal cycle among the training rows is left out in turn, the whole path of models is fitted to the others and
+    predicts it. Inputs that do not change get the coefficient 0.
+
+    Attributes
+    ----------
+    cv_rms_ : float
+        Mean over the cycles left out of their RMS, at the choice [unit of y].
+    chosen_by_ : str
+        What was left out to choose.
+    r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
+        See `thermocomp.models.linear.TermRegressor`; each coefficient that is not 0 counts as a parameter.
+    dependent_ : tuple of str
+        Names of the inputs that do not change.
+    """
+
+    rule: Rule
+    fit_intercept: bool
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
+            take the place of the cycles.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        FitError
+            Fewer than two rows to learn from.
+        InputError
+            A setting that is none.
+        """
+        change, deviation, _ = self._read(X, y)
+        change, deviation, folds, self.chosen_by_ = learned_rows(change, deviation, cycle)
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        errors = []
+        for k in range(int(folds.max()) + 1):
+            left_out = folds == k
+            weights, intercepts = self._fitted(change[~left_out], deviation[~left_out])
+            residual = np.tensordot(weights, change[left_out], axes=(2, 1)) + intercepts[..., None]
+            residual -= deviation[left_out]
+            errors.append(np.sqrt(np.mean(residual**2, axis=2)))
+        rms = np.stack(errors, axis=-1)
+        which, setting = choose(rms, self.rule)
+        self.cv_rms_ = float(rms[which, setting].mean())
+        weights, intercepts = self._fitted(change, deviation)
+        self._note(which, setting)
+        self._conclude(change, deviation, weights[which, setting], float(intercepts[which, setting]))
+        return self
+
+    @abstractmethod
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the weights on standardised inputs, (n_sets, n_settings, n_features): see `choose`.
+
+        The numbers of sets and settings must not depend on the rows.
+        """
+
+    @abstractmethod
+    def _note(self, which: int, setting: int) -> None:
+        """Note the chosen settings as attributes."""
+
+    def _fitted(self, X: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return weights (n_sets, n_settings, n_features) and intercepts (n_sets, n_settings) on raw inputs."""
+        centre, scale = scaling(X, centred=self.fit_intercept)
+        mean = float(y.mean()) if self.fit_intercept else 0.0
+        weights = self._paths((X - centre) / scale, y - mean) / scale
+        return weights, mean - weights @ centre
+
+    def _conclude(self, X: FloatArray, y: FloatArray, weights: FloatArray, intercept: float) -> None:
+        centre, scale = scaling(X, centred=self.fit_intercept)
+        changing = np.isfinite(scale)
+        values = linalg.svdvals((X[:, changing] - centre[changing]) / scale[changing])
+        least = float(values.min(initial=np.inf))
+        residual = y - X @ weights - intercept
+        found = Solution(
+            coefficients=weights,
+            intercept=intercept,
+            dependent=tuple(np.flatnonzero(~changing).tolist()),
+            rank=int(np.count_nonzero(weights)),
+            condition=float(values.max(initial=0.0)) / least if least > 0 else np.inf,
+            residual=residual,
+            rss=float(residual @ residual),
+        )
+        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
+        total = float(np.sum((y - (y.mean() if self.fit_intercept else 0.0)) ** 2))
+        self._keep(found, variables, [(i,) for i in range(len(variables))], total, self.fit_intercept)
+
+
+def sorted_strengths(strengths: ArrayLike) -> FloatArray:
+    """Return strengths from the greatest (the simplest model) to the smallest.
+
+    Raises
+    ------
+    InputError
+        None, or one that is not a positive number.
+    """
+    values = np.atleast_1d(np.asarray(strengths, dtype=np.float64))
+    if values.size == 0 or not (values > 0).all() or not np.isfinite(values).all():
+        raise InputError(f"strengths {strengths!r}: want positive numbers")
+    return np.sort(values)[::-1]
+
+
+def most_components(max_components: int | None, n_features: int) -> int:
+    """Return the number of components of the richest model.
+
+    Raises
+    ------
+    InputError
+        `max_components` is less than 1.
+    """
+    if max_components is not None and max_components < 1:
+        raise InputError(f"max_components {max_components}: want at least 1, or None for as many as inputs")
+    return n_features if max_components is None else min(max_components, n_features)

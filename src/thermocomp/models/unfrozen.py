@@ -1,0 +1,125 @@
+"""Methods that no handful of numbers can stand for: compared with the others, never deployed."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NoReturn
+
+import joblib
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.models.base import ThermalRegressor
+
+FloatArray = NDArray[np.float64]
+
+
+class UnfrozenRegressor(ThermalRegressor):
+    """A regressor that cannot be frozen; `unfrozen` gives what the replay of a comparison needs instead."""
+
+    freezable: ClassVar[bool] = False
+    name: ClassVar[str]  #: of the method
+
+    @abstractmethod
+    def evaluate(self, change: FloatArray) -> FloatArray:
+        """Predict for rows that were checked before, (n_rows, n_features): `predict` without its overhead."""
+
+    @abstractmethod
+    def _bulk(self) -> str:
+        """Return why it cannot be frozen, in words."""
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        return self.evaluate(validate_data(self, X, dtype=np.float64, reset=False))
+
+    def unfrozen(
+        self,
+        *,
+        target: str,
+        unit: str = "um",
+        inputs: Sequence[Input] | None = None,
+        support: Support = Support(),
+        provenance: Provenance | None = None,
+    ) -> "EstimatorModel":
+        """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
+
+        Parameters
+        ----------
+        target, unit, inputs, support, provenance
+            As in `thermocomp.models.base.ThermalRegressor.freeze`.
+
+        Returns
+        -------
+        EstimatorModel
+            With all of the inputs.
+        """
+        return EstimatorModel(
+            target=target,
+            unit=unit,
+            inputs=self._inputs(inputs),
+            support=support,
+            provenance=provenance,
+            estimator=self,
+            fingerprint=str(joblib.hash(self)),
+        )
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
+        raise FitError(
+            f"{self.name} cannot be frozen to plain numbers: {self._bulk()}; use it in compare, deploy another"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EstimatorModel(ErrorModel):
+    """A fitted estimator that is replayed like any frozen model; no file holds it.
+
+    Parameters
+    ----------
+    estimator : UnfrozenRegressor
+        Fitted.
+    fingerprint : str
+        Hash of its numbers; in its place when two models are compared.
+    """
+
+    family: ClassVar[str] = "estimator"
+    remembers: ClassVar[bool] = False
+
+    estimator: UnfrozenRegressor = field(compare=False)
+    fingerprint: str
+
+    def _check(self) -> None:
+        check_is_fitted(self.estimator)
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return np.empty((*change.shape[:-1], 0))
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        rows = change.reshape(-1, change.shape[-1])
+        return memory, self.estimator.evaluate(rows).reshape(change.shape[:-1])
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs: it uses all of them."""
+        return tuple(i.name for i in self.inputs)
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return nothing: there are no coefficients."""
+        return {}
+
+    def formula(self) -> str:
+        """Return what it is, as one line of text."""
+        return f"{self.estimator.name} of {', '.join(self.sensors)}: no formula"
