@@ -17,8 +17,8 @@ class Curve:
     """A function of one variable, constant beyond its ends.
 
     ``linear`` joins the points (x, y) by straight lines. ``step`` is constant between the breaks x: ``y[0]``
-    below ``x[0]``, ``y[i]`` from ``x[i-1]`` on. That is the exact form of a k-nearest-neighbour estimate from a table of
-    one variable: the neighbours change only half way between two entries that are k apart.
+    below ``x[0]``, ``y[i]`` from ``x[i-1]`` on. That is the exact form of a k-nearest-neighbour estimate from a table
+    of one variable: the neighbours change only half way between two entries that are k apart.
 
     Parameters
     ----------

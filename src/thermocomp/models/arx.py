@@ -1,0 +1,277 @@
+"""`arx` and `arx-free-run`: the deviation from its own past and the spindle speed (P-01, P-02)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.autoregressive import Autoregressive
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import ErrorModel, Input
+from thermocomp.models import ticks
+from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
+from thermocomp.models.freerun import Coefficients, output_error
+from thermocomp.models.leastsquares import triangle
+from thermocomp.models.selection import orders
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Setting:
+    """What is tried: data on one clock, orders to choose from, with an intercept or without."""
+
+    data: Clocked
+    ks: tuple[int, ...]
+    ms: tuple[int, ...]
+    intercept: bool
+
+
+class ARX(ClockedRegressor):
+    """Autoregressive model with inputs: dz(t) = sum_{i=1..k} a_i dz(t - ih) + sum_{i=0..m} b_i n(t - ih) (P-01).
+
+    The recording is put on a clock of `interval`: each tick is driven by the mean of the inputs over the interval that
+    ends there, and the displacement is interpolated at the tick (see `thermocomp.core.autoregressive`).
+
+    With ``criterion`` ``"fpe"``, ``"aic"`` or ``"bic"`` the coefficients come from least squares on one-step errors,
+    and the orders from that criterion (P-02); k = 0 takes part, so there is always an order whose free run decays.
+    Orders whose free run does not decay within the length of the longest test are not admissible. One-step errors
+    are trivially small, and the noise of the probe biases the coefficients (E-P3); with ``"free-run"`` they are those
+    with the smallest error in free run (see `thermocomp.models.freerun.output_error`), and the orders those that leave
+    the smallest free-run error on thermal cycles left out. Several intervals are always judged by that.
+
+    Rows with cycle -1 are not learned from, but their inputs drive the model. Inputs that depend on others, or never
+    leave zero, get no coefficient of their own.
+
+    Without `dt`, every row is a machine at rest in that state: k = m = 0 is all that can be learned, and `predict`
+    gives the deviation at which the model settles.
+
+    Parameters
+    ----------
+    inputs : sequence of str or int, optional
+        Names (or indices) of the columns it predicts from: the spindle speed in the paper. All columns without it; an
+        empty sequence is a `FitError`, since it means that there is no spindle speed.
+    interval : float or sequence of float, optional
+        h [s], or several to choose from. None: the usual time step of the recording. The paper computes every 10 min.
+    k, m : int, optional
+        Orders; chosen without them.
+    k_max, m_max : int
+        Greatest orders that are tried.
+    criterion : {'fpe', 'aic', 'bic', 'free-run'}
+    fit_intercept : bool or None
+        False: no deviation without inputs, as in the paper. True: one that builds up from the start of each test, as
+        what runs beside the spindle gives. None: judged in free run on cycles left out.
+
+    Attributes
+    ----------
+    k_, m_ : int
+    interval_ : float
+        [s]
+    a_ : ndarray of shape (k,)
+    b_ : ndarray of shape (m + 1, n_inputs_used)
+        Lag by lag, for the inputs in the order of `inputs`.
+    intercept_ : float
+    orders_ : tuple of Order
+        Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
+    choices_ : tuple of Choice
+        What was judged in free run on cycles left out; empty if nothing was.
+    cv_rms_ : float
+        Of the choice; nan if nothing was judged.
+    chosen_by_ : str
+        What was left out.
+    one_step_rms_, free_run_rms_ : float
+        In the training data: the first is trivially small, the second is the model's [unit of y].
+    caution_ : str
+        What the model cannot know (E-P6).
+    """
+
+    def __init__(
+        self,
+        *,
+        inputs: Sequence[str | int] | None = None,
+        interval: float | Sequence[float] | None = 600.0,
+        k: int | None = None,
+        m: int | None = None,
+        k_max: int = 5,
+        m_max: int = 5,
+        criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe",
+        fit_intercept: bool | None = False,
+    ) -> None:
+        self.inputs = inputs
+        self.interval = interval
+        self.k = k
+        self.m = m
+        self.k_max = k_max
+        self.m_max = m_max
+        self.criterion = criterion
+        self.fit_intercept = fit_intercept
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> "ARX":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation; without meaning where `cycle` is -1.
+        dt : array-like of shape (n_rows,), optional
+            Time since the row before [s]; inf in the first row of each test.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row, -1 for rows that are not learned from.
+
+        Returns
+        -------
+        ARX
+
+        Raises
+        ------
+        FitError
+            No input, too few rows, or the free run of the orders asked for does not decay.
+        InputError
+            A setting, `dt` or `cycle` cannot be used.
+        """
+        if self.criterion not in ("fpe", "aic", "bic", "free-run"):
+            raise InputError(f"criterion {self.criterion!r}: want fpe, aic, bic or free-run")
+        ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
+        inputs, deviation, step, folds = self._start(X, y, dt, cycle)
+        data = [
+            Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
+            for h in self._intervals(self.interval, step)
+        ]
+        constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
+        if dt is None:  # nothing to choose: no row has a past
+            ks, ms, data, constants = ks[:1], ms[:1], data[:1], constants[:1]
+        # one-step criteria choose among all orders by themselves
+        groups = [((k,), (m,)) for k in ks for m in ms] if self.criterion == "free-run" else [(ks, ms)]
+        tried = [_Setting(d, k, m, c) for d in data for k, m in groups for c in constants]
+        self.choices_: tuple[Choice, ...] = ()
+        best = 0
+        if len(tried) > 1:
+            errors = [self._judge(t) for t in tried]
+            self.choices_ = tuple(
+                Choice(t.data.interval, max(t.ks), max(t.ms), t.intercept, 0, e)
+                for t, e in zip(tried, errors, strict=True)
+            )
+            best = int(np.argmin(errors))
+        self.cv_rms_ = self.choices_[best].cv_rms if self.choices_ else math.nan
+        clocked = tried[best].data
+        self._coefficients, self.orders_, self.one_step_rms_ = self._solve(tried[best], clocked.targets())
+        self.interval_ = clocked.interval
+        self.a_, self.b_, self.intercept_ = (c := self._coefficients).a, c.b, c.intercept
+        self.k_, self.m_ = len(c.a), len(c.b) - 1
+        self.free_run_rms_ = rms(self._free_error(clocked, c, folds >= 0)) if dt is not None else math.nan
+        return self
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`. Without it, the deviation at which each row would settle is given.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        inputs = self._given(X)
+        if dt is None:
+            return self._coefficients.settled(inputs)
+        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
+        parts = [self._coefficients.at_rows(r) for r in runs]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def one_step(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike) -> FloatArray:
+        """Predict each tick from the measured displacements before it: a diagnostic, not a prediction (E-P3).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        y : array-like of shape (n_rows,)
+            Measured deviation.
+        dt : array-like of shape (n_rows,)
+
+        Returns
+        -------
+        ndarray of shape (n_predicted, 2)
+            Measured and predicted deviation at all ticks that have enough past.
+        """
+        inputs = self._given(X)
+        step = ticks.steps(dt, len(inputs))
+        runs = ticks.on_clock(inputs, step, self.interval_)
+        measured = np.asarray(y, dtype=np.float64)
+        data = Clocked(self.interval_, runs, measured, step, np.zeros(len(inputs), dtype=np.intp))
+        work = data.lagged(data.targets(), self.k_, self.m_)
+        return np.column_stack([work[:, -1], self._coefficients.one_step(work[:, :-1])])
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> ErrorModel:
+        return Autoregressive(
+            **header,
+            inputs=tuple(inputs[j] for j in self._columns),
+            interval=self.interval_,
+            a=tuple(self.a_.tolist()),
+            b=tuple(tuple(b) for b in self.b_.T.tolist()),
+            intercept=self.intercept_,
+        )
+
+    def _wanted(self) -> Sequence[str | int] | None:
+        return self.inputs
+
+    # -- choice --------------------------------------------------------------------------------------------------------
+
+    def _solve(
+        self, setting: "_Setting", targets: Sequence[FloatArray]
+    ) -> tuple[Coefficients, tuple[orders.Order, ...], float]:
+        """Return the coefficients of the best of the orders of a setting, the table, and the RMS of one-step errors."""
+        data, ks, ms, constant = setting.data, setting.ks, setting.ms, setting.intercept
+        J = len(self._columns)
+        if self.criterion == "free-run" and any(len(r.drive) > 1 for r in data.runs):
+            least = output_error(data.runs, targets, ks[0], ms[0], intercept=constant, largest_root=data.largest_root)
+            if least is None:
+                raise FitError(too_few(sum(int(np.isfinite(t[1:]).sum()) for t in targets), ks[0], ms[0], data))
+            work = data.lagged(targets, ks[0], ms[0])
+            return least, (), rms(work[:, -1] - least.one_step(work[:, :-1]))
+        while True:  # the greatest orders that the rows suffice for
+            K, M = ks[-1], ms[-1]
+            work = data.lagged(targets, K, M)
+            if len(work) > K + (M + 1) * J + int(constant):
+                break
+            if len(ks) == len(ms) == 1:
+                raise FitError(too_few(len(work), K, M, data))
+            ks, ms = ks[: max(len(ks) - 1, 1)], ms[: max(len(ms) - 1, 1)]
+        tri = triangle(work, intercept=constant)
+        found = orders.table(tri, J, ks, ms, data.largest_root)
+        chosen = orders.best(found, "fpe" if self.criterion == "free-run" else self.criterion)
+        if chosen is None:
+            raise FitError(
+                f"k = {', '.join(map(str, ks))} at an interval of {data.interval:g} s: the largest root is "
+                f"{min(o.largest_root for o in found):.6g}, so the free run does not decay within the data; take "
+                "another interval, leave the order to be chosen, or let criterion free-run find the coefficients"
+            )
+        k, m = chosen.k, chosen.m
+        weights, intercept = orders.coefficients(tri, [*range(k), *range(K, K + (m + 1) * J)])
+        found_at = Coefficients(weights[:k], weights[k:].reshape(m + 1, J), intercept)
+        return found_at, found, math.sqrt(chosen.sse / chosen.n_rows)
+
+    def _judge(self, setting: "_Setting") -> float:
+        """Return the mean RMS in free run over the folds, each left out in turn."""
+        data, errors = setting.data, []
+        for fold in range(int(data.folds.max()) + 1):
+            try:
+                c, *_ = self._solve(setting, data.targets(fold))
+            except FitError:
+                return math.inf
+            errors.append(rms(self._free_error(data, c, data.folds == fold)))
+        return float(np.mean(errors))
+
+    @staticmethod
+    def _free_error(data: Clocked, c: Coefficients, rows: BoolArray) -> FloatArray:
+        free = np.concatenate([c.at_rows(r) for r in data.runs])
+        return np.asarray(data.y[rows] - free[rows])

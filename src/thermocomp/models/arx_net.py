@@ -1,0 +1,271 @@
+"""`arx-net`: a net for the next deviation from the last ones and the spindle speed (P-03)."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils import check_random_state
+
+from thermocomp.core.autoregressive import AutoregressiveNet
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import Input
+from thermocomp.core.network import Affine, Perceptron
+from thermocomp.models import ticks
+from thermocomp.models.arx import ARX
+from thermocomp.models.backprop import learning_rates, scaling_in, scaling_out, train_net
+from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
+from thermocomp.models.ticks import Run
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: ticks after which a row without time is taken to have settled
+SETTLED = 2000
+
+
+class _Net:
+    """A trained net with its scaling: one tick, and the free run."""
+
+    def __init__(self, net: Perceptron, scale_in: Affine, scale_out: Affine, k: int, m: int) -> None:
+        self.net, self.scale_in, self.scale_out, self.k, self.m = net, scale_in, scale_out, k, m
+
+    def tick(self, regressors: FloatArray) -> FloatArray:
+        return self.scale_out(self.net.evaluate(self.scale_in(regressors)))[..., 0]
+
+    def ticked(self, run: Run) -> FloatArray:
+        """Run freely from a cold start; return the deviation at each tick."""
+        k, n = self.k, len(run.drive)
+        own = np.zeros(n + k)  # k ticks of rest in front
+        driven = ticks.regressors(np.empty(0), run.drive, np.arange(n), 0, self.m, run.drive)
+        row = np.empty(k + driven.shape[1])
+        for t in range(1, n):
+            row[:k] = own[t : t + k][::-1]  # own[t + k] is dz(t)
+            row[k:] = driven[t]
+            own[t + k] = self.tick(row)
+        return own[k:]
+
+    def at_rows(self, run: Run) -> FloatArray:
+        """Run freely from a cold start; return the deviation at each row of the test."""
+        ticked = self.ticked(run)
+        return ticks.at_rows(
+            run, ticked, lambda t, now: self.tick(ticks.regressors(ticked, run.drive, t + 1, self.k, self.m, now))
+        )
+
+    def settled(self, inputs: FloatArray) -> FloatArray:
+        """Return where the free run is after many ticks of the same inputs."""
+        own = np.zeros((len(inputs), max(self.k, 1)))
+        driven = np.tile(inputs, self.m + 1)
+        for _ in range(SETTLED if self.k else 1):
+            value = self.tick(np.hstack([own[:, : self.k], driven]))
+            same = np.array_equal(value, own[:, 0])
+            own = np.column_stack([value, own[:, :-1]])
+            if same:
+                break
+        return own[:, 0]
+
+
+class NetARX(ClockedRegressor):
+    """Back-propagation net for dz(t) from dz(t-h) .. dz(t-kh) and n(t) .. n(t-mh) (P-03, E-P2).
+
+    The net is trained on measured displacements one step ahead, as in the paper, on the same clock as `ARX`; the number
+    of hidden nodes is the one that leaves the smallest error in free run on thermal cycles left out, in place of the
+    paper's trial and error. Its sigmoid output keeps the free run within the trained displacements and an eighth more
+    on either side: it cannot run away.
+
+    Without `dt`, every row is a machine at rest in that state: the net is trained with k = m = 0.
+
+    Parameters
+    ----------
+    inputs : sequence of str or int, optional
+        As for `ARX`: the spindle speed in the paper.
+    interval : float or None
+        h [s]; None: the usual time step of the recording. In steps much shorter than the time constants of the machine,
+        dz(t) is dz(t-h) but for less than a net can learn.
+    k, m : int or None
+        Orders; None: those of the linear model with the smallest final prediction error (P-02, E-P2).
+    hidden : int or sequence of int
+        Numbers of hidden nodes to choose from.
+    epochs : int
+    rate, final_rate : float
+        Learning rate in the first and in the last epoch.
+    momentum : float
+        Part of the previous change that is added to the next one.
+    random_state : int
+        Of the initial weights and of the order of the patterns.
+    jobs : int
+        Threads that train nets.
+
+    Attributes
+    ----------
+    k_, m_, hidden_ : int
+    interval_ : float
+        [s]
+    net_ : Perceptron
+    choices_ : tuple of Choice
+        Numbers of hidden nodes that were judged; empty if there was nothing to choose.
+    cv_rms_ : float
+    chosen_by_ : str
+    free_run_rms_ : float
+        In the training data [unit of y].
+    caution_ : str
+        What the model cannot know (E-P6).
+    """
+
+    def __init__(
+        self,
+        *,
+        inputs: Sequence[str | int] | None = None,
+        interval: float | None = 600.0,
+        k: int | None = 1,
+        m: int | None = 0,
+        hidden: int | Sequence[int] = (2, 3, 4, 6, 8),
+        epochs: int = 10_000,
+        rate: float = 0.5,
+        final_rate: float = 0.02,
+        momentum: float = 0.0,
+        random_state: int = 0,
+        jobs: int = 2,
+    ) -> None:
+        self.inputs = inputs
+        self.interval = interval
+        self.k = k
+        self.m = m
+        self.hidden = hidden
+        self.epochs = epochs
+        self.rate = rate
+        self.final_rate = final_rate
+        self.momentum = momentum
+        self.random_state = random_state
+        self.jobs = jobs
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
+    ) -> "NetARX":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation; without meaning where `cycle` is -1.
+        dt : array-like of shape (n_rows,), optional
+            Time since the row before [s]; inf in the first row of each test.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row, -1 for rows that are not learned from.
+
+        Returns
+        -------
+        NetARX
+
+        Raises
+        ------
+        FitError
+            No input, or too few rows.
+        InputError
+            A setting, `dt` or `cycle` cannot be used.
+        """
+        sizes = tuple(int(h) for h in np.atleast_1d(self.hidden))
+        if not sizes or min(sizes) < 1:
+            raise InputError(f"hidden = {self.hidden}: want numbers of nodes, at least 1")
+        inputs, deviation, step, folds = self._start(X, y, dt, cycle)
+        h = self._intervals(self.interval, step)[0]
+        data = Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
+        self.k_, self.m_ = (0, 0) if dt is None else self._chosen_orders(inputs, deviation, dt, cycle)
+        best = 0
+        self.choices_: tuple[Choice, ...] = ()
+        if len(sizes) > 1 and dt is not None:
+            jobs = [(size, fold) for size in sizes for fold in range(int(folds.max()) + 1)]
+            errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
+            means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
+            self.choices_ = tuple(
+                Choice(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
+            )
+            best = int(np.argmin(means))
+        self.cv_rms_ = self.choices_[best].cv_rms if self.choices_ else math.nan
+        self.hidden_, self.interval_ = sizes[best], h
+        self._net = self._train(data, self.hidden_, None)
+        self.net_ = self._net.net
+        self.free_run_rms_ = rms(self._free_error(data, self._net, folds >= 0)) if dt is not None else math.nan
+        return self
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`. Without it, the deviation at which each row would settle is given.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        inputs = self._given(X)
+        if dt is None:
+            return self._net.settled(inputs)
+        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
+        parts = [self._net.at_rows(r) for r in runs]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> AutoregressiveNet:
+        return AutoregressiveNet(
+            **header,
+            inputs=tuple(inputs[j] for j in self._columns),
+            interval=self.interval_,
+            k=self.k_,
+            m=self.m_,
+            net=self._net.net,
+            input_scaling=self._net.scale_in,
+            output_scaling=self._net.scale_out,
+        )
+
+    def _wanted(self) -> Sequence[str | int] | None:
+        return self.inputs
+
+    # -- choice --------------------------------------------------------------------------------------------------------
+
+    def _chosen_orders(
+        self, inputs: FloatArray, y: FloatArray, dt: ArrayLike, cycle: ArrayLike | None
+    ) -> tuple[int, int]:
+        self._orders(self.k, 0, "k")
+        self._orders(self.m, 0, "m")
+        if self.k is not None and self.m is not None:
+            return self.k, self.m
+        linear = ARX(interval=self.interval, k=self.k, m=self.m).fit(inputs, y, dt=dt, cycle=cycle)
+        return linear.k_, linear.m_
+
+    def _train(self, data: Clocked, size: int, without: int | None) -> _Net:
+        table = data.lagged(data.targets(without), self.k_, self.m_)
+        if len(table) < 2:
+            raise FitError(too_few(len(table), self.k_, self.m_, data))
+        X, y = table[:, :-1], table[:, -1]
+        scale_in = scaling_in(X.min(axis=0), X.max(axis=0))
+        low, high = y.min(keepdims=True), y.max(keepdims=True)
+        seed = check_random_state(self.random_state).randint(2**31 - 1)
+        trained = train_net(
+            scale_in(X),
+            scaling_in(low, high)(y[:, None]),
+            size,
+            rng=np.random.default_rng(seed),
+            rates=learning_rates(self.epochs, self.rate, self.final_rate, "geometric"),
+            momentum=self.momentum,
+        )
+        return _Net(trained.net, scale_in, scaling_out(low, high), self.k_, self.m_)
+
+    def _judge(self, data: Clocked, size: int, fold: int) -> float:
+        """Return the RMS in free run on one fold, left out; inf if what is left is too little."""
+        try:
+            net = self._train(data, size, fold)
+        except FitError:
+            return math.inf
+        return rms(self._free_error(data, net, data.folds == fold))
+
+    @staticmethod
+    def _free_error(data: Clocked, net: _Net, rows: BoolArray) -> FloatArray:
+        free = np.concatenate([net.at_rows(r) for r in data.runs])
+        return np.asarray(data.y[rows] - free[rows])

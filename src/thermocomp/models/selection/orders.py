@@ -1,0 +1,158 @@
+"""Orders k and m of an autoregressive model: final prediction error, AIC, BIC; all orders from one triangle."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from thermocomp.core.autoregressive import slowest
+from thermocomp.models.leastsquares import Triangle
+
+FloatArray = NDArray[np.float64]
+
+_TINY = float(np.finfo(np.float64).tiny)
+
+Criterion = Literal["fpe", "aic", "bic"]
+
+
+@dataclass(frozen=True)
+class Order:
+    """One line of the table of orders.
+
+    Parameters
+    ----------
+    k, m : int
+        Past deviations, and past values of each input beside the present one.
+    n_parameters, n_rows : int
+        d, the intercept included and inputs that depend on others left out, and N.
+    sse : float
+        Sum of squared one-step errors; not below what rounding may leave.
+    fpe, aic, bic : float
+        See `final_prediction_error`; AIC = N ln(SSE/N) + 2 d, BIC = N ln(SSE/N) + d ln N.
+    largest_root : float
+        Largest modulus of the roots of the polynomial in dz; 1 or more runs away in free run. inf if the coefficients
+        cannot be told because the columns depend on each other.
+    admissible : bool
+        The free run decays, and within the time that was asked for.
+    """
+
+    k: int
+    m: int
+    n_parameters: int
+    n_rows: int
+    sse: float
+    fpe: float
+    aic: float
+    bic: float
+    largest_root: float
+    admissible: bool
+
+
+def final_prediction_error(sse: float, n: int, d: int) -> float:
+    """Return Akaike's FPE = (SSE/N) (N + d) / (N - d) (P-02).
+
+    Parameters
+    ----------
+    sse : float
+        Sum of squared one-step errors.
+    n : int
+        Number of rows, N.
+    d : int
+        Number of parameters; inf is given unless d < N.
+
+    Returns
+    -------
+    float
+    """
+    return sse / n * (n + d) / (n - d) if d < n else math.inf
+
+
+def table(
+    tri: Triangle, n_inputs: int, ks: Sequence[int], ms: Sequence[int], largest_root: float = 1.0
+) -> tuple[Order, ...]:
+    """Compute all orders from the triangle of the greatest one, on the same rows, so that they can be compared.
+
+    For each m the small triangle is made anew with the inputs first; its last column then holds the SSE of every k.
+
+    Parameters
+    ----------
+    tri : Triangle
+        Of dz(t-1) .. dz(t-K), all inputs at t, all inputs at t-1, .. at t-M, and dz(t).
+    n_inputs : int
+    ks, ms : sequence of int
+        Orders wanted; K and M are the greatest of them.
+    largest_root : float
+        An order is admissible if all roots are smaller.
+
+    Returns
+    -------
+    tuple of Order
+    """
+    K, n = max(ks), tri.n_rows
+    floor = float(tri.noise[-1] ** 2)
+    found = []
+    for m in ms:
+        driven = _independent(tri.part(range(K, K + (m + 1) * n_inputs))) + K
+        small = tri.part([*driven, *range(K)])
+        R = np.asarray(np.linalg.qr(small.factor, mode="r"))
+        left = np.append(np.cumsum(R[::-1, -1] ** 2)[::-1], np.zeros(len(driven) + K + 1))
+        for k in ks:
+            own = slice(len(driven), len(driven) + k)
+            d = own.stop + int(tri.intercept)
+            sse = max(float(left[own.stop]), floor)
+            log = n * math.log(max(sse, _TINY) / n)
+            root = _largest_root(R[own, own], R[own, -1], small.noise[own])
+            fpe = final_prediction_error(sse, n, d)
+            able = d < n and root < largest_root
+            found.append(Order(k, m, d, n, sse, fpe, log + 2 * d, log + d * math.log(n), root, able))
+    return tuple(sorted(found, key=lambda o: (o.k, o.m)))
+
+
+def coefficients(tri: Triangle, columns: Sequence[int]) -> tuple[FloatArray, float]:
+    """Solve for some of the columns; those that depend on others get 0.
+
+    Parameters
+    ----------
+    tri : Triangle
+    columns : sequence of int
+
+    Returns
+    -------
+    weights : ndarray of shape (n_columns,)
+    intercept : float
+    """
+    part = tri.part(columns)
+    kept = _independent(part)
+    R = np.asarray(np.linalg.qr(part.factor[:, [*kept, -1]], mode="r"))
+    weights = np.zeros(len(columns))
+    weights[kept] = linalg.solve_triangular(R[: len(kept), : len(kept)], R[: len(kept), -1]) if len(kept) else 0.0
+    return weights, float(part.centre[-1] - part.centre[:-1] @ weights)
+
+
+def _independent(tri: Triangle) -> NDArray[np.intp]:
+    """Return the columns that add something to the others; the rest would take directions of dz away."""
+    norms, noise = tri.norms[:-1], tri.noise[:-1]
+    alive = np.flatnonzero(norms > noise)
+    if not alive.size:
+        return alive
+    R, order = linalg.qr(tri.factor[:, alive] / norms[alive], mode="r", pivoting=True)
+    order = alive[order[: min(R.shape)]]
+    return np.sort(order[np.abs(np.diag(R)) > noise[order] / norms[order]])
+
+
+def _largest_root(R: FloatArray, head: FloatArray, noise: FloatArray) -> float:
+    if len(head) == 0:
+        return 0.0
+    if R.shape[0] != R.shape[1] or (np.abs(np.diag(R)) <= noise).any():
+        return math.inf
+    return slowest(linalg.solve_triangular(R, head))
+
+
+def best(orders: Sequence[Order], criterion: Criterion) -> Order | None:
+    """Return the admissible order with the smallest criterion, the one with fewer parameters on a tie."""
+    able = [o for o in orders if o.admissible]
+    return min(able, key=lambda o: (getattr(o, criterion), o.n_parameters), default=None)

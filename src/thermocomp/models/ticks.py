@@ -1,0 +1,209 @@
+"""Recordings on the clock of an autoregressive model, by the very rule of `thermocomp.core.autoregressive`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.autoregressive import EARLY
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: a displacement between two rows is interpolated if they are not further apart than this many usual steps
+NEAR = 1.5
+#: more ticks than this in one recording are refused: the interval is a slip of the pen
+MOST_TICKS = 50_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One test on the clock: without a break, from a cold start.
+
+    Parameters
+    ----------
+    rows : slice
+        Its rows in the recording.
+    count : ndarray of int of shape (n_rows,)
+        Ticks made up to each row; the first row is tick 0.
+    phase : ndarray of shape (n_rows,)
+        Time of each row since its last tick, as a share of the interval.
+    since : ndarray of shape (n_rows, n_inputs)
+        Mean of the inputs since that tick; without meaning where `phase` is 0.
+    drive : ndarray of shape (n_ticks + 1, n_inputs)
+        Mean of the inputs over the interval that ends at each tick; at tick 0, the first row.
+    """
+
+    rows: slice
+    count: IntArray
+    phase: FloatArray
+    since: FloatArray
+    drive: FloatArray
+
+    @property
+    def row_by_row(self) -> bool:
+        """True if every row is the next tick."""
+        return self.since is self.drive
+
+
+def steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
+    """Check time steps [s]; without any, every row is a test of its own.
+
+    Raises
+    ------
+    InputError
+        Not one per row, or one is negative or not a number.
+    """
+    if dt is None:
+        return np.full(n_rows, np.inf)
+    found = np.asarray(dt, dtype=np.float64)
+    if found.shape != (n_rows,) or not (found >= 0).all():
+        raise InputError(f"dt: want {n_rows} time steps that are not negative")
+    return found
+
+
+def usual(dt: FloatArray) -> float:
+    """Return the median of the time steps within tests [s]; 1 if there are none."""
+    inside = dt[np.isfinite(dt) & (dt > 0)]
+    return float(np.median(inside)) if inside.size else 1.0
+
+
+def on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Run]:
+    """Put a recording on the clock.
+
+    Parameters
+    ----------
+    inputs : ndarray of shape (n_rows, n_inputs)
+    dt : ndarray of shape (n_rows,)
+        Time since the previous row [s]; inf starts a new test, as the first row always does.
+    interval : float
+        [s]
+
+    Returns
+    -------
+    list of Run
+    """
+    starts = np.flatnonzero(np.isinf(dt))
+    if not starts.size or starts[0] != 0:
+        starts = np.append(0, starts)
+    return [_run(inputs, dt, slice(i, j), interval) for i, j in pairwise([*starts.tolist(), len(dt)])]
+
+
+def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> Run:
+    u, n = inputs[rows], rows.stop - rows.start
+    if (dt[rows][1:] == h).all():
+        return Run(rows, np.arange(n), np.zeros(n), u, u)
+    step = dt[rows].copy()
+    step[0] = 0.0
+    time = np.cumsum(step)
+    if not time[-1] / h < MOST_TICKS:
+        raise InputError(f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; make it longer")
+    share = time / h
+    count = np.floor(share + EARLY).astype(np.intp)
+    phase = share - count
+    phase[phase <= EARLY] = 0.0
+    if not phase.any() and (np.diff(count) == 1).all():  # one row per tick
+        return Run(rows, count, phase, u, u)
+    total = np.cumsum(step[:, None] * u, axis=0)
+    at = np.searchsorted(count, np.arange(count[-1] + 1))  # row that makes each tick; it may come later
+    late = (time[at] - np.arange(count[-1] + 1) * h)[:, None]
+    until = total[at] - late * u[at]
+    until[0] = 0.0
+    drive = np.vstack([u[:1], np.diff(until, axis=0) / h])
+    since = (total - until[count]) / np.where(phase > 0, phase * h, np.inf)[:, None]
+    return Run(rows, count, phase, since, drive)
+
+
+def displacements(
+    runs: Sequence[Run], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
+) -> list[FloatArray]:
+    """Return the displacement at each tick, interpolated between the rows around it; nan where it is not known.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    y, dt : ndarray of shape (n_rows,)
+    known : ndarray of bool of shape (n_rows,)
+        Rows whose displacement may be used.
+    h : float
+        Interval [s].
+
+    Returns
+    -------
+    list of ndarray of shape (n_ticks + 1,)
+        Per test.
+    """
+    near = NEAR * usual(dt)
+    found = []
+    for run in runs:
+        inside, may = y[run.rows], known[run.rows]
+        if run.row_by_row:
+            found.append(np.where(may, inside, np.nan))
+            continue
+        after = np.searchsorted(run.count, np.arange(len(run.drive)))
+        before = np.maximum(after - 1, 0)
+        step = dt[run.rows].copy()
+        step[0] = 0.0
+        late = np.cumsum(step)[after] - np.arange(len(run.drive)) * h  # of the row after each tick
+        late = np.where(late <= EARLY * h, 0.0, late)
+        part = late / np.maximum(step[after], np.finfo(np.float64).tiny)
+        fine = may[after] & ((late == 0) | (may[before] & (step[after] <= near)))
+        value = np.where(late == 0, inside[after], inside[after] + part * (inside[before] - inside[after]))
+        found.append(np.where(fine, value, np.nan))
+    return found
+
+
+def at_rows(run: Run, ticked: FloatArray, ahead: Callable[[IntArray, FloatArray], FloatArray]) -> FloatArray:
+    """Return the deviation at the rows of a test from that at its ticks.
+
+    Parameters
+    ----------
+    run : Run
+    ticked : ndarray of shape (n_ticks + 1,)
+    ahead : callable
+        Gives the tick after some ticks, if the inputs went on as given: ``ahead(ticks, inputs)``.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
+    if run.row_by_row:
+        return ticked
+    last = ticked[run.count]
+    between = np.flatnonzero(run.phase)
+    if between.size:
+        coming = ahead(run.count[between], run.since[between])
+        last[between] += run.phase[between] * (coming - last[between])
+    return last
+
+
+def regressors(own: FloatArray, drive: FloatArray, ticks: IntArray, k: int, m: int, now: FloatArray) -> FloatArray:
+    """Return [dz(t-h) .. dz(t-kh), inputs(t), inputs(t-h) .. inputs(t-mh)], zero before the start (cold).
+
+    Parameters
+    ----------
+    own : ndarray of shape (n_ticks,)
+    drive : ndarray of shape (n_ticks, n_inputs)
+    ticks : ndarray of int of shape (n_wanted,)
+        t.
+    k, m : int
+    now : ndarray of shape (n_wanted, n_inputs)
+        The inputs at t.
+
+    Returns
+    -------
+    ndarray of shape (n_wanted, k + (m + 1) n_inputs), Fortran order
+    """
+    n = drive.shape[1]
+    table = np.zeros((len(ticks), k + (m + 1) * n), order="F")
+    for i in range(1, k + 1):
+        past = ticks >= i
+        table[past, i - 1] = own[ticks[past] - i]
+    table[:, k : k + n] = now
+    for i in range(1, m + 1):
+        past = ticks >= i
+        table[past, k + i * n : k + (i + 1) * n] = drive[ticks[past] - i]
+    return table
