@@ -21,6 +21,7 @@ release = version = version_of("thermocomp")
 
 extensions = [
     "cli_help",
+    "method_table",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

@@ -1,6 +1,7 @@
 """A drift test that is computed in a moment and whose physics is known."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -36,3 +37,16 @@ def small_machine(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *,
     quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
     channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
     return Recording("small", time, table, channels, find_cycles(time, speed))
+
+
+def crowded_machine() -> Recording:
+    """Return the same with two more sensors that say the same as t1_C, and one of the weather elsewhere."""
+    plain = small_machine()
+    rng = np.random.default_rng(7)
+    near, far, other = rng.normal(size=(3, len(plain)))
+    table = plain.table.copy()
+    table["t4_C"] = table["t1_C"] + 0.05 * near
+    table["t5_C"] = table["t1_C"] + 0.2 * far
+    table["t6_C"] = 20 + np.cumsum(0.01 * other)
+    more = tuple(Channel(n, "temperature", "degC") for n in ("t4_C", "t5_C", "t6_C"))
+    return replace(plain, table=table, channels=(*plain.channels, *more))

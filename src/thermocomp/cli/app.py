@@ -23,6 +23,7 @@ for command in (
     commands.demo,
     commands.simulate,
     commands.check,
+    commands.select,
     commands.fit,
     commands.assess,
     commands.compare,

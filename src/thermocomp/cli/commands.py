@@ -21,6 +21,7 @@ from thermocomp.cli.options import (
     OptionalOutput,
     Output,
     Recordings,
+    Selector,
     Study,
     read_recordings,
     refuse_existing,
@@ -29,6 +30,7 @@ from thermocomp.cli.options import (
 from thermocomp.core.exceptions import InputError
 
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
+SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
 
@@ -149,6 +151,62 @@ def check(recordings: Recordings, /, *, mapping: Path | None = None, json: Json 
     findings = [findings_of(test) for test in tests]
     out.show_check(tests, findings, _console, as_json=json)
     return 1 if any(f.severity == "trouble" for found in findings for f in found) else 0
+
+
+def select(
+    recordings: Recordings,
+    /,
+    *,
+    study: Study,
+    method: SelectionMethod = "pareto",
+    settings: Selector = Selector(),  # noqa: B008 - frozen
+    output: OptionalOutput = None,
+    overwrite: Flag = False,
+    json: Json = False,
+) -> int:
+    """Choose the few temperature sensors that a model needs.
+
+    Parameters
+    ----------
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    study : Study
+        What is predicted from what, and on what it is judged.
+    method : str
+        How to choose. pareto: error on unseen cycles against the number of sensors; subsets: exact best subset of
+        every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F (stepwise 2017, Chen);
+        ace: by maximal correlation (Wessel).
+    settings : Settings
+        What the methods can be told.
+    output : Path
+        Page with tables and figures to write (.html).
+    overwrite : bool
+        Write over an existing page.
+    json : bool
+        Print results for a machine instead of tables.
+
+    Returns
+    -------
+    int
+        0 done, 2 unusable input.
+    """
+    tests = read_recordings(recordings, study.mapping)
+    with needs("study"):
+        from thermocomp.assessment import selecting
+        from thermocomp.cli import output as out
+    if output is not None:
+        refuse_existing([output], overwrite, recordings)
+    trouble = tell_trouble(tests)
+    samples = study.samples(tests)
+    protocol = study.protocol(samples)
+    with _progress(selecting.n_pieces(method, samples, protocol, settings), json) as progress:
+        choices = selecting.select(method, samples, protocol, settings, jobs=study.jobs, progress=progress)
+    if output is not None:
+        with needs("study"):
+            from thermocomp.report import html
+        html.write_choices(choices, tests, output)
+    out.show_choices(choices, output, trouble, _console, as_json=json)
+    return 0
 
 
 def fit(

@@ -1,7 +1,7 @@
 """Options that several commands share, and what they stand for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +9,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
 
+from thermocomp.assessment.choice import Settings
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import InputError
 
@@ -81,6 +82,16 @@ class Study:
         if self.leave_one_file_out:
             return splits.leave_one_file_out(samples)
         return splits.leave_one_cycle_out(samples)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Selector(Settings):  # noqa: D101 - that of Settings, which the help is made from
+    __doc__ = Settings.__doc__
+
+    unsigned: Flag = False
+    models: Names = field(default_factory=lambda: ["ols", "dynamic"])
+    holm: Flag = False
 
 
 def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]":

@@ -11,7 +11,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.compare import Assessment, Comparison
+from thermocomp.assessment.harm import CycleVerdict
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
@@ -51,6 +53,47 @@ def show_comparison(
             )
     if report is not None:
         console.print(f"Report: {report}")
+
+
+def show_choices(
+    choices: Sequence[Choice], page: Path | None, trouble: Sequence[str], console: Console, *, as_json: bool
+) -> None:
+    """Print selections of sensors."""
+    if as_json:
+        content = {
+            "trouble": trouble,
+            "choices": [
+                {
+                    "method": c.method,
+                    "target": c.target,
+                    "sensors": c.sensors,
+                    "reason": c.reason,
+                    "notes": c.notes,
+                    "tables": {t.title: [dict(zip(t.columns, row, strict=True)) for row in t.rows] for t in c.tables},
+                }
+                for c in choices
+            ],
+        }
+        _print_json(content, console)
+        return
+    for c in choices:
+        for t in c.tables:
+            console.print(f"\n[bold]{escape(c.target)}: {escape(t.title)}[/]")
+            table = Table()
+            for j, heading in enumerate(t.columns):
+                table.add_column(escape(heading), justify="left" if j in t.words else "right")
+            for k, row in enumerate(t.rows):
+                table.add_row(*(escape(written(cell)) for cell in row), style="bold green" if k == t.marked else None)
+            console.print(table)
+            if t.caption:
+                console.print(escape(t.caption), style="dim")
+        for note in c.notes:
+            console.print(f"[dim]note[/] {escape(note)}")
+        console.print(
+            f"[bold green]{escape(c.target)}: {escape(', '.join(c.sensors)) or 'no sensor'}[/]: {escape(c.reason)}"
+        )
+    if page is not None:
+        console.print(f"Page: {page}")
 
 
 def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
@@ -189,22 +232,28 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Table:
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Table:
-    """Return the RMS in every unseen cycle, a section per target and a column per model."""
-    models = list(dict.fromkeys(a.model for a in assessments))
+    """Return the RMS in every unseen cycle, a section per target; whatever there is more of goes down the page."""
+    models = ["none", *dict.fromkeys(a.model for a in assessments)]
+    cycles = list(dict.fromkeys(c.cycle for a in assessments for c in a.verdict.cycles))
+    down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
     table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = refused")
     table.add_column("")
-    for heading in ("none", *models):
-        table.add_column(heading, justify="right", no_wrap=True)
+    for heading in across:
+        table.add_column(escape(heading), justify="right", no_wrap=across is models)
     for mine in _by_target(assessments):
+        cells = {(a.model, c.cycle): _passed(c) for a in mine for c in a.verdict.cycles}
+        cells |= {("none", c.cycle): f"{c.none_rms:.2f} " for a in mine for c in a.verdict.cycles}
         table.add_section()
         table.add_row(f"[bold]{escape(mine[0].target)}[/]")
-        verdicts = {a.model: {c.cycle: c for c in a.verdict.cycles} for a in mine}
-        for cycle in dict.fromkeys(c for found in verdicts.values() for c in found):
-            known = {m: found[cycle] for m, found in verdicts.items() if cycle in found}
-            cells = {m: f"{c.rms:.2f} " if c.passed else f"[red]{c.rms:.2f}![/]" for m, c in known.items()}
-            none = f"{next(iter(known.values())).none_rms:.2f}"
-            table.add_row(f"  {escape(cycle)}", none, *(cells.get(m, "") for m in models))
+        for name in down:
+            keys = [(name, other) if down is models else (other, name) for other in across]
+            if any(k in cells for k in keys):
+                table.add_row(f"  {escape(name)}", *(cells.get(k, "") for k in keys))
     return table
+
+
+def _passed(cycle: CycleVerdict) -> str:
+    return f"{cycle.rms:.2f} " if cycle.passed else f"[red]{cycle.rms:.2f}![/]"
 
 
 def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:

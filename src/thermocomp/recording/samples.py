@@ -1,7 +1,7 @@
 """`Samples`: several tests stacked into the arrays that models are fitted to and replayed on."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -114,6 +114,11 @@ class Samples:
             self.hashes,
             self.rezero,
         )
+
+    def only(self, names: Sequence[str]) -> "Samples":
+        """Return the same rows with some of the inputs, in the order they had."""
+        kept = [j for j, c in enumerate(self.inputs) if c.name in names]
+        return replace(self, inputs=tuple(self.inputs[j] for j in kept), values=self.values[:, kept])
 
     def model_inputs(self, columns: Sequence[int], rows: BoolArray | IntArray) -> tuple[Input, ...]:
         """Describe inputs for a model fitted to `rows`: reference and trained range of each."""

@@ -45,7 +45,7 @@ def measured(recording: Recording) -> str:
     hours = recording.time / 3600
     speed = recording.speed
     heights = ([1] if speed else []) + [2.2, 2.2]
-    with _style(recording.name):
+    with drawing(recording.name):
         figure = Figure(figsize=(9.6, 1.0 + 1.15 * sum(heights)), layout="constrained")
         axes: list[Axes] = list(np.atleast_1d(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)))
         for ax in axes:
@@ -81,7 +81,7 @@ def measured(recording: Recording) -> str:
                 ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, fontsize=7, handlelength=1.4)
         rest[-1].set_xlabel("time [h]")
         rest[-1].margins(x=0)
-        return _svg(figure)
+        return svg(figure)
 
 
 def overview(comparison: Comparison) -> str:
@@ -89,32 +89,32 @@ def overview(comparison: Comparison) -> str:
     overall = comparison.overall()
     targets = list(dict.fromkeys(a.target for a in overall))
     models = list(dict.fromkeys(a.model for a in overall))
-    with _style("overview"):
-        figure = Figure(figsize=(9.6, 0.9 + 0.38 * len(targets)), layout="constrained")
-        ax = figure.subplots()
-        for k, model in enumerate(models):
-            colour = COLOURS[k % len(COLOURS)]
-            for a in overall:
-                if a.model == model and not a.failure:
-                    y = targets.index(a.target) + 0.13 * (k - (len(models) - 1) / 2)
-                    ax.plot(
-                        a.metric("rms"), y, "o", color=colour, mfc=colour if a.accepted else "white", ms=6, zorder=3
-                    )
-            ax.plot([], [], "o", color=colour, label=model)
-        for a in overall:
-            y = targets.index(a.target)
-            ax.plot([a.none_metric("rms")] * 2, [y - 0.4, y + 0.4], color=NONE, lw=2.5, zorder=2)
-        ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
-        ax.plot([], [], "o", color="#444", mfc="white", label="refused")
-        ax.set_xscale("log")
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("{x:g}")
-        ax.tick_params(axis="x", which="minor", labelsize=7)
-        ax.set_yticks(range(len(targets)), targets)
-        ax.set_ylim(len(targets) - 0.5, -0.5)
-        ax.set_xlabel("RMS of the residual where it was judged [um], smaller is better")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return _svg(figure)
+    with drawing("overview"):
+        figure = Figure(figsize=(9.6, 0.8 + len(targets) * (0.25 + 0.15 * len(models))), layout="constrained")
+        panels = np.atleast_1d(figure.subplots(len(targets), 1, sharex=True))
+        for ax, target in zip(panels, targets, strict=True):
+            mine = [a for a in overall if a.target == target]
+            ax.axvline(mine[0].none_metric("rms"), color=NONE, lw=2.5, zorder=2)
+            for a in mine:
+                if not a.failure:
+                    face = PREDICTED if a.accepted else "white"
+                    ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
+            ax.set_yticks(range(len(models)), models, fontsize=7)
+            ax.set_ylim(len(models) - 0.4, -0.6)
+            ax.set_ylabel(target, fontweight="bold")
+            ax.set_xscale("log")
+        for label, style in (
+            ("no compensation", {"color": NONE, "lw": 2.5}),
+            ("accepted", {"marker": "o", "ls": "", "color": PREDICTED}),
+            ("refused", {"marker": "o", "ls": "", "color": PREDICTED, "mfc": "white"}),
+        ):
+            panels[0].plot([], [], label=label, **style)
+        figure.legend(loc="outside upper right", ncols=3)
+        panels[-1].xaxis.set_major_formatter("{x:g}")
+        panels[-1].xaxis.set_minor_formatter("{x:g}")
+        panels[-1].tick_params(axis="x", which="minor", labelsize=7)
+        panels[-1].set_xlabel("RMS of the residual where it was judged [um], smaller is better")
+        return svg(figure)
 
 
 def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Sequence[FloatArray]) -> str:
@@ -131,7 +131,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
     """
     columns = min(len(blocks), 3)
     rows = -(-len(blocks) // columns)
-    with _style(assessment.target + assessment.model):
+    with drawing(assessment.target + assessment.model):
         figure = Figure(figsize=(9.6, 0.5 + 2.6 * rows), layout="constrained")
         axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
         for ax in axes.flat[len(blocks) :]:
@@ -161,13 +161,13 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             ax.set_ylabel(f"{assessment.target.removesuffix('_um')} [um]")
         handles, labels = axes.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
-        return _svg(figure)
+        return svg(figure)
 
 
 def robustness(comparison: Comparison, model: str) -> str:
     """Show what noise and a lost sensor cost: RMS clean, with noise, and with each sensor cut off."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
-    with _style("robustness" + model):
+    with drawing("robustness" + model):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
         ax = figure.subplots()
         for k, a in enumerate(found):
@@ -195,7 +195,7 @@ def robustness(comparison: Comparison, model: str) -> str:
         ax.set_ylim(len(found) - 0.5, -0.5)
         ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return _svg(figure)
+        return svg(figure)
 
 
 def _clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
@@ -226,14 +226,21 @@ def _thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatA
 
 
 @contextmanager
-def _style(salt: str) -> Iterator[None]:
-    # a salt of its own keeps the ids of several figures on one page apart, and the page the same from run to run
+def drawing(salt: str) -> Iterator[None]:
+    """Draw in the house's style.
+
+    Parameters
+    ----------
+    salt : str
+        Keeps the ids of several figures on one page apart, and the page the same from run to run.
+    """
     rc: Any = {**_STYLE, "svg.hashsalt": salt}
     with mpl.rc_context(rc):
         yield
 
 
-def _svg(figure: Figure) -> str:
+def svg(figure: Figure) -> str:
+    """Return a figure as SVG text."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()

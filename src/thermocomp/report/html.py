@@ -6,9 +6,11 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
+from thermocomp import __version__
+from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.compare import Comparison
 from thermocomp.recording.recording import Recording
-from thermocomp.report import figures
+from thermocomp.report import figures, selections
 from thermocomp.report.summary import summarise
 
 
@@ -25,15 +27,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
     -------
     str
     """
-    environment = Environment(
-        loader=PackageLoader("thermocomp.report"),
-        autoescape=select_autoescape(["html"]),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["um"] = _number
-    environment.filters["hours"] = lambda value: f"{value:.1f}"
+    environment = _environment()
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -61,9 +55,54 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
     )
 
 
+def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -> str:
+    """Return a selection of sensors as one HTML page that needs no network.
+
+    Parameters
+    ----------
+    choices : sequence of Choice
+        All by one method.
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    str
+    """
+    return (
+        _environment()
+        .get_template("selection.html")
+        .render(
+            version=__version__,
+            recordings=[r.source or r.name for r in recordings],
+            method=choices[0].method,
+            choices=choices,
+            figures=[selections.draw(c) for c in choices],
+        )
+    )
+
+
+def write_choices(choices: Sequence[Choice], recordings: Sequence[Recording], path: Path) -> None:
+    """Write a selection of sensors as a page; an existing file is replaced."""
+    path.write_text(render_choices(choices, recordings), encoding="utf-8")
+
+
 def write(comparison: Comparison, recordings: Sequence[Recording], path: Path) -> None:
     """Write the report; an existing file is replaced."""
     path.write_text(render(comparison, recordings), encoding="utf-8")
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("thermocomp.report"),
+        autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["um"] = _number
+    environment.filters["hours"] = lambda value: f"{value:.1f}"
+    environment.filters["cell"] = written
+    return environment
 
 
 def _number(value: float | None) -> str:

@@ -1,0 +1,108 @@
+"""A selection of sensors: what it can be told, and what it comes out as: the sensors, why, and the tables behind it."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+Cell = str | float | int | None
+Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the selection methods can be told; each looks at its own.
+
+    Parameters
+    ----------
+    threshold : float
+        grouping: correlation above which a sensor joins a group.
+    unsigned : bool
+        grouping: compare magnitudes of correlations.
+    reference : str
+        grouping: temperature that is subtracted from the others.
+    max_sensors : int
+        subsets, ace, pareto: most sensors; 10 if not given, 3 for ace.
+    criterion : str
+        subsets: what the number of sensors is chosen by.
+    models : list of str
+        pareto: methods that are trained on the sensors.
+    level : float
+        ace: of the Wilcoxon test.
+    holm : bool
+        ace: correct the level for the number of tests.
+    """
+
+    threshold: float = 0.9
+    unsigned: bool = False
+    reference: str | None = None
+    max_sensors: int | None = None
+    criterion: Criterion = "cycles"
+    models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
+    level: float = 0.05
+    holm: bool = False
+
+    def most(self, method: str) -> int:
+        """Return the most sensors a method may choose."""
+        return self.max_sensors if self.max_sensors is not None else 3 if method == "ace" else 10
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table for people, pages and programs alike.
+
+    Parameters
+    ----------
+    title : str
+    columns : tuple of str
+        Headings; units in brackets.
+    rows : tuple of tuple
+    marked : int or None
+        Row of what was chosen.
+    caption : str
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    marked: int | None = None
+    caption: str = ""
+
+    @property
+    def words(self) -> tuple[int, ...]:
+        """Columns of words, which are set to the left."""
+        return tuple(j for j in range(len(self.columns)) if any(isinstance(row[j], str) for row in self.rows))
+
+
+def written(cell: Cell) -> str:
+    """Return a cell as text: four digits, nothing for what is not known."""
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Sensors that a method has chosen.
+
+    Parameters
+    ----------
+    method : str
+    target : str
+        Displacement channel, or several joined by ``, `` if the choice is for all of them.
+    sensors : tuple of str
+    reason : str
+        How they were chosen, in words.
+    tables : tuple of Table
+    notes : tuple of str
+        What a user should know before he relies on it.
+    details : object
+        The numbers behind it, for figures.
+    """
+
+    method: str
+    target: str
+    sensors: tuple[str, ...]
+    reason: str
+    tables: tuple[Table, ...]
+    notes: tuple[str, ...] = ()
+    details: object = None

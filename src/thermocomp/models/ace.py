@@ -1,0 +1,282 @@
+"""`ace`: alternating conditional expectations on ranks, as in Wessel 2004."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import Input
+from thermocomp.core.terms import Variable
+from thermocomp.models.base import ThermalRegressor
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+_NOTHING = Curve((), (0.0,), "step")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A function of one variable as points, for plots.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n_rows,)
+        Values seen, rising.
+    y : ndarray of shape (n_rows,)
+    """
+
+    x: FloatArray
+    y: FloatArray
+
+
+class TransformRegressor(ThermalRegressor):
+    """Both sides transformed: theta(y) = phi_1(x_1) + phi_2(x_2) + ... (Wessel 2004, Eq. 2; W-01).
+
+    theta has zero mean and unit variance, each phi has zero mean (E-W3). A constant input has phi = 0. If nothing
+    depends on anything (a constant y, say), psi is 0 and the mean of y is predicted.
+
+    Attributes
+    ----------
+    psi_ : float
+        Maximal correlation |corr(theta, sum phi)|, as reached (W-02).
+    theta_ : Table
+        theta over y.
+    phi_ : tuple of Table
+        phi over each input.
+    sum_phi_ : Table
+        Sum of phi over theta, row by row of the training data sorted by y: a straight line if the model holds.
+    errors_ : ndarray of shape (n_sweeps,)
+        E[(theta - sum phi)^2] after each sweep.
+    falling_theta_ : float
+        Share of the steps between neighbouring values of y over which theta falls: there its inverse is not unique, and
+        an average of neighbours mixes branches (E-W5).
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range; beyond it all curves are constant (W-07).
+    """
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation, theta^-1 of the sum of phi.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        total = np.zeros(len(change))
+        for j, curve in enumerate(self._curves):
+            total = total + curve(change[:, j])
+        return self._inverse(total)
+
+    def outside(self, X: ArrayLike) -> NDArray[np.bool_]:
+        """Tell which values lie beyond the trained range, where the prediction is cropped (W-07).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+
+        Returns
+        -------
+        ndarray of bool of shape (n_rows, n_features)
+        """
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        return np.asarray((change < self.data_min_) | (change > self.data_max_))
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Additive:
+        active = [j for j, curve in enumerate(self._curves) if curve != _NOTHING]
+        return Additive(
+            **header,
+            inputs=tuple(inputs[j] for j in active),
+            variables=tuple(Variable.single(inputs[j].name, k) for k, j in enumerate(active)),
+            curves=tuple(self._curves[j] for j in active),
+            response=self._inverse,
+        )
+
+    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Check the training data and note their range."""
+        change, deviation = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        return change, np.asarray(deviation, dtype=np.float64)
+
+    def _keep(
+        self,
+        X: FloatArray,
+        y: FloatArray,
+        theta: FloatArray,
+        total: FloatArray,
+        curves: dict[int, Curve],
+        inverse: Curve,
+    ) -> None:
+        """Keep the transformations; `theta` and `total`, the sum of phi, are by row, `curves` by input."""
+        self._curves = tuple(curves.get(j, _NOTHING) for j in range(X.shape[1]))
+        self._inverse = inverse
+        by_y = np.argsort(y, kind="stable")
+        self.theta_ = Table(y[by_y], theta[by_y])
+        self.sum_phi_ = Table(theta[by_y], total[by_y])
+        tables = []
+        for j, curve in enumerate(self._curves):
+            rising = np.sort(X[:, j])
+            tables.append(Table(rising, curve(rising)))
+        self.phi_ = tuple(tables)
+        steps = np.diff(self.theta_.y)[np.diff(self.theta_.x) > 0]
+        self.falling_theta_ = float(np.mean(steps < 0)) if steps.size else 0.0
+
+
+class ACE(TransformRegressor):
+    """Alternating conditional expectations with a boxcar on ranks, and nearest neighbours (Wessel 2004; W-01 to W-05).
+
+    Appendix A as it stands, with what it leaves open settled like this. All but the first input start with phi = 0; if
+    the first input has E[y|x_1] = 0, the first that has not takes its place. theta is normalised, phi is not (E-W3). At
+    the ends of the rank list the boxcar holds the ranks that there are; values of tied ranks, ordered as the rows are,
+    get the mean of what the boxcar gives them (E-W4). The functions are those of the last sweep.
+
+    theta need not be monotone, and then has no inverse: see ``falling_theta_`` (E-W5) and
+    `thermocomp.models.ace_monotone.MonotoneACE`.
+
+    Parameters
+    ----------
+    half_window : int
+        N: the boxcar holds 2N + 1 ranks (W-04). With n rows it is never more than (n - 1) / 4, so that the window is
+        not wider than half of the data, nor less than 1.
+    window_share : float, optional
+        N as a share of the number of rows, instead of `half_window`: ten ranks are a lot of 199 rows but noise of
+        10,000 (E-W8).
+    neighbours : int
+        k of the nearest-neighbour estimate of phi and of theta^-1 (W-05). With fewer rows, all are taken.
+    tolerance : float
+        Sweeps end when E[(theta - sum phi)^2] fails to decrease by more than this; 0 is the paper's rule (W-03).
+    max_sweeps : int
+        Sweeps end then at the latest. The paper's rule may take thousands: see ``errors_``.
+
+    Attributes
+    ----------
+    psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
+        See `TransformRegressor`.
+    half_window_ : int
+        N, as used.
+    """
+
+    def __init__(
+        self,
+        *,
+        half_window: int = 10,
+        window_share: float | None = None,
+        neighbours: int = 2,
+        tolerance: float = 0.0,
+        max_sweeps: int = 300,
+    ) -> None:
+        self.half_window = half_window
+        self.window_share = window_share
+        self.neighbours = neighbours
+        self.tolerance = tolerance
+        self.max_sweeps = max_sweeps
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "ACE":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        ACE
+
+        Raises
+        ------
+        InputError
+            A setting is out of its range.
+        """
+        if self.neighbours < 1 or self.max_sweeps < 1 or not self.tolerance >= 0:
+            raise InputError(
+                f"ACE: want neighbours >= 1, max_sweeps >= 1 and tolerance >= 0, "
+                f"found {self.neighbours}, {self.max_sweeps} and {self.tolerance}"
+            )
+        change, deviation = self._read(X, y)
+        self.half_window_ = half_window(len(deviation), self.half_window, self.window_share)
+        self._alternate(change, deviation)
+        return self
+
+    def _alternate(self, X: FloatArray, y: FloatArray) -> None:
+        from thermocomp.models.kernels import ace as kernel  # numba takes its time
+
+        varied = np.flatnonzero(self.data_max_ > self.data_min_)
+        order, bounds, groups, start = kernel.rank(np.ascontiguousarray(np.vstack([X[:, varied].T, y])))
+        by_rank, phi, self.psi_, self.errors_ = kernel.solve(
+            order, bounds, groups, start, self.half_window_, self.tolerance, self.max_sweeps
+        )
+        by_y = order[-1]
+        theta, total = np.empty(len(y)), np.zeros(len(y))
+        theta[by_y] = by_rank
+        curves, tables = {}, {}
+        for k, j in enumerate(varied.tolist()):
+            rows = by_y[order[k]]
+            total[rows] += phi[k]
+            tables[j] = Table(X[rows, j], phi[k])
+            curves[j] = nearest(tables[j], self.neighbours)
+        by_theta = np.argsort(theta, kind="stable")
+        inverse = nearest(Table(theta[by_theta], y[by_theta]), self.neighbours)
+        if self.psi_ == 0.0:
+            curves, inverse = {}, Curve((), (float(y.mean()),), "step")
+        self._keep(X, y, theta, total, curves, inverse)
+        self.phi_ = tuple(tables.get(j, t) for j, t in enumerate(self.phi_))  # as found, not as read from the curves
+
+
+def half_window(n_rows: int, fixed: int, share: float | None) -> int:
+    """Return the half width of the boxcar, not more than a quarter of the rows.
+
+    Raises
+    ------
+    InputError
+        `fixed` is less than 1, or `share` not between 0 and 1/4.
+    """
+    if share is None:
+        if fixed < 1:
+            raise InputError(f"half_window {fixed}: want at least 1")
+        wanted = fixed
+    else:
+        if not 0 < share <= 0.25:
+            raise InputError(f"window_share {share}: want more than 0 and at most 0.25, a window of half of the rows")
+        wanted = round(share * n_rows)
+    return max(1, min(wanted, (n_rows - 1) // 4))
+
+
+def nearest(table: Table, k: int) -> Curve:
+    """Return the mean of the k entries that are nearest, as a function of the place: a step curve.
+
+    The k nearest of sorted entries are neighbours of each other; entry i makes room for entry i + k half way between
+    them, and there the latter counts as the nearer one. Entries at one place are given their mean first.
+
+    Parameters
+    ----------
+    table : Table
+        With rising, perhaps equal x.
+    k : int
+
+    Returns
+    -------
+    Curve
+    """
+    _, group, count = np.unique(table.x, return_inverse=True, return_counts=True)
+    y = (np.bincount(group, table.y) / count)[group]
+    k = min(k, len(y))
+    # half of each first: the sum of two large numbers may be beyond all numbers
+    breaks = table.x[:-k] / 2 + table.x[k:] / 2
+    means = np.lib.stride_tricks.sliding_window_view(y, k).mean(axis=1)
+    wide = np.append(np.diff(breaks, prepend=-np.inf) > 0, True)
+    return Curve(tuple(np.unique(breaks).tolist()), tuple(means[wide].tolist()), "step")

@@ -1,0 +1,206 @@
+"""`ace-monotone`: alternating conditional expectations with a theta that can be inverted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import isotonic_regression
+
+from thermocomp.core.additive import Curve
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.ace import TransformRegressor
+
+FloatArray = NDArray[np.float64]
+
+_SAME = 1e-9  # share of its size by which a channel must vary, else it counts as constant: no sensor has as many digits
+
+
+class MonotoneACE(TransformRegressor):
+    """Alternating conditional expectations with a rising theta, converged, as smooth curves (E-W5, E-W8).
+
+    The model of `thermocomp.models.ace.ACE`, made fit for unseen cycles and for a controller:
+
+    - The conditional expectations are penalised splines (joined straight lines on equally spaced knots, second
+      differences penalised) instead of a boxcar on ranks. They leave straight lines as they are, where a boxcar
+      flattens the ends of every curve; neither the number of rows nor ties matter to them (E-W4, E-W8).
+    - For a given theta all phi are found at once by solving one linear system: collinear temperatures, among which
+      back-fitting takes thousands of sweeps, cost nothing.
+    - theta is made rising in every sweep (isotonic regression of its knots), so its inverse is unique. Where theta is
+      flat, the inverse has a single point: the mean of y there.
+    - The curves go on straight beyond the trained range for a share of it, and are constant from there on.
+
+    Parameters
+    ----------
+    points : int
+        Knots of each curve.
+    smoothing : float
+        Weight of the integrated squared second derivative, the (extended) range of each variable counting as 1. It takes
+        1 % of the height of one wide arc at 1e-4, and half of it at 0.01; at 1e-6 the curves follow every bump.
+    shrinkage : float
+        Weight of the mean square of the curves' knots: decides between inputs that say the same.
+    extend : float
+        Share of the trained span by which curves go on beyond it. It is the margin at which `Support` clips the inputs
+        unless told otherwise; 0 crops peaks like the paper (W-07).
+    tolerance : float
+        Sweeps end when theta moves by less (root mean square; it has norm 1).
+    max_sweeps : int
+        Sweeps end then at the latest.
+    max_rows : int
+        With more rows, runs of equally many consecutive rows are averaged first, so that not more are left.
+
+    Attributes
+    ----------
+    psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
+        See `TransformRegressor`; of the averaged rows, except for the trained range. ``falling_theta_`` is 0.
+    """
+
+    def __init__(
+        self,
+        *,
+        points: int = 20,
+        smoothing: float = 1e-4,
+        shrinkage: float = 1e-5,
+        extend: float = 0.25,
+        tolerance: float = 1e-6,
+        max_sweeps: int = 1000,
+        max_rows: int = 10_000,
+    ) -> None:
+        self.points = points
+        self.smoothing = smoothing
+        self.shrinkage = shrinkage
+        self.extend = extend
+        self.tolerance = tolerance
+        self.max_sweeps = max_sweeps
+        self.max_rows = max_rows
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "MonotoneACE":
+        """Fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        MonotoneACE
+
+        Raises
+        ------
+        InputError
+            A setting is out of its range.
+        """
+        if self.points < 3 or self.max_sweeps < 1 or self.max_rows < 2:
+            raise InputError(
+                f"MonotoneACE: want points >= 3, max_sweeps >= 1 and max_rows >= 2, "
+                f"found {self.points}, {self.max_sweeps} and {self.max_rows}"
+            )
+        if not (self.smoothing > 0 and self.shrinkage > 0 and self.extend >= 0 and self.tolerance >= 0):
+            raise InputError(
+                f"MonotoneACE: want smoothing > 0, shrinkage > 0, extend >= 0 and tolerance >= 0, "
+                f"found {self.smoothing}, {self.shrinkage}, {self.extend} and {self.tolerance}"
+            )
+        change, deviation = self._read(X, y)
+        run = -(-len(deviation) // self.max_rows)
+        self._alternate(_averaged(change, run), _averaged(deviation, run))
+        return self
+
+    def _alternate(self, X: FloatArray, y: FloatArray) -> None:
+        n, k = len(y), self.points
+        varied = [j for j in range(X.shape[1]) if _varies(X[:, j])]
+        self.errors_ = np.empty(0)
+        if not varied or not _varies(y):
+            self._keep_nothing(X, y)
+            return
+        knots = [_Knots.over(X[:, j], k, self.extend) for j in varied]
+        basis = np.hstack([at.basis(X[:, j]) for at, j in zip(knots, varied, strict=True)])
+        means = basis.mean(axis=0)
+        basis -= means  # each phi has zero mean
+        gram = basis.T @ basis
+        bending = self.smoothing * n * _bending(k)
+        for start in range(0, len(gram), k):
+            gram[start : start + k, start : start + k] += bending
+        gram[np.diag_indices_from(gram)] += self.shrinkage * n
+        factor = cho_factor(gram, overwrite_a=True)
+        y_knots = _Knots.over(y, k, self.extend)
+        y_basis = y_knots.basis(y)
+        y_gram = y_basis.T @ y_basis + bending + 1e-9 * n * np.eye(k)
+        y_factor = cho_factor(y_gram)
+        theta, errors = (y - y.mean()) / y.std(), []
+        while True:
+            weights = cho_solve(factor, basis.T @ theta)
+            total = basis @ weights
+            errors.append(float(np.mean((theta - total) ** 2)))
+            level = isotonic_regression(cho_solve(y_factor, y_basis.T @ total)).x
+            new = y_basis @ level
+            centre, norm = new.mean(), new.std()
+            if not norm > _SAME:
+                self._keep_nothing(X, y)
+                return
+            level = (level - centre) / norm
+            new = (new - centre) / norm
+            moved = np.sqrt(np.mean((new - theta) ** 2))
+            theta = new
+            if moved <= self.tolerance or len(errors) == self.max_sweeps:
+                break
+        weights = cho_solve(factor, basis.T @ theta)
+        total = basis @ weights
+        self.errors_ = np.array(errors)
+        self.psi_ = float(abs(np.mean(theta * total)) / total.std())
+        curves = {
+            j: Curve(at.places, tuple((weights[s : s + k] - means[s : s + k] @ weights[s : s + k]).tolist()))
+            for at, j, s in zip(knots, varied, range(0, len(gram), k), strict=True)
+        }
+        levels, group, count = np.unique(level, return_inverse=True, return_counts=True)
+        places = np.bincount(group, y_knots.places) / count
+        self._keep(X, y, theta, total, curves, Curve(tuple(levels.tolist()), tuple(places.tolist())))
+
+    def _keep_nothing(self, X: FloatArray, y: FloatArray) -> None:
+        self.psi_ = 0.0
+        nothing = np.zeros(len(y))
+        self._keep(X, y, nothing, nothing, {}, Curve((), (float(y.mean()),), "step"))
+
+
+@dataclass(frozen=True)
+class _Knots:
+    """Equally spaced places, as the joints of straight lines."""
+
+    places: tuple[float, ...]
+
+    @classmethod
+    def over(cls, values: FloatArray, points: int, extend: float) -> "_Knots":
+        low, high = values.min(), values.max()
+        beyond = extend * (high - low)
+        return cls(tuple(np.linspace(low - beyond, high + beyond, points).tolist()))
+
+    def basis(self, values: FloatArray) -> FloatArray:
+        """Return the weight of each knot in each value, (n_values, n_points)."""
+        places = np.array(self.places)
+        left = np.clip(np.searchsorted(places, values, side="right") - 1, 0, len(places) - 2)
+        share = (values - places[left]) / (places[left + 1] - places[left])
+        table = np.zeros((len(values), len(places)))
+        rows = np.arange(len(values))
+        table[rows, left] = 1 - share
+        table[rows, left + 1] = share
+        return table
+
+
+def _bending(points: int) -> FloatArray:
+    """Return the matrix of the integrated squared second derivative over a range of 1."""
+    second = np.diff(np.eye(points), 2, axis=0)
+    return np.asarray((points - 1) ** 3 * (second.T @ second))
+
+
+def _varies(values: FloatArray) -> bool:
+    low, high = values.min(), values.max()
+    return bool(high - low > _SAME * max(abs(low), abs(high)))
+
+
+def _averaged(values: FloatArray, run: int) -> FloatArray:
+    """Return the means of runs of consecutive rows."""
+    starts = np.arange(0, len(values), run)
+    lengths = np.diff(np.append(starts, len(values)))
+    return np.asarray((np.add.reduceat(values, starts, axis=0).T / lengths).T)

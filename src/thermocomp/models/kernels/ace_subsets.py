@@ -1,0 +1,307 @@
+"""ACE of many subsets of the same variables at once, eight in the lanes of a register; see `kernels.ace`."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.models.kernels.ace import MOMENTUM, VANISHES, FloatArray, RankArray, compiled, dot, running_sums, smooth
+from thermocomp.models.kernels.lanes import LANES, add, load, multiply, splat, store, subtract
+
+
+@compiled
+def _lane_boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> Any:
+    """As `boxcar` of `thermocomp.models.kernels.ace` for all lanes, except that the mean stays in; return it."""
+    n = len(out)
+    mean = splat(0.0)
+    for i in range(min(half, n)):
+        top = min(i + half + 1, n)
+        value = multiply(load(sums, top), splat(1.0 / top))
+        store(out, i, value)
+        mean = add(mean, value)
+    share = splat(1.0 / (2 * half + 1))
+    for i in range(half, n - half):
+        value = multiply(subtract(load(sums, i + half + 1), load(sums, i - half)), share)
+        store(out, i, value)
+        mean = add(mean, value)
+    whole = load(sums, n)
+    for i in range(max(half, n - half), n):
+        value = multiply(subtract(whole, load(sums, i - half)), splat(1.0 / (n - i + half)))
+        store(out, i, value)
+        mean = add(mean, value)
+    _lane_level(bounds, groups, out)
+    return multiply(mean, splat(1.0 / n))
+
+
+@compiled
+def _lane_level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
+    """Give tied ranks their mean."""
+    n = len(out)
+    if groups < n:
+        for g in range(groups):
+            first, last = bounds[g], bounds[g + 1]
+            if last - first > 1:
+                tied = splat(0.0)
+                for i in range(first, last):
+                    tied = add(tied, load(out, i))
+                tied = multiply(tied, splat(1.0 / (last - first)))
+                for i in range(first, last):
+                    store(out, i, tied)
+
+
+@compiled
+def _lane_mirrored(sums: FloatArray, half: int, out: FloatArray) -> None:
+    """Mean of the 2 half + 1 ranks around each, mirrored at the ends."""
+    n = len(out)
+    share = splat(1.0 / (2 * half + 1))
+    for i in range(half):
+        store(out, i, multiply(add(load(sums, i + half + 1), load(sums, half - i)), share))
+    for i in range(half, n - half):
+        store(out, i, multiply(subtract(load(sums, i + half + 1), load(sums, i - half)), share))
+    whole = load(sums, n)
+    for i in range(n - half, n):
+        right = subtract(whole, load(sums, 2 * n - i - half - 1))
+        store(out, i, multiply(add(right, subtract(whole, load(sums, i - half))), share))
+
+
+@compiled
+def _lane_smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray) -> Any:
+    """As `smooth`, for all lanes, except that the mean stays in; return it."""
+    if not twice:
+        return _lane_boxcar(sums, half, bounds, groups, out)
+    n = len(out)
+    if groups < n:
+        for g in range(groups):
+            first, last = bounds[g], bounds[g + 1]
+            if last - first > 1:
+                low = load(sums, first)
+                step = multiply(subtract(load(sums, last), low), splat(1.0 / (last - first)))
+                for i in range(first + 1, last):
+                    store(sums, i, add(low, multiply(step, splat(1.0 * (i - first)))))
+    _lane_mirrored(sums, (half + 1) // 2, out)
+    running = splat(0.0)
+    for i in range(n):
+        running = add(running, load(out, i))
+        store(sums, i + 1, running)
+    _lane_mirrored(sums, (half + 1) // 2, out)
+    _lane_level(bounds, groups, out)
+    return multiply(running, splat(1.0 / n))  # twice the mirrored boxcar keeps the mean
+
+
+@compiled
+def _lane_theta(
+    total: FloatArray,
+    last_total: FloatArray,
+    momentum: FloatArray,
+    half: int,
+    twice: bool,
+    bounds: RankArray,
+    groups: Any,
+    theta: FloatArray,
+    residual: FloatArray,
+    sums: FloatArray,
+    norm: FloatArray,
+) -> None:
+    """Theta of the (extrapolated) sum of phi, normalised; a lane without any gets 0. `norm` is a row to write to."""
+    n = len(theta)
+    share, running = load(momentum, 0), splat(0.0)
+    for i in range(n):
+        new = load(total, i)
+        ahead = add(new, multiply(share, subtract(new, load(last_total, i))))
+        store(last_total, i, new)
+        store(total, i, ahead)
+        running = add(running, ahead)
+        store(sums, i + 1, running)
+    mean, square = _lane_smooth(sums, half, twice, bounds, groups, theta), splat(0.0)
+    for i in range(n):
+        value = subtract(load(theta, i), mean)
+        store(theta, i, value)
+        square = add(square, multiply(value, value))
+    store(norm, 0, square)
+    for v in range(LANES):
+        root = np.sqrt(norm[0, v] / n)
+        norm[0, v] = 1.0 / root if root > VANISHES else 0.0
+    scale = load(norm, 0)
+    for i in range(n):
+        value = multiply(load(theta, i), scale)
+        store(theta, i, value)
+        store(residual, i, subtract(value, load(total, i)))
+
+
+@compiled
+def _lane_phi(
+    phi: FloatArray,
+    last: FloatArray,
+    momentum: FloatArray,
+    on: FloatArray,
+    j: int,
+    index: RankArray,
+    half: int,
+    bounds: RankArray,
+    groups: Any,
+    residual: FloatArray,
+    sums: FloatArray,
+    work: FloatArray,
+    accelerate: bool,
+) -> Any:
+    """Back-fit one phi in the lanes that have it; return the square of its move."""
+    n = len(phi)
+    share, running = load(momentum, 0), splat(0.0)
+    if accelerate:
+        for i in range(n):
+            new = load(phi, i)
+            ahead = add(new, multiply(share, subtract(new, load(last, i))))
+            store(last, i, new)
+            store(phi, i, ahead)
+            running = add(running, add(load(residual, index[i]), ahead))
+            store(sums, i + 1, running)
+    else:
+        for i in range(n):
+            running = add(running, add(load(residual, index[i]), load(phi, i)))
+            store(sums, i + 1, running)
+    mean, mine, square = _lane_smooth(sums, half, accelerate, bounds, groups, work), load(on, j), splat(0.0)
+    for i in range(n):
+        new = multiply(subtract(load(work, i), mean), mine)
+        step = subtract(new, load(phi, i))
+        store(phi, i, new)
+        store(residual, index[i], subtract(load(residual, index[i]), step))
+        square = add(square, multiply(step, step))
+    return square
+
+
+@compiled
+def _lane_sums(theta: FloatArray, residual: FloatArray, total: FloatArray, result: FloatArray) -> None:
+    """Renew the sum of phi; write the sums of residual^2, sum^2 and theta * sum to rows 1 to 3 of `result`."""
+    error = norm = cross = splat(0.0)
+    for i in range(len(theta)):
+        left, ours = load(residual, i), load(theta, i)
+        fitted = subtract(ours, left)
+        store(total, i, fitted)
+        error = add(error, multiply(left, left))
+        norm = add(norm, multiply(fitted, fitted))
+        cross = add(cross, multiply(fitted, ours))
+    store(result, 1, error)
+    store(result, 2, norm)
+    store(result, 3, cross)
+
+
+@compiled
+def _take(
+    v: int,
+    subset: NDArray[np.bool_],
+    first: FloatArray,
+    order: RankArray,
+    groups: Any,
+    phi: FloatArray,
+    last: FloatArray,
+    total: FloatArray,
+    on: FloatArray,
+    accelerate: bool,
+) -> bool:
+    """Begin a subset in lane `v`; return False if E[S|T] vanishes for all its variables."""
+    p, n, _ = phi.shape
+    begun = False
+    for j in range(p):
+        if on[j, v] > 0:
+            for i in range(n):
+                phi[j, i, v] = 0.0
+            if accelerate:
+                for i in range(n):
+                    last[j, i, v] = 0.0
+        on[j, v] = 1.0 if subset[j] and groups[j] > 1 else 0.0
+        if on[j, v] > 0 and not begun and dot(first[j], first[j]) > n * VANISHES**2:
+            begun = True
+            for i in range(n):
+                phi[j, i, v] = first[j, i]
+                total[order[j, i], v] = first[j, i]
+    return begun
+
+
+@compiled
+def correlations(  # noqa: PLR0912
+    order: RankArray,
+    bounds: RankArray,
+    groups: Any,
+    start: FloatArray,
+    half: int,
+    tolerance: float,
+    max_sweeps: int,
+    accelerate: bool,
+    subsets: NDArray[np.bool_],
+) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Psi of many subsets of the variables, eight at a time.
+
+    Parameters
+    ----------
+    order, bounds, groups, start
+        From `rank`.
+    accelerate : bool
+        False: the rule of `solve`; True: that of `converge`.
+    subsets : ndarray of bool of shape (n_subsets, p)
+        Neighbours should share most of their variables.
+
+    Returns
+    -------
+    psi : ndarray of shape (n_subsets,)
+    sweeps : ndarray of int64 of shape (n_subsets,)
+    """
+    p, n = len(order) - 1, len(start)
+    count = len(subsets)
+    psi, sweeps = np.zeros(count), np.zeros(count, np.int64)
+    first = np.zeros((p, n))
+    start_sums, zero = np.empty(n + 1), np.zeros(n)
+    for j in range(p):
+        if groups[j] > 1:
+            running_sums(start, zero, order[j], start_sums)
+            smooth(start_sums, half, accelerate, bounds[j], groups[j], first[j])
+    theta, total, residual = np.empty((n, LANES)), np.empty((n, LANES)), np.empty((n, LANES))
+    last_total, work, sums = np.zeros((n, LANES)), np.empty((n, LANES)), np.zeros((n + 1, LANES))
+    phi, last = np.zeros((p, n, LANES)), np.zeros((p, n, LANES))
+    on, used = np.zeros((p, LANES)), np.zeros(p, np.bool_)
+    momentum, result = np.zeros((1, LANES)), np.empty((4, LANES))
+    previous, age, holds = np.empty(LANES), np.empty(LANES, np.int64), np.full(LANES, -1)
+    idle = np.ones(LANES, np.bool_)
+    queue = 0
+    while True:
+        for v in range(LANES):  # a lane that is done takes the next subset
+            while idle[v] and queue < count:
+                holds[v] = queue
+                momentum[0, v] = 0.0  # the last sum is multiplied by this, then overwritten
+                idle[v] = not _take(v, subsets[queue], first, order, groups, phi, last, total, on, accelerate)
+                queue += 1
+        if idle.all():
+            return psi, sweeps
+        for j in range(p):
+            used[j] = False
+            for v in range(LANES):
+                used[j] |= on[j, v] > 0 and not idle[v]
+        _lane_theta(total, last_total, momentum, half, accelerate, bounds[p], groups[p], theta, residual, sums, result[:1])
+        for v in range(LANES):
+            if result[0, v] == 0.0 and not idle[v]:
+                idle[v] = True
+                psi[holds[v]] = 0.0
+        move = splat(0.0)
+        for j in range(p):
+            if used[j]:
+                square = _lane_phi(
+                    phi[j], last[j], momentum, on, j, order[j], half, bounds[j], groups[j],
+                    residual, sums, work, accelerate,
+                )  # fmt: skip
+                move = add(move, square)
+        store(result, 0, move)
+        _lane_sums(theta, residual, total, result)
+        for v in range(LANES):
+            if idle[v]:
+                continue
+            k = holds[v]
+            sweeps[k] += 1
+            psi[k] = abs(result[3, v]) / np.sqrt(result[2, v] * n) if result[2, v] > 0 else 0.0
+            now = np.sqrt(result[0, v] / n) if accelerate else result[1, v] / n
+            if accelerate:
+                age[v] = 0 if sweeps[k] == 1 or now > previous[v] else age[v] + 1
+                momentum[0, v] = min(MOMENTUM, age[v] / (age[v] + 3.0))
+                idle[v] = now <= tolerance
+            else:
+                idle[v] = sweeps[k] > 1 and not previous[v] - now > tolerance
+            previous[v] = now
+            idle[v] |= sweeps[k] == max_sweeps

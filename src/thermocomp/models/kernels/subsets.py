@@ -1,0 +1,95 @@
+"""What both searches for best subsets share, compiled: the lists of good sets, and QR.
+
+They work on the triangle of the columns (scaled to the norm 1) and y. The lists are a tuple: residual sums of squares,
+rising, and the sets they belong to, per size; the least sum lost from each list; the limit below which a set of each
+size is of interest; the greatest limit of that size and above; how many sets are wanted; and the margin of
+`thermocomp.models.selection.subsetsearch.Problem`.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ByteArray = NDArray[np.uint8]
+Lists = tuple[FloatArray, ByteArray, FloatArray, FloatArray, FloatArray, IntArray, FloatArray]
+
+#: products and sums may be rounded once instead of twice
+CONTRACT = {"contract"}
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: int) -> None:
+    """Put the set `inside` without `a` and `b` on the list of its size; renew the limits."""
+    values, sets, lost, limit, bound, wanted, margin = lists
+    last = values.shape[1] - 1
+    if values[size, last] < np.inf:
+        lost[size] = min(lost[size], max(value, values[size, last]))
+    if value >= values[size, last]:
+        return
+    k = last
+    while k > 0 and values[size, k - 1] > value:
+        values[size, k] = values[size, k - 1]
+        sets[size, k] = sets[size, k - 1]
+        k -= 1
+    values[size, k] = value
+    sets[size, k] = inside
+    if a >= 0:
+        sets[size, k, a] = 0
+    if b >= 0:
+        sets[size, k, b] = 0
+    worst = values[size, wanted[size] - 1]
+    if worst < np.inf:
+        root = np.sqrt(worst) + 2 * (margin[0] + margin[1] * np.sqrt(max(worst - margin[2], 0.0)))
+        new = min(root * root, worst * (1 + margin[3]))
+        if new < limit[size]:
+            limit[size] = new
+            most = -np.inf
+            for s in range(len(limit) - 1, 0, -1):
+                most = max(most, limit[s])
+                bound[s] = most
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+def householder(columns: FloatArray, n: int) -> None:
+    """Make the first `n` columns triangular, the others go with them; columns are stored as rows."""
+    width, rows = columns.shape
+    for k in range(min(n, rows)):
+        x = columns[k]
+        square = 0.0
+        for i in range(k, rows):
+            square += x[i] * x[i]
+        if square == 0.0:
+            continue
+        length = np.copysign(np.sqrt(square), x[k])
+        x[k] += length
+        for c in range(k + 1, width):
+            other = columns[c]
+            dot = 0.0
+            for i in range(k, rows):
+                dot += x[i] * other[i]
+            dot /= x[k] * length
+            for i in range(k, rows):
+                other[i] -= dot * x[i]
+        x[k] = -length
+        for i in range(k + 1, rows):
+            x[i] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
+def exact(columns: FloatArray, least: FloatArray, chosen: IntArray, n: int) -> float:
+    """Return the residual sum of squares of the first `n` of `chosen` by QR; infinite if they are dependent."""
+    p, rows = columns.shape[0] - 1, columns.shape[1]
+    some = np.empty((n + 1, rows))
+    for i in range(n):
+        some[i] = columns[chosen[i]]
+    some[n] = columns[p]
+    householder(some, n)
+    for i in range(n):
+        if i >= rows or abs(some[i, i]) <= least[chosen[i]]:
+            return np.inf
+    total = 0.0
+    for i in range(n, rows):
+        total += some[n, i] ** 2
+    return total

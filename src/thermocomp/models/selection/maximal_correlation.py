@@ -1,0 +1,199 @@
+"""Maximal correlation of every small set of temperatures with every displacement of every test."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One test, as arrays.
+
+    Parameters
+    ----------
+    name : str
+    temperatures : array-like of shape (n_rows, n_temperatures)
+    displacements : array-like of shape (n_rows, n_displacements)
+    """
+
+    name: str
+    temperatures: ArrayLike
+    displacements: ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class MaximalCorrelations:
+    """Psi of every subset of the temperatures (Wessel 2004, Appendix B; W-10).
+
+    Parameters
+    ----------
+    psi : ndarray of shape (n_displacements, n_subsets, n_tests)
+        Of models that were not reached before the work was stopped: nan.
+    subsets : tuple of tuple of int
+        Indices of the temperatures.
+    tests : tuple of str
+    complete : bool
+        False if the work was stopped.
+    """
+
+    psi: FloatArray
+    subsets: tuple[tuple[int, ...], ...]
+    tests: tuple[str, ...]
+    complete: bool
+
+    def scores(self) -> FloatArray:
+        """Return Psi summed over the tests that are done, (n_displacements, n_subsets)."""
+        return np.asarray(np.nansum(self.psi, axis=2))
+
+    def best(self, displacement: int) -> tuple[int, ...]:
+        """Return the subset with the greatest sum of Psi for a displacement."""
+        return self.subsets[int(np.argmax(self.scores()[displacement]))]
+
+    def least_size(self, level: float) -> int | None:
+        """Return the number of temperatures from which on a subset reaches `level` on average, everywhere (W-12).
+
+        None if no number does. For the paper `level` is 0.99, and the answer three.
+        """
+        sizes = np.array([len(s) for s in self.subsets])
+        means = np.nanmean(self.psi, axis=2)
+        for size in np.unique(sizes).tolist():
+            if (means[:, sizes == size].max(axis=1) >= level).all():
+                return int(size)
+        return None
+
+
+def subsets_up_to(n_temperatures: int, size: int | None = None) -> tuple[tuple[int, ...], ...]:
+    """Return all subsets with 1 to `size` members, small ones first: 511 of nine, 129 of them up to three (W-10)."""
+    largest = n_temperatures if size is None else min(size, n_temperatures)
+    return tuple(s for k in range(1, largest + 1) for s in combinations(range(n_temperatures), k))
+
+
+def maximal_correlations(
+    tests: Sequence[Test],
+    subsets: Sequence[Sequence[int]] | None = None,
+    *,
+    half_window: int = 10,
+    converged: bool = True,
+    tolerance: float | None = None,
+    max_sweeps: int = 2000,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> MaximalCorrelations:
+    """Compute the maximal correlation of every subset, for every test and displacement (W-10, W-12).
+
+    The transformations are those of `thermocomp.models.ace.ACE`. Stopped by the keyboard, it returns what is done.
+
+    Parameters
+    ----------
+    tests : sequence of Test
+    subsets : sequence of sequence of int, optional
+        Indices of the temperatures; all subsets up to three if not given.
+    half_window : int
+        N: the boxcar holds 2N + 1 ranks.
+    converged : bool
+        True: sweep until the functions stand still, accelerated; False: until the error fails to decrease, as in the
+        paper.
+    tolerance : float, optional
+        Root mean square by which a sweep may still move the functions, summed over all (1e-5 if not given); or the
+        decrease of the error that counts as a failure (0).
+    max_sweeps : int
+    jobs : int
+        Threads; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each displacement of each test.
+
+    Returns
+    -------
+    MaximalCorrelations
+
+    Raises
+    ------
+    FitError
+        A test has fewer rows than the boxcar, or a value that is no number.
+    InputError
+        Tests differ in their channels, or a setting is out of its range.
+    """
+    if not tests:
+        raise InputError("maximal correlation: no test given")
+    if half_window < 1 or max_sweeps < 1 or (tolerance is not None and not tolerance >= 0):
+        raise InputError(
+            "maximal correlation: want half_window >= 1, max_sweeps >= 1 and tolerance >= 0, "
+            f"found {half_window}, {max_sweeps} and {tolerance}"
+        )
+    tables = [_checked(t, half_window) for t in tests]
+    shapes = {(T.shape[1], S.shape[1]) for T, S in tables}
+    if len(shapes) > 1:
+        raise InputError(f"tests differ in their numbers of temperatures and displacements: {sorted(shapes)}")
+    n_temperatures, n_displacements = shapes.pop()
+    chosen = subsets_up_to(n_temperatures, 3) if subsets is None else tuple(tuple(s) for s in subsets)
+    members = _membership(chosen, n_temperatures)
+    # neighbours in this order share most of their members, which the kernel likes
+    order = np.lexsort(members.T)
+    if tolerance is None:
+        tolerance = 1e-5 if converged else 0.0
+    psi = np.full((n_displacements, len(chosen), len(tests)), np.nan)
+    pieces = [(k, d) for k in range(len(tests)) for d in range(n_displacements)]
+    work = (
+        delayed(_psi)(tables[k][0], tables[k][1][:, d], members[order], half_window, tolerance, max_sweeps, converged)
+        for k, d in pieces
+    )
+    complete = True
+    try:
+        found = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(work)
+        for (k, d), values in zip(pieces, found, strict=True):
+            psi[d, order, k] = values
+            progress(f"{tests[k].name} displacement {d + 1} of {n_displacements}: {len(chosen)} subsets")
+    except KeyboardInterrupt:
+        complete = False
+    return MaximalCorrelations(psi, chosen, tuple(t.name for t in tests), complete)
+
+
+def _checked(test: Test, half_window: int) -> tuple[FloatArray, FloatArray]:
+    T = np.asarray(test.temperatures, dtype=np.float64)
+    S = np.asarray(test.displacements, dtype=np.float64)
+    if T.ndim != 2 or S.ndim != 2 or len(T) != len(S):
+        raise InputError(
+            f"{test.name}: want temperatures and displacements as tables of equally many rows, "
+            f"found the shapes {T.shape} and {S.shape}"
+        )
+    if len(T) < 2 * half_window + 1:
+        raise FitError(
+            f"{test.name}: {len(T)} rows, but the boxcar holds {2 * half_window + 1}; use a smaller half_window"
+        )
+    bad = ~(np.isfinite(T).all(axis=1) & np.isfinite(S).all(axis=1))
+    if bad.any():
+        raise FitError(f"{test.name}: row {int(np.argmax(bad))} holds a value that is no number; leave such rows out")
+    return T, S
+
+
+def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDArray[np.bool_]:
+    members = np.zeros((len(subsets), n_temperatures), dtype=np.bool_)
+    for row, subset in zip(members, subsets, strict=True):
+        if not subset or any(not 0 <= j < n_temperatures for j in subset):
+            raise InputError(f"subset {subset}: want indices of the {n_temperatures} temperatures, at least one")
+        row[list(subset)] = True
+    return members
+
+
+def _psi(
+    T: FloatArray,
+    S: FloatArray,
+    members: NDArray[np.bool_],
+    half_window: int,
+    tolerance: float,
+    max_sweeps: int,
+    converged: bool,
+) -> FloatArray:
+    from thermocomp.models.kernels import ace, ace_subsets  # numba takes its time
+
+    ranked = ace.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    found: FloatArray = ace_subsets.correlations(*ranked, half_window, tolerance, max_sweeps, converged, members)[0]
+    return found

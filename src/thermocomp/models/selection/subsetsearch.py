@@ -1,0 +1,369 @@
+"""The two searches of `best_subsets`: what they share, their threads, clock and margins."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy import linalg
+from scipy.linalg import lapack
+
+from thermocomp.models.leastsquares import Triangle
+
+FloatArray = NDArray[np.float64]
+
+Route = Literal["dropping", "adding"]
+Stop = Literal["", "nodes", "seconds", "interrupted"]
+
+_SPARE = 7  # sets kept per size beyond those asked for: those that rounding could make the best
+_MOST = 0.05  # margins beyond this share of a sum of squares are cut, and nothing is proven: bounds the work
+_SEARCH = 1e-9  # relative error of a sum of squares that the searches themselves may make: see GUARD and LEFT
+_LANES = 8  # numbers in a register
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is searched.
+
+    Parameters
+    ----------
+    triangle : ndarray of shape (n, p + 1)
+        Triangular factor of the columns, scaled to the norm 1, and of y.
+    least : ndarray of shape (p,)
+        Norm that rounding alone may leave of each column.
+    rank : int
+    full_rss : float
+        Residual sum of squares on all columns.
+    margin : ndarray of shape (4,)
+        Of a residual norm: a constant, a factor of the root of (rss - full_rss); `full_rss`; most, as a share.
+    y_noise : float
+        Norm that rounding alone may leave of y.
+    """
+
+    triangle: FloatArray
+    least: FloatArray
+    rank: int
+    full_rss: float
+    margin: FloatArray
+    y_noise: float
+
+    @classmethod
+    def of(cls, tri: Triangle, columns: Sequence[int]) -> "Problem":
+        """Take some columns of a triangle."""
+        p = len(columns)
+        which = [*columns, -1]
+        norms, noise = tri.norms[which], tri.noise[which]
+        both = tri.factor[:, which]
+        both[:, :-1] /= norms[:-1]
+        if p + 1 < len(tri.centre):
+            both = np.asarray(np.linalg.qr(both, mode="r"))
+        least, y_noise = noise[:-1] / norms[:-1], float(noise[-1])
+        if not norms[-1] > y_noise:
+            both[:, -1] = 0.0  # y is constant
+        pivoted, order = linalg.qr(both[:, :-1], mode="r", pivoting=True)
+        small = min(pivoted.shape)
+        rank = int(np.sum(np.abs(np.diag(pivoted)) > least[order[:small]]))
+        size = float(np.linalg.norm(both[:, -1]))
+        if rank == p:
+            inverse = lapack.dtrtri(both[:p, :p])[0]
+            b = inverse @ both[:p, -1]
+            full = float(np.sum(both[p:, -1] ** 2))
+            constant = y_noise + float(least @ np.abs(b))
+            slope = float(least @ np.linalg.norm(inverse, axis=1))
+        else:
+            some = both[:, order[:rank]]
+            head = np.linalg.qr(some)[0].T @ both[:, -1]
+            full = max(float(both[:, -1] @ both[:, -1] - head @ head), 0.0)
+            # the sets that QR does not look into leave the root of LEFT of each column: coefficients up to its inverse
+            constant, slope = y_noise + float(least.max()) * 1e4 * size, 0.0
+        margin = np.array([constant + 1e-12 * size, slope + _SEARCH, full, _MOST])
+        return cls(both, least, rank, full, margin, y_noise)
+
+    def error(self, rss: float) -> float:
+        """Return the most by which rounding can have moved the residual norm of a set as good as `rss`."""
+        return float(self.margin[0] + self.margin[1] * np.sqrt(max(rss - self.full_rss, 0.0)))
+
+
+class Search(ABC):
+    """One thread's part of a search: what it works on, and the best sets it found."""
+
+    chunk = 200_000  # sets between two looks at the clock: well below 0.1 s
+
+    def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
+        self.problem = problem
+        p = problem.triangle.shape[1] - 1
+        keep = n_best + _SPARE
+        self.inside = np.ones(p, dtype=np.uint8)
+        self.values = np.full((p + 1, keep), np.inf)
+        self.contents = np.zeros((p + 1, keep, p), dtype=np.uint8)
+        self.lost = np.full(p + 1, np.inf)
+        wanted = np.ones(p + 1, dtype=np.int64)
+        ways = 1.0
+        for size in range(sizes + 1):
+            wanted[size] = min(n_best, int(min(ways, n_best)))
+            ways = ways * (p - size) / (size + 1)
+        self.lists = (self.values, self.contents, self.lost, limit, bound, wanted, problem.margin)
+        self.tasks = 0
+
+    @abstractmethod
+    def start(self, first: int, last: int) -> None:
+        """Take the branches from the `first` to before the `last` of the root."""
+
+    @abstractmethod
+    def go_on(self, budget: int) -> int:
+        """Look at about `budget` sets and return how many it was; 0 if there are no more."""
+
+    @abstractmethod
+    def open_from(self) -> FloatArray:
+        """Return the least sum of squares that the sets of each size not looked at can have, shape (p + 1,)."""
+
+    def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
+        """Return the columns of a set."""
+        return tuple(np.flatnonzero(flags).tolist())
+
+
+class Swapping(Search):
+    """Good sets to begin with; it ends at once."""
+
+    def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
+        super().__init__(problem, sizes, n_best, limit, bound)
+        from thermocomp.models.kernels.dropping import warm_up
+
+        warm_up(problem.triangle, problem.least, self.lists, self.inside, sizes)
+
+    def start(self, first: int, last: int) -> None:
+        """Take nothing."""
+
+    def go_on(self, budget: int) -> int:  # noqa: ARG002
+        """Do nothing."""
+        return 0
+
+    def open_from(self) -> FloatArray:
+        """Return the least sum of the sets not looked at, per size."""
+        return np.full(len(self.inside) + 1, np.inf)
+
+
+class Dropping(Search):
+    """Branch and bound from the full set downwards."""
+
+    def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
+        super().__init__(problem, sizes, n_best, limit, bound)
+        from thermocomp.models.kernels import dropping
+
+        p = len(self.inside)
+        width = -(-p // _LANES) * _LANES
+        self._orders = np.zeros((3, p + 1, width), dtype=np.int64)
+        self._numbers = np.zeros((8, p + 1), dtype=np.int64)
+        self._work = np.zeros((6, p + 1, width))
+        self._rss = np.zeros(p + 1)
+        self._state = (
+            self._work,
+            np.empty((p + 1, width, width)),
+            np.empty((p + 1, p + 1, p)),
+            self._orders,
+            self._numbers,
+            self._rss,
+        )
+        self._drop = dropping.drop
+        dropping.begin(problem.triangle[:p], self._state, self.lists, self.inside, problem.full_rss)
+        self.tasks = p - 1
+
+    def start(self, first: int, last: int) -> None:
+        """Take branches of the root."""
+        self._orders[1, 0, : last - first] = range(first, last)
+        self._numbers[2, 0] = last - first
+
+    def go_on(self, budget: int) -> int:
+        """Look at about `budget` sets."""
+        return int(self._drop(self._state, self.lists, self.inside, budget))
+
+    def open_from(self) -> FloatArray:
+        """Return the least sum of the sets not looked at, per size."""
+        least = np.full(len(self.inside) + 1, np.inf)
+        many, sizes, left = self._numbers[:3]
+        for d in range(int(self._numbers[5, 0]) + 1):
+            for j in self._orders[1, d, : left[d]]:
+                high = int(sizes[d]) - 1  # of the branch; itself it has been looked at
+                low = max(high - (int(many[d]) - 1 - int(j)), 1)
+                least[low:high] = np.minimum(least[low:high], self._rss[d] + self._work[4, d, j])
+        return least
+
+
+class Adding(Search):
+    """All sets up to a size."""
+
+    chunk = 4_000_000
+
+    def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
+        super().__init__(problem, sizes, n_best, limit, bound)
+        from thermocomp.models.kernels.adding import add
+
+        p = len(self.inside)
+        self._order = _promising(problem, sizes)
+        self._columns = np.ascontiguousarray(problem.triangle[:, [*self._order, -1]].T)
+        self._least = problem.least[self._order]
+        levels = max(sizes - 1, 1)
+        self._numbers = np.zeros((3, levels), dtype=np.int64)
+        G, D, h, sums = np.zeros((levels, p, p)), np.ones((levels, p)), np.zeros((levels, p)), np.zeros((3, levels))
+        G[0], h[0] = self._columns[:p] @ self._columns[:p].T, self._columns[:p] @ self._columns[p]
+        sums[:2, 0] = self._columns[p] @ self._columns[p]
+        self._state = (G, D, h, sums, np.zeros(sizes, dtype=np.int64), self._numbers)
+        self._sizes = sizes
+        self._add = add
+        self.tasks = p
+
+    def start(self, first: int, last: int) -> None:
+        """Take branches of the root."""
+        self._numbers[1:, 0] = first, last - 1
+
+    def go_on(self, budget: int) -> int:
+        """Look at about `budget` sets."""
+        return int(self._add(self._columns, self._least, self._state, self.lists, self.inside, self._sizes, budget))
+
+    def open_from(self) -> FloatArray:
+        """Return the least sum of the sets not looked at, per size."""
+        over = self._numbers[0, 0] == 0 and self._numbers[1, 0] > self._numbers[2, 0]
+        return np.full(len(self.inside) + 1, np.inf if over else self.problem.full_rss)
+
+    def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
+        """Return the columns of a set."""
+        return tuple(sorted(self._order[i] for i in np.flatnonzero(flags)))
+
+
+def _promising(problem: Problem, sizes: int) -> list[int]:
+    """Return the columns by forward selection, so that good sets come first; before them those that nearly coincide.
+
+    Of two that nearly coincide, the second leaves hardly anything once the first is inside: that must not happen in the
+    last two columns, which enter in closed form.
+    """
+    rest = problem.triangle[:, :-1].copy()
+    y = problem.triangle[:, -1].copy()
+    near = np.abs(np.triu(rest.T @ rest, 1)) > 1 - 1e-7
+    front = [int(k) for k in np.flatnonzero(near.any(axis=0) | near.any(axis=1))]
+    order: list[int] = []
+    for _ in range(sizes):
+        squares = np.einsum("ij,ij->j", rest, rest)
+        gains = np.where(squares > 1e-8, (y @ rest) ** 2 / np.maximum(squares, 1e-8), -1.0)
+        gains[order] = -np.inf
+        k = int(gains.argmax())
+        q = rest[:, k] / max(np.sqrt(squares[k]), 1e-4)
+        order.append(k)
+        rest -= np.outer(q, q @ rest)
+        y -= q * (q @ y)
+    order += [k for k in range(rest.shape[1]) if k not in order]
+    return front + [k for k in order if k not in front]
+
+
+class Result:
+    """A search that has ended, one way or the other."""
+
+    def __init__(self, problem: Problem, limit: FloatArray, n_best: int) -> None:
+        self.problem, self.limit, self.n_best = problem, limit, n_best
+        self.parts: list[Search] = []
+        self.looked = 0
+        self.stopped: Stop = ""
+        self._open = np.full(len(limit), np.inf)
+
+    def sets(self, size: int) -> list[tuple[int, ...]]:
+        """Return the sets of a size that may be the best: those within the margin, and at least those asked for."""
+        found = self._merged(size)
+        return [c for i, (v, c) in enumerate(found) if v < self.limit[size] or i < self.n_best]
+
+    def safe(self, size: int) -> tuple[float, bool]:
+        """Return the sum of squares that all other sets of a size reach, and whether none was lost below the margin."""
+        found = self._merged(size)
+        if not found:
+            return self.problem.full_rss, False
+        lost = min(float(part.lost[size]) for part in self.parts)
+        beyond = min(lost, float(self._open[size]), float(self.limit[size]))
+        worst = found[min(self.n_best, len(found)) - 1][0]
+        needed = (np.sqrt(worst) + 2 * self.problem.error(worst)) ** 2
+        complete = min(lost, float(self._open[size])) >= self.limit[size] and self.limit[size] >= needed * (1 - 1e-12)
+        if beyond == np.inf:
+            return beyond, complete
+        return float(max(np.sqrt(beyond) - self.problem.error(max(beyond, worst)), 0.0) ** 2), complete
+
+    def _merged(self, size: int) -> list[tuple[float, tuple[int, ...]]]:
+        found: dict[tuple[int, ...], float] = {}
+        for part in self.parts:
+            for value, flags in zip(part.values[size], part.contents[size], strict=True):
+                if value < np.inf:
+                    columns = part.columns(flags)
+                    found[columns] = min(float(value), found.get(columns, np.inf))
+        return sorted((v, c) for c, v in found.items())
+
+    def leave_open(self, least: FloatArray) -> None:
+        """Note what was not looked at."""
+        self._open = np.minimum(self._open, least)
+
+
+def run(
+    problem: Problem,
+    route: Route,
+    sizes: int,
+    n_best: int,
+    jobs: int,
+    nodes: int | None,
+    seconds: float | None,
+    progress: Callable[[str], None] | None,
+) -> Result:
+    """Search; the parameters are those of `best_subsets`."""
+    p = problem.triangle.shape[1] - 1
+    limit = np.full(p + 1, -np.inf)
+    limit[1 : sizes + 1] = np.inf
+    bound = limit.copy()
+    kind: Any = {"dropping": Dropping, "adding": Adding}[route]
+    result = Result(problem, limit, n_best)
+    result.parts = [kind(problem, sizes, n_best, limit, bound) for _ in range(jobs)]
+    n_tasks = result.parts[0].tasks
+    for part in result.parts:
+        part.start(0, 0)
+    if route == "dropping":
+        result.parts.append(Swapping(problem, sizes, n_best, limit, bound))
+    # dropping begins with the cheap branches at the end, which find good sets; so does adding with those at the begin
+    turns = list(range(n_tasks)) if route == "dropping" else list(range(n_tasks))[::-1]
+    whole = jobs == 1
+    began = said = time.monotonic()
+
+    def work(part: Search) -> None:
+        nonlocal said
+        while turns and not result.stopped:
+            if whole:
+                part.start(0, n_tasks)
+                turns.clear()
+            else:
+                task = turns.pop()  # one at a time: the interpreter's lock sees to it
+                part.start(task, task + 1)
+            chunk = part.chunk if nodes is None else min(part.chunk, nodes)
+            while not result.stopped:
+                done = part.go_on(chunk)
+                result.looked += done
+                if done == 0:
+                    break
+                now = time.monotonic()
+                if nodes is not None and result.looked >= nodes:
+                    result.stopped = "nodes"
+                elif seconds is not None and now - began >= seconds:
+                    result.stopped = "seconds"
+                if progress is not None and now - said >= 1:
+                    said = now
+                    progress(f"best subsets: {result.looked:,} sets looked at in {now - began:.0f} s")
+
+    try:
+        if whole:
+            work(result.parts[0])
+        else:
+            Parallel(n_jobs=jobs, prefer="threads")(delayed(work)(part) for part in result.parts[:jobs])
+    except KeyboardInterrupt:
+        result.stopped = "interrupted"
+    for part in result.parts:
+        result.leave_open(part.open_from())
+    for task in turns:
+        part = kind(problem, sizes, n_best, limit.copy(), bound.copy())
+        part.start(task, task + 1)
+        result.leave_open(part.open_from())
+    return result

@@ -1,0 +1,242 @@
+"""`subsets`: the exact best set of temperatures, its size chosen by cycles left out or by a criterion."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.terms import Variable
+from thermocomp.models import ridge
+from thermocomp.models.leastsquares import solve, table, triangle
+from thermocomp.models.linear import TermRegressor
+from thermocomp.models.selection.subsets import Subsets, best_subsets
+from thermocomp.models.stepwise import ENOUGH
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
+
+
+def scores(found: Subsets) -> dict[str, FloatArray]:
+    """Return the criteria of the best sets, one number for each of ``found.best``.
+
+    With n rows, s columns, the residual sum of squares SSE and R2 (uncentred if there is no intercept):
+
+    - ``mse``: SSE / (n - s - 1), without intercept SSE / (n - s) (H-05);
+    - ``adjr2``: adjusted R2, the greater the better; it ranks the sizes as ``mse`` does;
+    - ``cp``: Mallows' SSE / s2 + 2 (s + 1) - n with s2 from the model of all columns;
+    - ``bic``: n log(1 - R2) + (s + 1) log n.
+
+    All are as in the R package leaps, and all take the rows for independent.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_best,)
+        nan where there is no degree of freedom left.
+    """
+    n, one = found.n_rows, int(found.intercept)
+    rss = np.array([s.rss for s in found.best])
+    size = np.array([len(s.columns) for s in found.best], dtype=np.float64)
+    left = found.dof - size
+    left[left <= 0] = np.nan
+    full = found.dof - found.rank
+    share = rss / found.total if found.total > 0 else np.full(len(rss), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a perfect fit
+        return {
+            "mse": rss / left,
+            "adjr2": 1 - share * found.dof / left,
+            "cp": rss / (np.float64(found.full_rss) / full if full > 0 else np.nan) + 2 * (size + one) - n,
+            "bic": n * np.log(share) + (size + one) * np.log(n),
+        }
+
+
+class BestSubset(TermRegressor):
+    """Linear least squares on the best set of temperatures of all there are (H-05, H-07).
+
+    For every size the set with the smallest residual sum of squares is found exactly, or the certificate says "not
+    proven" (`thermocomp.models.selection.subsets.best_subsets`). Among the sizes the criterion chooses. ``cycles``:
+    the search is made again without each thermal cycle in turn, so that the cycle is unseen by the selection too, and
+    the size with the smallest RMS over all the cycles left out is taken.
+
+    ``mse``, ``adjr2``, ``cp`` and ``bic`` take the rows for independent. Those of a time series are not (E-C12), and
+    all four, BIC too, then select far too many temperatures; prefer ``cycles``.
+
+    Parameters
+    ----------
+    criterion : {'cycles', 'bic', 'cp', 'adjr2', 'mse'}, optional
+        Without it ``cycles`` if `fit` is given cycles, else ``bic``. If ``cycles`` is asked for and none are given,
+        five stretches of equal length take their place.
+    size : int, optional
+        Do not choose: so many temperatures, or as many as can be if there are not so many.
+    max_size : int, optional
+        Search up to this size only; needed beyond about 50 temperatures, and where they are as many as the rows.
+    rule : {'minimum', 'one-standard-error'}
+        For ``cycles``: the best size, or the smallest whose mean square error over the cycles is within one standard
+        error of the best.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
+    jobs : int
+        Threads.
+    nodes : int, optional
+        Stop each search after about so many sets.
+    seconds : float, optional
+        Stop each search after about so long [s].
+    progress : callable, optional
+        Called about once a second with a line of text.
+
+    Attributes
+    ----------
+    subsets_ : Subsets
+        The best set of every size, with its certificate.
+    scores_ : dict of str to ndarray
+        Criteria of ``subsets_.best``, see `scores`; with ``cycles`` the RMS over the cycles left out [unit of y].
+    selected_ : tuple of int
+        Features in the model, in rising order.
+    proven_ : bool
+        Whether no other set of that size fits as well.
+    criterion_ : str
+        What the size was chosen by; ``size`` if it was given.
+    chosen_by_ : str
+        What was left out to choose; empty if nothing was.
+    terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
+        See `thermocomp.models.linear.TermRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        criterion: Criterion | None = None,
+        size: int | None = None,
+        max_size: int | None = None,
+        rule: Literal["minimum", "one-standard-error"] = "minimum",
+        fit_intercept: bool = True,
+        jobs: int = 1,
+        nodes: int | None = None,
+        seconds: float | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> None:
+        self.criterion = criterion
+        self.size = size
+        self.max_size = max_size
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+        self.jobs = jobs
+        self.nodes = nodes
+        self.seconds = seconds
+        self.progress = progress
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "BestSubset":
+        """Search, choose and fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Temperatures minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row; rows with -1 are not learned from.
+
+        Returns
+        -------
+        BestSubset
+
+        Raises
+        ------
+        FitError
+            No row to learn from.
+        InputError
+            A setting makes no sense, or there are too many columns that depend on each other (see `max_size`).
+        KeyboardInterrupt
+            While the cycles are left out. Interrupted before, it goes on with what was found so far.
+        """
+        criterion = self.criterion or ("bic" if cycle is None else "cycles")
+        if criterion not in {"mse", "adjr2", "cp", "bic", "cycles"} or (self.size is not None and self.size < 1):
+            raise InputError(
+                f"criterion {criterion!r}, size {self.size}: want mse, adjr2, cp, bic or cycles, and a size from 1 on"
+            )
+        change, deviation, both = self._read(X, y)
+        folds, left_out = ridge.number_folds(cycle, len(change))
+        if (folds < 0).any():
+            learned = folds >= 0
+            change, deviation, folds = change[learned], deviation[learned], folds[learned]
+            both = table(change, deviation)
+            self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        sizes = self.size or self.max_size
+        self.selected_: tuple[int, ...] = ()
+        self.proven_, self.criterion_, self.chosen_by_ = True, "none", ""
+        self.scores_: dict[str, FloatArray] = {}
+        with suppress(FitError):  # only constant columns: the model is the mean
+            self.subsets_ = self._search(change, deviation, sizes)
+            if not self.subsets_.best:
+                raise InputError("best subsets: stopped before a set was found; give it more sets or seconds")
+            self.scores_ = scores(self.subsets_)
+            self.criterion_ = "size" if self.size is not None else criterion
+            if self.criterion_ == "cycles":
+                self.chosen_by_ = left_out
+                place = self._by_cycles(change, deviation, folds)
+            elif self.criterion_ == "size":
+                place = -1
+            else:
+                score = self.scores_[criterion] * (-1 if criterion == "adjr2" else 1)
+                place = int(np.nanargmin(score)) if not np.isnan(score).all() else 0
+            chosen = self.subsets_.best[place]
+            self.selected_, self.proven_ = chosen.columns, chosen.proven
+        tri = triangle(both, intercept=self.fit_intercept)
+        found = solve(change, deviation, tri, columns=self.selected_, enough=ENOUGH)
+        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
+        self._keep(found, variables, [(i,) for i in self.selected_], tri.total, self.fit_intercept)
+        return self
+
+    def _search(self, X: FloatArray, y: FloatArray, sizes: int | None) -> Subsets:
+        return best_subsets(
+            X,
+            y,
+            intercept=self.fit_intercept,
+            max_size=sizes,
+            jobs=self.jobs,
+            nodes=self.nodes,
+            seconds=self.seconds,
+            progress=self.progress,
+        )
+
+    def _by_cycles(self, X: FloatArray, y: FloatArray, folds: IntArray) -> int:
+        """Return the place in ``subsets_.best`` that predicts cycles best that neither search nor fit have seen."""
+        sizes = [len(s.columns) for s in self.subsets_.best]
+        n_folds = int(folds.max()) + 1
+        squares = np.full((len(sizes), n_folds), np.nan)
+        if n_folds > 1:
+            for k in range(n_folds):
+                squares[:, k] = self._unseen(X, y, folds == k, sizes)
+        pooled = np.sqrt(squares.sum(axis=1) / len(y))
+        self.scores_["cycles"] = pooled
+        if np.isnan(pooled).all():
+            return 0
+        best = int(np.nanargmin(pooled))
+        if self.rule == "one-standard-error":
+            mean = squares / np.bincount(folds)
+            limit = mean[best].mean() + mean[best].std(ddof=1) / np.sqrt(n_folds)
+            best = int(np.flatnonzero(mean.mean(axis=1) <= limit)[0])
+        return best
+
+    def _unseen(self, X: FloatArray, y: FloatArray, out: NDArray[np.bool_], sizes: list[int]) -> FloatArray:
+        """Return the sum of squared errors on the rows left out, for each size; nan where there is no such set."""
+        errors = np.full(len(sizes), np.nan)
+        train, known = X[~out], y[~out]
+        try:
+            found = self._search(train, known, max(sizes))
+        except FitError:
+            return errors
+        if found.stopped == "interrupted":
+            raise KeyboardInterrupt
+        tri = triangle(table(train, known), intercept=self.fit_intercept)
+        for best in found.best:
+            if len(best.columns) in sizes:
+                model: Any = solve(train, known, tri, columns=best.columns, enough=ENOUGH)
+                missed = y[out] - model.intercept - X[out][:, best.columns] @ model.coefficients
+                errors[sizes.index(len(best.columns))] = missed @ missed
+        return errors

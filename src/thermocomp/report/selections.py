@@ -1,0 +1,118 @@
+"""Figures of a sensor selection, as SVG text. Each answers one question; the question stands in its docstring."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from thermocomp.assessment.choice import Choice
+from thermocomp.assessment.pareto import Budget
+from thermocomp.models.grouping import CorrelationGrouping
+from thermocomp.report.figures import COLOURS, NONE, drawing, svg
+
+
+def draw(choice: Choice) -> tuple[str, str] | None:
+    """Return the figure of a choice and its caption; None if its tables say it all."""
+    found = choice.details
+    if isinstance(found, Budget):
+        return budget(found), (
+            "Lines: all unseen blocks together; dots: each block. Ring: enough, for what more sensors bring is within "
+            "one standard error between the blocks. Condition: how far the sensors repeat each other."
+        )
+    if isinstance(found, CorrelationGrouping):
+        return grouping(found, choice.target), (
+            "Left: correlation of every two temperatures, those of a group side by side and framed; names of "
+            "representatives are bold. Right: the best subset of each number of representatives."
+        )
+    return None
+
+
+def grouping(g: CorrelationGrouping, target: str) -> str:
+    """Show which temperatures say the same, and how many are worth having: groups in the correlation matrix, MSE_p."""
+    order = [i for members in g.groups_ for i in members]
+    names = [str(n) for n in g.feature_names_in_[order]]
+    places = [g.candidates_.index(i) for i in order]
+    with drawing("grouping" + target):
+        figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+        matrix, curve = figure.subplots(1, 2, width_ratios=[1.25, 1])
+        image = matrix.imshow(g.correlation_[np.ix_(places, places)], cmap="RdBu_r", vmin=-1, vmax=1)
+        figure.colorbar(image, ax=matrix, shrink=0.8)
+        start = 0
+        for members in g.groups_:
+            frame = Rectangle((start - 0.5, start - 0.5), len(members), len(members), fill=False, ec="black", lw=1.6)
+            matrix.add_patch(frame)
+            start += len(members)
+        matrix.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+        matrix.set_yticks(range(len(names)), names, fontsize=7)
+        for labels in (matrix.get_xticklabels(), matrix.get_yticklabels()):
+            for i, label in zip(order, labels, strict=True):
+                label.set_fontweight("bold" if i in g.representatives_ else "normal")
+        matrix.grid(visible=False)
+        matrix.set_title(f"correlation, groups above {g.threshold:g}")
+        numbers = [len(s.columns) for s in g.curve_]
+        curve.plot(numbers, [s.mse for s in g.curve_], "-o", color=COLOURS[0])
+        curve.axhline(g.mse_, color=COLOURS[1], ls="--", label="best members of the groups")
+        _log(curve)
+        curve.set_xlabel("number of representatives")
+        curve.set_ylabel("smallest MSE$_p$ [um$^2$]")
+        curve.set_title(target)
+        curve.xaxis.set_major_locator(MaxNLocator(integer=True))
+        curve.legend()
+        return svg(figure)
+
+
+def budget(b: Budget) -> str:
+    """Show what each further sensor buys: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
+    sizes = np.arange(1, len(b.sensors) + 1)
+    with drawing("budget" + b.target):
+        figure = Figure(figsize=(9.6, 4.2 + 0.17 * len(b.candidates)), layout="constrained")
+        errors, repeats, chosen = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1.1, 0.16 * len(b.candidates)])
+        for k, model in enumerate(b.models):
+            colour = COLOURS[k % len(COLOURS)]
+            errors.plot(sizes, b.rms[k], ".", color=colour, alpha=0.35, ms=5)
+            errors.plot(sizes, b.pooled()[k], "-o", color=colour, label=model, ms=4)
+            enough = b.enough(model)
+            if enough is not None:
+                errors.plot(enough, b.pooled()[k][enough - 1], "o", color=colour, mfc="none", ms=12, mew=1.6)
+        errors.axhline(b.none_pooled(), color=NONE, lw=2.5, label="no compensation")
+        errors.plot([], [], ".", color="#888", label="one unseen block")
+        errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
+        _log(errors)
+        errors.set_ylabel("RMS unseen [um]")
+        errors.set_title(f"{b.target}: error against the number of temperature sensors")
+        errors.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        finite = np.isfinite(b.condition)
+        repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
+        repeats.set_yscale("log")
+        repeats.set_ylabel("condition")
+        chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
+        chosen.set_yticks(range(len(b.candidates)), b.candidates, fontsize=7)
+        chosen.grid(visible=False)
+        for size, sensors in zip(sizes, b.sensors, strict=True):
+            rows = [b.candidates.index(s) for s in sensors]
+            chosen.plot([size] * len(rows), rows, "o", color=COLOURS[1], ms=3)
+        chosen.plot([], [], "o", color=COLOURS[1], ms=3, label="chosen in all rows")
+        chosen.plot(
+            [],
+            [],
+            "s",
+            color="#08306b",
+            ms=6,
+            label="chosen without any\none block, and lighter:\nwithout some of them",
+        )
+        chosen.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        chosen.set_xlabel("number of temperature sensors")
+        chosen.xaxis.set_major_locator(MaxNLocator(integer=True))
+        return svg(figure)
+
+
+def _extent(b: Budget) -> tuple[float, float, float, float]:
+    return 0.5, len(b.sensors) + 0.5, len(b.candidates) - 0.5, -0.5
+
+
+def _log(ax: Axes) -> None:
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter("{x:g}")
+    ax.tick_params(axis="y", which="minor", labelsize=7)

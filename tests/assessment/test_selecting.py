@@ -1,0 +1,136 @@
+"""Every selector brought to one form: sensors that exist, tables that add up, and what the user should know."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from smallmachine import crowded_machine
+from thermocomp.assessment import selecting, splits
+from thermocomp.assessment.choice import Choice, Settings, Table, written
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.models.grouping import CorrelationGrouping
+from thermocomp.models.selection.subsets import best_subsets
+from thermocomp.recording.samples import Samples, stack
+
+METHODS = ("grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")
+SETTINGS = Settings(max_sensors=3, models=["ols"])
+
+
+@pytest.fixture(scope="module")
+def crowd() -> Samples:
+    return stack([crowded_machine()], ["x_um", "z_um"])
+
+
+@pytest.fixture(scope="module")
+def choices(crowd: Samples) -> dict[str, tuple[Choice, ...]]:
+    protocol = splits.leave_one_cycle_out(crowd)
+    return {m: selecting.select(m, crowd, protocol, SETTINGS) for m in METHODS}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_chooses_temperatures_that_exist(choices: dict[str, tuple[Choice, ...]], method: str) -> None:
+    found = choices[method]
+    assert [c.target for c in found] == (["x_um, z_um"] if method == "ace" else ["x_um", "z_um"])
+    for c in found:
+        assert c.method == method
+        assert set(c.sensors) <= {f"t{k}_C" for k in range(1, 7)}
+        assert c.sensors
+        assert "t1_C" in c.sensors or "t4_C" in c.sensors or "t2_C" in c.sensors  # what drives the drift
+        assert c.reason
+        assert c.notes
+        for t in c.tables:
+            assert t.rows
+            assert all(len(row) == len(t.columns) for row in t.rows)
+            assert t.marked is None or 0 <= t.marked < len(t.rows)
+
+
+def table(choice: Choice, title: str) -> Table:
+    return next(t for t in choice.tables if t.title.startswith(title))
+
+
+def test_grouping_puts_the_repeating_sensors_together(choices: dict[str, tuple[Choice, ...]], crowd: Samples) -> None:
+    choice = choices["grouping"][0]
+    groups = [set(str(row[1]).split()) for row in table(choice, "Groups").rows]
+    assert any({"t1_C", "t4_C"} <= g for g in groups)
+    assert isinstance(choice.details, CorrelationGrouping)
+    thresholds = table(choice, "What other")
+    assert thresholds.marked is not None
+    low, high, n_groups, sensors = thresholds.rows[thresholds.marked][:4]
+    assert isinstance(low, float)
+    assert isinstance(high, float)
+    assert low <= 0.9 < high
+    assert n_groups == len(groups)
+    assert str(sensors).split() == list(choice.sensors)
+    ends = [row[:2] for row in thresholds.rows]
+    assert all(a[1] == b[0] for a, b in pairwise(ends))  # no gap between the rows
+
+
+def test_a_reference_is_needed_too(crowd: Samples) -> None:
+    settings = Settings(reference="t3_C")
+    (choice, _) = selecting.select("grouping", crowd, splits.leave_one_cycle_out(crowd), settings)
+    assert choice.sensors[-1] == "t3_C"
+    with pytest.raises(InputError, match="no input is named 't33_C'"):
+        selecting.select("grouping", crowd, splits.leave_one_cycle_out(crowd), Settings(reference="t33_C"))
+
+
+def test_subsets_show_the_best_of_every_size(choices: dict[str, tuple[Choice, ...]], crowd: Samples) -> None:
+    choice = choices["subsets"][0]
+    shown = table(choice, "Best subset")
+    X, y = crowd.change()[:, :6], crowd.deviations[:, 0]
+    columns = [c.name for c in crowd.inputs if c.quantity == "temperature"]
+    expected = best_subsets(
+        crowd.change()[:, [j for j, c in enumerate(crowd.inputs) if c.name in columns]], y, max_size=3
+    )
+    assert [str(row[-1]).split() for row in shown.rows] == [[columns[j] for j in s.columns] for s in expected.best]
+    assert all(row[-2] == "proven" for row in shown.rows)
+    assert shown.marked is not None
+    assert str(shown.rows[shown.marked][-1]).split() == list(choice.sensors)
+    assert X.shape[1] == 6
+
+
+def test_too_few_cycles_for_the_wilcoxon_test_are_told(choices: dict[str, tuple[Choice, ...]]) -> None:
+    (choice,) = choices["ace"]
+    assert any("too few" in n for n in choice.notes)
+    assert len(choice.sensors) <= 3
+    counts = table(choice, "Best set").caption
+    assert "41 sets, 4 thermal cycles, 2 displacements: 328 models" in counts
+
+
+def test_the_budget_is_within_its_limit(choices: dict[str, tuple[Choice, ...]]) -> None:
+    for choice in choices["pareto"]:
+        errors = table(choice, "Error on unseen")
+        assert [row[0] for row in errors.rows] == [1, 2, 3]
+        assert errors.marked == len(choice.sensors) - 1
+        assert str(errors.rows[errors.marked][-1]).split() == list(choice.sensors)
+
+
+def test_progress_is_told_piece_by_piece(crowd: Samples) -> None:
+    protocol = splits.leave_one_cycle_out(crowd)
+    for method in ("grouping", "ace", "pareto"):
+        heard: list[str] = []
+        selecting.select(method, crowd, protocol, SETTINGS, progress=heard.append)
+        assert len(heard) == selecting.n_pieces(method, crowd, protocol, SETTINGS)
+
+
+def test_nothing_to_choose_from_is_an_error() -> None:
+    speed_only = stack([crowded_machine()], ["x_um"], ["spindle_rpm"])
+    protocol = splits.leave_one_cycle_out(speed_only)
+    for method in METHODS:
+        with pytest.raises((InputError, FitError), match=r"temperature|complete rows"):
+            selecting.select(method, speed_only, protocol, SETTINGS)
+
+
+def test_cells_as_text() -> None:
+    assert [written(c) for c in (None, float("nan"), 3, 0.123456, 1e6, "t1_C")] == [
+        "",
+        "",
+        "3",
+        "0.1235",
+        "1e+06",
+        "t1_C",
+    ]
+    words = Table("t", ("a", "b"), ((1, "x"), (None, "y"))).words
+    assert words == (1,)
+    assert np.isfinite(Settings().most("ace"))
+    assert (Settings().most("ace"), Settings().most("subsets"), Settings(max_sensors=5).most("ace")) == (3, 10, 5)
