@@ -1,6 +1,7 @@
 """The command line: exit codes, JSON, messages, nothing overwritten."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import MissingExtraError
 from thermocomp.core.machine import Channel
 from thermocomp.files import modelfile, recordings
+from thermocomp.models.methods import METHODS
 from thermocomp.recording.recording import Recording
 
 RESULT_KEYS = {
@@ -295,3 +297,20 @@ def test_public_names_are_all_there() -> None:
     assert set(dir(thermocomp)) == set(thermocomp.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         thermocomp.nothing  # noqa: B018
+
+
+def test_the_help_names_every_method(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compare", "--help"]) == 0
+    said = re.sub(r"[│\s]+", " ", capsys.readouterr().out)
+    assert f"or all: {', '.join(METHODS)}." in said
+
+
+def test_a_method_that_cannot_be_frozen_is_not_fitted(
+    drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "model.json"
+    assert run(["fit", str(drift), "--target", "z_um", "--model", "gp", "-o", str(out), "--jobs", "1"]) == 2
+    assert "gp cannot be frozen" in capsys.readouterr().err
+    assert not out.exists()
+    assert run(["compare", str(drift), "--target", "z_um", "--models", "gp", "--jobs", "1"]) in (0, 1)
+    assert "gp" in capsys.readouterr().out

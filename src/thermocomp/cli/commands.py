@@ -234,7 +234,7 @@ def fit(
     study : Study
         What is predicted from what, and on what it is judged.
     model : str
-        ols, partial-f, mra or dynamic.
+        A method as in ``thermocomp compare``, all but gp.
     output : Path
         Model file to write (.json).
     support : str
@@ -330,7 +330,8 @@ def compare(
     study : Study
         What is predicted from what, and on what it is judged.
     models : list of str
-        Methods to compare: ols, partial-f, mra, dynamic.
+        Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
+        mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
     output : Path
         Report to write (.html).
     overwrite : bool

@@ -236,13 +236,14 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Table:
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
     cycles = list(dict.fromkeys(c.cycle for a in assessments for c in a.verdict.cycles))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
+    space = " " if down is models else ""  # where others have their mark
     table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = refused")
     table.add_column("")
     for heading in across:
         table.add_column(escape(heading), justify="right", no_wrap=across is models)
     for mine in _by_target(assessments):
         cells = {(a.model, c.cycle): _passed(c) for a in mine for c in a.verdict.cycles}
-        cells |= {("none", c.cycle): f"{c.none_rms:.2f} " for a in mine for c in a.verdict.cycles}
+        cells |= {("none", c.cycle): f"{c.none_rms:.2f}{space}" for a in mine for c in a.verdict.cycles}
         table.add_section()
         table.add_row(f"[bold]{escape(mine[0].target)}[/]")
         for name in down:
