@@ -28,32 +28,49 @@ def expectation(y: FloatArray, x: FloatArray, half: int) -> FloatArray:
     return np.asarray(out - out.mean())
 
 
+def triangle(y: FloatArray, x: FloatArray, half: int) -> FloatArray:
+    """E[y|x]: averaged over ties, two boxcars of half the width, mirrored at the ends, averaged over ties again."""
+    index, h, n = np.argsort(x, kind="stable"), (half + 1) // 2, len(y)
+    boxcar = np.zeros((n, n))
+    for i in range(n):
+        for k in range(i - h, i + h + 1):
+            boxcar[i, -1 - k if k < 0 else 2 * n - 1 - k if k >= n else k] += 1 / (2 * h + 1)
+    ties = (x[index][:, None] == x[index]).astype(np.float64)
+    ties /= ties.sum(axis=1)
+    out = np.empty(n)
+    out[index] = ties @ boxcar @ boxcar @ ties @ y[index]
+    return np.asarray(out - out.mean())
+
+
 def level(values: FloatArray, x: FloatArray) -> FloatArray:
     """Mean over ties in x."""
     return np.array([values[x == v].mean() for v in x])
 
 
-def fit(T: FloatArray, S: FloatArray, half: int, tolerance: float, max_sweeps: int) -> Transforms:
+def fit(
+    T: FloatArray, S: FloatArray, half: int, tolerance: float, max_sweeps: int, *, twice: bool = False
+) -> Transforms:
     """Fit theta(S) = sum of phi_j(T_j)."""
     n, p = T.shape
+    smooth = triangle if twice else expectation
     s = (S - S.mean()) / S.std()
     phi = np.zeros((p, n))
     for j in range(p):
-        start = expectation(s, T[:, j], half)
+        start = smooth(s, T[:, j], half)
         if np.sqrt(np.mean(start**2)) > VANISHES:
             phi[j] = start
             break
     errors: list[float] = []
     theta = np.zeros(n)
     for _ in range(max_sweeps):
-        theta = expectation(phi.sum(axis=0), S, half)
+        theta = smooth(phi.sum(axis=0), S, half)
         norm = np.sqrt(np.mean(theta**2))
         if norm <= VANISHES:
             return Transforms(np.zeros(n), np.zeros((p, n)), 0.0, errors)
         theta /= norm
         for j in range(p):
             others = [k for k in range(p) if k != j]
-            phi[j] = expectation(theta - phi[others].sum(axis=0), T[:, j], half)
+            phi[j] = smooth(theta - phi[others].sum(axis=0), T[:, j], half)
         errors.append(float(np.mean((theta - phi.sum(axis=0)) ** 2)))
         if len(errors) > 1 and not errors[-2] - errors[-1] > tolerance:
             break

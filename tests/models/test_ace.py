@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 BOTH = [ACE(), MonotoneACE()]
 
 
-@parametrize_with_checks([*BOTH, ACE(window_share=0.05, neighbours=5)])  # type: ignore[untyped-decorator]
+@parametrize_with_checks([*BOTH, ACE(window_share=0.05, neighbours=5, converged=True, tolerance=1e-3)])  # type: ignore[untyped-decorator]
 def test_contract_of_scikit_learn(estimator: ThermalRegressor, check: Callable[[ThermalRegressor], None]) -> None:
     check(estimator)
 
@@ -37,15 +37,16 @@ def bent(seed: int = 0, n: int = 400, noise: float = 0.05) -> tuple[pd.DataFrame
     rng = np.random.default_rng(seed)
     T = pd.DataFrame({"T1": rng.uniform(-8, 12, n), "T2": rng.uniform(-3, 3, n), "dead": np.full(n, 20.0)})
     y = 20 * np.log(1 + T["T1"] ** 2 / 30 + T["T2"].abs())
-    return T, y.to_numpy() + noise * rng.normal(size=n)
+    return T, np.asarray(y) + noise * rng.normal(size=n)
 
 
 def kernel_fit(
     T: FloatArray, S: FloatArray, half: int, tolerance: float, max_sweeps: int
 ) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     from thermocomp.models.kernels import ace as kernel
+    from thermocomp.models.kernels import ranks
 
-    order, bounds, groups, start = kernel.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    order, bounds, groups, start = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
     by_rank, phi_by_rank, psi, errors = kernel.solve(order, bounds, groups, start, half, tolerance, max_sweeps)
     theta, phi = np.empty(len(S)), np.empty(T.T.shape)
     theta[order[-1]] = by_rank
@@ -81,7 +82,7 @@ def test_kernel_is_the_paper_literally(seed: int, n: int, p: int, half: int, tie
 @pytest.mark.parametrize("n", [2, 5, 63, 64, 300, 9000])
 @pytest.mark.parametrize("kind", ["plain", "quantised", "outlier", "constant", "huge"])
 def test_ranks_are_those_of_a_stable_sort(n: int, kind: str) -> None:
-    from thermocomp.models.kernels import ace as kernel
+    from thermocomp.models.kernels import ranks
 
     rng = np.random.default_rng(n)
     x = {
@@ -92,7 +93,7 @@ def test_ranks_are_those_of_a_stable_sort(n: int, kind: str) -> None:
         "huge": rng.choice([-1.0, 1.0], n) * rng.uniform(1e308, 1.7e308, n),
     }[kind]
     S = np.arange(n, dtype=np.float64)
-    order, bounds, groups, _ = kernel.rank(np.vstack([x, S]))
+    order, bounds, groups, _ = ranks.rank(np.vstack([x, S]))
     assert order[0].tolist() == np.argsort(x, kind="stable").tolist()
     assert groups[0] == len(np.unique(x))
     assert bounds[0, : groups[0] + 1].tolist() == [*np.searchsorted(np.sort(x), np.unique(x)).tolist(), n]
@@ -123,6 +124,30 @@ def test_psi_does_not_change_under_invertible_transformations(scale: float, shif
     assert np.exp(T["T1"] / 5).nunique() == T["T1"].nunique()
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(3, 60), st.integers(1, 4), st.integers(1, 12), st.booleans())
+def test_converged_kernel_is_the_limit_of_its_twin(seed: int, n: int, p: int, half: int, ties: bool) -> None:
+    from thermocomp.models.kernels import ace as kernel
+    from thermocomp.models.kernels import ranks
+
+    half = min(half, max(1, (n - 1) // 4))
+    rng = np.random.default_rng(seed)
+    T = np.cumsum(rng.normal(size=(n, p)), axis=0)
+    S = T[:, 0] + 0.3 * rng.normal(size=n)
+    if ties:
+        T = np.round(T)
+    ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    one = twin_ace.fit(T, S, half, 0.0, 1, twice=True)  # not accelerated yet
+    theta, _, psi, errors = kernel.converge(*ranked, half, 0.0, 1)
+    np.testing.assert_allclose(theta, one.theta[np.argsort(S)], atol=1e-12)
+    assert psi == pytest.approx(one.psi, abs=1e-12)
+    assert errors == pytest.approx(one.errors, abs=1e-12)
+    _, _, psi, errors = kernel.converge(*ranked, half, 1e-9, 50_000)
+    again = twin_ace.fit(T, S, half, -1.0, 300, twice=True)
+    assert psi >= again.psi - 1e-6
+    assert errors[-1] <= again.errors[-1] + 1e-6 if again.errors else psi == 0
+
+
 def test_stop_rules() -> None:
     T, y = bent()
     paper = ACE(max_sweeps=2000).fit(T, y)
@@ -132,6 +157,9 @@ def test_stop_rules() -> None:
     assert len(early.errors_) < len(paper.errors_)
     assert early.psi_ < paper.psi_
     assert len(ACE(max_sweeps=3).fit(T, y).errors_) == 3
+    limit = ACE(converged=True, tolerance=1e-7, max_sweeps=5000).fit(T, y)
+    assert ACE(converged=True, tolerance=1e-4).fit(T, y).psi_ == pytest.approx(limit.psi_, abs=1e-5)
+    assert len(limit.errors_) < 2000
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 10])
@@ -157,7 +185,7 @@ def test_step_curve_is_the_nearest_neighbours(k: int) -> None:
 )
 def test_additive_truth_is_found(estimator: TransformRegressor) -> None:
     T, y = bent(0, 1500)
-    m: TransformRegressor = estimator.fit(T, y)  # type: ignore[attr-defined]
+    m: TransformRegressor = estimator.fit(T, y)
     assert m.psi_ > 0.99
     unseen, truth = bent(1, 500, noise=0.0)
     assert np.sqrt(np.mean((m.predict(unseen) - truth) ** 2)) < 0.05 * truth.std()
@@ -348,4 +376,4 @@ def test_half_window() -> None:
 )
 def test_bad_settings_are_refused(estimator: TransformRegressor, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        estimator.fit(*bent())  # type: ignore[attr-defined]
+        estimator.fit(*bent())

@@ -109,11 +109,14 @@ class Comparison:
         Per target, method and block; with several blocks also one for all of them together.
     collinearity : Collinearity
         Of the temperatures.
+    left : int
+        Pairs of method and target that were not judged, because the work was stopped.
     """
 
     protocol: Protocol
     assessments: tuple[Assessment, ...]
     collinearity: Collinearity
+    left: int = 0
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per target and method: over all its blocks."""
@@ -136,6 +139,8 @@ def compare(
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
     """Train every method for every target and judge it on what it has not seen.
+
+    Stopped by the keyboard, it returns the methods that were judged on all blocks, and how many were not.
 
     Parameters
     ----------
@@ -161,18 +166,23 @@ def compare(
     pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in protocol.splits]
     done: list[Assessment] = []
     work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
-    for a in Parallel(n_jobs=jobs, return_as="generator")(work):
-        progress(f"{a.target} {a.model} {a.block}")
-        done.append(a)
+    try:
+        for a in Parallel(n_jobs=jobs, return_as="generator")(work):
+            progress(f"{a.target} {a.model} {a.block}")
+            done.append(a)
+    except KeyboardInterrupt:
+        if len(done) < len(protocol.splits):
+            raise
     found: list[Assessment] = []
-    for start in range(0, len(done), len(protocol.splits)):
-        parts = done[start : start + len(protocol.splits)]
+    whole = len(done) // len(protocol.splits)  # a method that was judged on some of the blocks only is left out
+    for k in range(whole):
+        parts = done[k * len(protocol.splits) : (k + 1) * len(protocol.splits)]
         found += parts if len(parts) > 1 else []
         found.append(_together(parts))
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
-    return Comparison(protocol, tuple(found), heat)
+    return Comparison(protocol, tuple(found), heat, left=len(pieces) // len(protocol.splits) - whole)
 
 
 def n_pieces(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:

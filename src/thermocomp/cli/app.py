@@ -42,7 +42,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 judged bad, 2 unusable input.
+        0 done, 1 judged bad, 2 unusable input, 130 stopped by the keyboard.
     """
     try:
         code = app(None if arguments is None else list(arguments))
@@ -50,6 +50,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _unusable(str(e))
     except OSError as e:  # a folder that may not be written to, a full disk
         return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
+    except KeyboardInterrupt:
+        Console(stderr=True, highlight=False).print("[bold red]stopped:[/] nothing was finished, nothing was written")
+        return commands.STOPPED
     return code if isinstance(code, int) else 0
 
 

@@ -32,6 +32,8 @@ from thermocomp.core.exceptions import InputError
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
+#: exit code of work that was stopped by the keyboard, as shells have it
+STOPPED = 130
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
 
 _console = Console(highlight=False)
@@ -342,7 +344,8 @@ def compare(
     Returns
     -------
     int
-        0 every target has a model that may be used, 1 a target has none, 2 unusable input.
+        0 every target has a model that may be used, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
+        (what was judged until then is shown).
     """
     tests = read_recordings(recordings, study.mapping)
     with needs("study"):
@@ -360,6 +363,8 @@ def compare(
             from thermocomp.report import html
         html.write(comparison, tests, output)
     out.show_comparison(comparison, output, trouble, _console, as_json=json)
+    if comparison.left:
+        return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1
 
 

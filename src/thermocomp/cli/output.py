@@ -32,6 +32,7 @@ def show_comparison(
             "condition_number": comparison.collinearity.condition_number,
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
+            "not_judged": comparison.left,
             "results": [_result(a) for a in comparison.assessments],
         }
         _print_json(content, console)
@@ -51,6 +52,8 @@ def show_comparison(
                 f"[bold green]{escape(target)}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
                 f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less)"
             )
+    if comparison.left:
+        console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
     if report is not None:
         console.print(f"Report: {report}")
 
@@ -132,6 +135,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "seen_in_training": judged.seen,
             "verdict_when_fitted": {m.target: m.honest_error.verdict for m in judged.models if m.honest_error},
             "trouble": trouble,
+            "not_judged": comparison.left,
             "results": [_result(a) for a in judged.assessments],
         }
         _print_json(content, console)

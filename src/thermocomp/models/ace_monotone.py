@@ -35,8 +35,8 @@ class MonotoneACE(TransformRegressor):
     points : int
         Knots of each curve.
     smoothing : float
-        Weight of the integrated squared second derivative, the (extended) range of each variable counting as 1. It takes
-        1 % of the height of one wide arc at 1e-4, and half of it at 0.01; at 1e-6 the curves follow every bump.
+        Weight of the integrated squared second derivative, the (extended) range of each variable counting as 1. It
+        takes 1 % of the height of one wide arc at 1e-4, and half of it at 0.01; at 1e-6 the curves follow every bump.
     shrinkage : float
         Weight of the mean square of the curves' knots: decides between inputs that say the same.
     extend : float

@@ -71,6 +71,8 @@ def cautions(comparison: Comparison) -> list[str]:
     best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
     known = [(a, a.robustness) for a in best if a.robustness is not None]
     found = []
+    if comparison.left:
+        found.append(f"the work was stopped: {comparison.left} pairs of method and target were not judged.")
     harmful = [f"{a.target} ({r.worst_lost[0]})" for a, r in known if r.worst_lost[1] >= a.none_metric("rms")]
     if harmful:
         found.append(f"a sensor that is cut off unnoticed makes it worse than none for {_list(harmful)}.")

@@ -1,260 +1,13 @@
-"""ACE on ranks: sort once, then sliding means by running sums.
-
-Everything lives in ranks. Row ``j < p`` of `order` holds, for each rank of T_j, the rank of S of the same sample; row
-p holds the sample of each rank of S. `bounds` and `groups` hold where the tied values of each variable begin.
-"""
+"""ACE on ranks: the sweeps; see `kernels.ranks` for what they stand on."""
 
 from typing import Any
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-RankArray = NDArray[np.uint32]
-
-compiled: Any = njit(cache=True, nogil=True)
+from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot, running_sums, smooth
 
 VANISHES = 1e-9  # a function of smaller norm (theta has norm 1) counts as zero
-MOMENTUM = 0.98  # greatest share of the last move that the acceleration repeats
-
-
-@compiled
-def _argsort(x: FloatArray, index: RankArray, keys: RankArray, bins: RankArray) -> None:
-    """Sort stably into `index`: one counting pass on a linear scale, then insertion within the bins."""
-    n = len(x)
-    low = high = x[0]
-    for i in range(n):
-        low = min(low, x[i])
-        high = max(high, x[i])
-    if not low < high:
-        for i in range(n):
-            index[i] = i
-        return
-    size = len(bins) - 1
-    scale = (size - 1) / (high - low)
-    bins[:] = 0
-    for i in range(n):
-        place = (x[i] - low) * scale
-        keys[i] = np.uint32(place) if place < size - 1 else np.uint32(size - 1)  # also where it is no number
-        bins[keys[i] + 1] += 1
-    for k in range(size):
-        bins[k + 1] += bins[k]
-    for i in range(n):
-        k = keys[i]
-        index[bins[k]] = i
-        bins[k] += 1
-    budget = 8 * n
-    for i in range(1, n):
-        mine = index[i]
-        value = x[mine]
-        k = i
-        while k > 0 and x[index[k - 1]] > value:
-            index[k] = index[k - 1]
-            k -= 1
-        index[k] = mine
-        budget -= i - k
-        if budget < 0:  # a few far values have squeezed all others into a few bins
-            index[:] = np.argsort(x, kind="mergesort")
-            return
-
-
-@compiled
-def rank(columns: FloatArray) -> tuple[RankArray, RankArray, NDArray[np.int64], FloatArray]:
-    """Rank variables.
-
-    Parameters
-    ----------
-    columns : ndarray of shape (p + 1, n), C order
-        T_1 ... T_p, S.
-
-    Returns
-    -------
-    order : ndarray of uint32 of shape (p + 1, n)
-    bounds : ndarray of uint32 of shape (p + 1, n + 1)
-        Ranks at which the groups of equal values begin; the last is n.
-    groups : ndarray of int64 of shape (p + 1,)
-        Number of groups.
-    start : ndarray of shape (n,)
-        S by rank, of zero mean and unit variance.
-    """
-    m, n = columns.shape
-    order = np.empty((m, n), np.uint32)
-    bounds = np.empty((m, n + 1), np.uint32)
-    groups = np.empty(m, np.int64)
-    keys = np.empty(n, np.uint32)
-    size = 64
-    while size < n and size < 8192:
-        size *= 2
-    bins = np.empty(size + 1, np.uint32)
-    for j in range(m):
-        x = columns[j]
-        index = order[j]
-        _argsort(x, index, keys, bins)
-        count = 0
-        last = np.nan
-        for i in range(n):
-            if x[index[i]] != last:
-                last = x[index[i]]
-                bounds[j, count] = i
-                count += 1
-        bounds[j, count] = n
-        groups[j] = count
-    for i in range(n):
-        keys[order[m - 1, i]] = i
-    for j in range(m - 1):
-        for i in range(n):
-            order[j, i] = keys[order[j, i]]
-    start = np.empty(n)
-    mean = 0.0
-    for i in range(n):
-        mean += columns[m - 1, i]
-    mean /= n
-    square = 0.0
-    for i in range(n):
-        start[i] = columns[m - 1, order[m - 1, i]] - mean
-        square += start[i] * start[i]
-    if groups[m - 1] == 1:
-        start[:] = 0.0  # else its rounding would be taken for a signal
-    else:
-        start /= np.sqrt(square / n)
-    return order, bounds, groups, start
-
-
-@compiled
-def running_sums(residual: FloatArray, phi: FloatArray, order: RankArray, sums: FloatArray) -> None:
-    """Fill `sums` with the running sums of residual + phi by rank, in four chains that do not wait for each other."""
-    n = len(phi)
-    m = n // 4
-    a = b = c = d = 0.0
-    sums[0] = 0.0
-    for i in range(m):
-        a += residual[order[i]] + phi[i]
-        b += residual[order[i + m]] + phi[i + m]
-        c += residual[order[i + 2 * m]] + phi[i + 2 * m]
-        d += residual[order[i + 3 * m]] + phi[i + 3 * m]
-        sums[i + 1] = a
-        sums[i + m + 1] = b
-        sums[i + 2 * m + 1] = c
-        sums[i + 3 * m + 1] = d
-    for i in range(4 * m, n):
-        d += residual[order[i]] + phi[i]
-        sums[i + 1] = d
-    b += a
-    c += b
-    for i in range(m):
-        sums[i + m + 1] += a
-        sums[i + 2 * m + 1] += b
-    for i in range(3 * m, n):
-        sums[i + 1] += c
-
-
-@compiled
-def boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Mean of the 2 half + 1 ranks around each, cut at the ends, averaged over ties, minus the mean of all."""
-    n = len(out)
-    for i in range(min(half, n)):
-        top = min(i + half + 1, n)
-        out[i] = sums[top] / top
-    share = 1.0 / (2 * half + 1)
-    for i in range(half, n - half):
-        out[i] = (sums[i + half + 1] - sums[i - half]) * share
-    for i in range(max(half, n - half), n):
-        out[i] = (sums[n] - sums[i - half]) / (n - i + half)
-    _level(bounds, groups, out)
-    _centre(out)
-
-
-@compiled
-def _level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Give tied ranks their mean."""
-    if groups == len(out):
-        return
-    for g in range(groups):
-        first, last = bounds[g], bounds[g + 1]
-        if last - first > 1:
-            tied = 0.0
-            for i in range(first, last):
-                tied += out[i]
-            tied /= last - first
-            for i in range(first, last):
-                out[i] = tied
-
-
-@compiled
-def _centre(out: FloatArray) -> None:
-    n = len(out)
-    m = n // 4 * 4
-    a = b = c = d = 0.0
-    for i in range(0, m, 4):
-        a += out[i]
-        b += out[i + 1]
-        c += out[i + 2]
-        d += out[i + 3]
-    for i in range(m, n):
-        a += out[i]
-    mean = (a + b + c + d) / n
-    for i in range(n):
-        out[i] -= mean
-
-
-@compiled
-def _mirrored(sums: FloatArray, half: int, out: FloatArray) -> None:
-    """Mean of the 2 half + 1 ranks around each, mirrored at the ends."""
-    n = len(out)
-    share = 1.0 / (2 * half + 1)
-    for i in range(half):
-        out[i] = (sums[i + half + 1] + sums[half - i]) * share
-    for i in range(half, n - half):
-        out[i] = (sums[i + half + 1] - sums[i - half]) * share
-    for i in range(n - half, n):
-        out[i] = (2 * sums[n] - sums[i - half] - sums[2 * n - i - half - 1]) * share
-
-
-@compiled
-def triangle(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Two boxcars of half the width, mirrored at the ends, averaged over ties before and after, minus the mean of all.
-
-    This is symmetric with eigenvalues from 0 to 1, so that sweeps have a limit and reach it. A boxcar has eigenvalues
-    down to -0.22: beyond five variables that rise together its equations are singular, and sweeps run away.
-    """
-    if groups < len(out):
-        for g in range(groups):
-            first, last = bounds[g], bounds[g + 1]
-            step = (sums[last] - sums[first]) / (last - first)
-            for i in range(first + 1, last):
-                sums[i] = sums[first] + step * (i - first)
-    _mirrored(sums, (half + 1) // 2, out)
-    for i in range(len(out)):
-        sums[i + 1] = sums[i] + out[i]
-    _mirrored(sums, (half + 1) // 2, out)
-    _level(bounds, groups, out)
-    _centre(out)
-
-
-@compiled
-def smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray) -> None:
-    """Estimate E[z|x] by rank from the running sums of z, which may be overwritten."""
-    if twice:
-        triangle(sums, half, bounds, groups, out)
-    else:
-        boxcar(sums, half, bounds, groups, out)
-
-
-@compiled
-def dot(x: FloatArray, y: FloatArray) -> float:
-    """Return the sum of x * y, in four chains."""
-    n = len(x)
-    m = n // 4 * 4
-    a = b = c = d = 0.0
-    for i in range(0, m, 4):
-        a += x[i] * y[i]
-        b += x[i + 1] * y[i + 1]
-        c += x[i + 2] * y[i + 2]
-        d += x[i + 3] * y[i + 3]
-    for i in range(m, n):
-        a += x[i] * y[i]
-    return a + b + c + d
+MOMENTUM = 0.95  # greatest share of the last move that the acceleration repeats
 
 
 @compiled
@@ -317,7 +70,7 @@ def _sweep(
             mine[i] = work[i]
     for i in range(n):
         total[i] = theta[i] - residual[i]
-    return float(dot(residual, residual)) / n
+    return float(dot(residual, residual) / n)
 
 
 @compiled
@@ -364,7 +117,7 @@ def solve(
 @compiled
 def converge(
     order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, tolerance: float, max_sweeps: int
-) -> tuple[FloatArray, FloatArray, float, FloatArray, float]:
+) -> tuple[FloatArray, FloatArray, float, FloatArray]:
     """Sweep, with `triangle` for the boxcar, until a sweep moves the functions by `tolerance` at most.
 
     The move is the root of the mean square over the rows, summed over all phi; theta has norm 1. Sweeps are
@@ -374,8 +127,6 @@ def converge(
     -------
     theta, phi, psi, errors
         As `solve`.
-    moved : float
-        By the last sweep.
     """
     p, n = len(order) - 1, len(start)
     theta, residual = np.zeros(n), np.empty(n)
@@ -387,14 +138,14 @@ def converge(
     sweeps = age = 0
     moved = 0.0
     if not _begin(order, bounds, groups, start, half, True, phi, total, sums):
-        return theta, phi, 0.0, errors[:0], moved
+        return theta, phi, 0.0, errors[:0]
     while True:
         before[:] = phi
         error = _sweep(order, bounds, groups, half, True, theta, phi, total, residual, sums, work)
         if np.isnan(error):
             theta[:] = 0.0
             state[:] = 0.0
-            return theta, phi, 0.0, errors[:sweeps], 0.0
+            return theta, phi, 0.0, errors[:sweeps]
         errors[sweeps] = error
         sweeps += 1
         previous = moved
@@ -405,7 +156,7 @@ def converge(
             moved += dot(work, work) / n
         moved = np.sqrt(moved)
         if moved <= tolerance or sweeps == max_sweeps:
-            return theta, phi, _correlation(theta, total), errors[:sweeps], moved
+            return theta, phi, _correlation(theta, total), errors[:sweeps]
         age = 0 if sweeps == 1 or moved > previous else age + 1
         momentum = min(MOMENTUM, age / (age + 3.0))
         for j in range(p + 1):

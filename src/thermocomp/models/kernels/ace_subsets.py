@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.models.kernels.ace import MOMENTUM, VANISHES, FloatArray, RankArray, compiled, dot, running_sums, smooth
+from thermocomp.models.kernels.ace import MOMENTUM, VANISHES
 from thermocomp.models.kernels.lanes import LANES, add, load, multiply, splat, store, subtract
+from thermocomp.models.kernels.ranks import FloatArray, RankArray, compiled, dot, running_sums, smooth
 
 
 @compiled
 def _lane_boxcar(sums: FloatArray, half: int, bounds: RankArray, groups: Any, out: FloatArray) -> Any:
-    """As `boxcar` of `thermocomp.models.kernels.ace` for all lanes, except that the mean stays in; return it."""
+    """As `boxcar` of `thermocomp.models.kernels.ranks` for all lanes, except that the mean stays in; return it."""
     n = len(out)
     mean = splat(0.0)
     for i in range(min(half, n)):
@@ -50,42 +51,54 @@ def _lane_level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
 
 
 @compiled
-def _lane_mirrored(sums: FloatArray, half: int, out: FloatArray) -> None:
-    """Mean of the 2 half + 1 ranks around each, mirrored at the ends."""
-    n = len(out)
-    share = splat(1.0 / (2 * half + 1))
-    for i in range(half):
-        store(out, i, multiply(add(load(sums, i + half + 1), load(sums, half - i)), share))
-    for i in range(half, n - half):
-        store(out, i, multiply(subtract(load(sums, i + half + 1), load(sums, i - half)), share))
-    whole = load(sums, n)
-    for i in range(n - half, n):
-        right = subtract(whole, load(sums, 2 * n - i - half - 1))
-        store(out, i, multiply(add(right, subtract(whole, load(sums, i - half))), share))
+def _lane_margins(sums: FloatArray, half: int) -> None:
+    """Go on with running sums, which have `half` rows to spare on either side, as if their numbers were mirrored."""
+    top = len(sums) - 1 - half
+    zero = splat(0.0)
+    whole = add(load(sums, top), load(sums, top))
+    for k in range(1, half + 1):
+        store(sums, half - k, subtract(zero, load(sums, half + k)))
+        store(sums, top + k, subtract(whole, load(sums, top - k)))
 
 
 @compiled
-def _lane_smooth(sums: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray) -> Any:
-    """As `smooth`, for all lanes, except that the mean stays in; return it."""
-    if not twice:
-        return _lane_boxcar(sums, half, bounds, groups, out)
-    n = len(out)
+def _lane_twice(sums: FloatArray, again: FloatArray, half: int, bounds: RankArray, groups: Any) -> Any:
+    """As the first half of `triangle`: level, smooth once, and put the running sums of that into `again`.
+
+    Return the mean, which mirrored boxcars keep.
+    """
+    n = len(sums) - 1 - 2 * half
     if groups < n:
         for g in range(groups):
-            first, last = bounds[g], bounds[g + 1]
+            first, last = bounds[g] + half, bounds[g + 1] + half
             if last - first > 1:
                 low = load(sums, first)
                 step = multiply(subtract(load(sums, last), low), splat(1.0 / (last - first)))
                 for i in range(first + 1, last):
                     store(sums, i, add(low, multiply(step, splat(1.0 * (i - first)))))
-    _lane_mirrored(sums, (half + 1) // 2, out)
-    running = splat(0.0)
+    _lane_margins(sums, half)
+    share, running = splat(1.0 / (2 * half + 1)), splat(0.0)
+    store(again, half, running)
     for i in range(n):
-        running = add(running, load(out, i))
-        store(sums, i + 1, running)
-    _lane_mirrored(sums, (half + 1) // 2, out)
+        running = add(running, multiply(subtract(load(sums, i + 2 * half + 1), load(sums, i)), share))
+        store(again, i + half + 1, running)
+    _lane_margins(again, half)
+    return multiply(running, splat(1.0 / n))
+
+
+@compiled
+def _lane_smooth(
+    sums: FloatArray, again: FloatArray, half: int, twice: bool, bounds: RankArray, groups: Any, out: FloatArray
+) -> Any:
+    """As `smooth`, for all lanes, except that the mean stays in; return it."""
+    if not twice:
+        return _lane_boxcar(sums, half, bounds, groups, out)
+    h = (half + 1) // 2
+    mean, share = _lane_twice(sums, again, h, bounds, groups), splat(1.0 / (2 * h + 1))
+    for i in range(len(out)):
+        store(out, i, multiply(subtract(load(again, i + 2 * h + 1), load(again, i)), share))
     _lane_level(bounds, groups, out)
-    return multiply(running, splat(1.0 / n))  # twice the mirrored boxcar keeps the mean
+    return mean
 
 
 @compiled
@@ -100,10 +113,13 @@ def _lane_theta(
     theta: FloatArray,
     residual: FloatArray,
     sums: FloatArray,
+    again: FloatArray,
     norm: FloatArray,
 ) -> None:
     """Theta of the (extrapolated) sum of phi, normalised; a lane without any gets 0. `norm` is a row to write to."""
     n = len(theta)
+    spare = (len(sums) - 1 - n) // 2
+    store(sums, spare, splat(0.0))
     share, running = load(momentum, 0), splat(0.0)
     for i in range(n):
         new = load(total, i)
@@ -111,8 +127,8 @@ def _lane_theta(
         store(last_total, i, new)
         store(total, i, ahead)
         running = add(running, ahead)
-        store(sums, i + 1, running)
-    mean, square = _lane_smooth(sums, half, twice, bounds, groups, theta), splat(0.0)
+        store(sums, i + 1 + spare, running)
+    mean, square = _lane_smooth(sums, again, half, twice, bounds, groups, theta), splat(0.0)
     for i in range(n):
         value = subtract(load(theta, i), mean)
         store(theta, i, value)
@@ -129,6 +145,15 @@ def _lane_theta(
 
 
 @compiled
+def _lane_settle(phi: FloatArray, i: int, residual: FloatArray, at: Any, new: Any) -> Any:
+    """Put a new value into phi and take its step out of the residual; return the square of the step."""
+    step = subtract(new, load(phi, i))
+    store(phi, i, new)
+    store(residual, at, subtract(load(residual, at), step))
+    return multiply(step, step)
+
+
+@compiled
 def _lane_phi(
     phi: FloatArray,
     last: FloatArray,
@@ -141,11 +166,14 @@ def _lane_phi(
     groups: Any,
     residual: FloatArray,
     sums: FloatArray,
+    again: FloatArray,
     work: FloatArray,
     accelerate: bool,
 ) -> Any:
     """Back-fit one phi in the lanes that have it; return the square of its move."""
     n = len(phi)
+    spare = (len(sums) - 1 - n) // 2
+    store(sums, spare, splat(0.0))
     share, running = load(momentum, 0), splat(0.0)
     if accelerate:
         for i in range(n):
@@ -154,18 +182,23 @@ def _lane_phi(
             store(last, i, new)
             store(phi, i, ahead)
             running = add(running, add(load(residual, index[i]), ahead))
-            store(sums, i + 1, running)
+            store(sums, i + 1 + spare, running)
     else:
         for i in range(n):
             running = add(running, add(load(residual, index[i]), load(phi, i)))
-            store(sums, i + 1, running)
-    mean, mine, square = _lane_smooth(sums, half, accelerate, bounds, groups, work), load(on, j), splat(0.0)
+            store(sums, i + 1 + spare, running)
+    mine, square = load(on, j), splat(0.0)
+    if accelerate and groups == n:  # the same as below, in one go
+        h = (half + 1) // 2
+        mean, width = _lane_twice(sums, again, h, bounds, groups), splat(1.0 / (2 * h + 1))
+        for i in range(n):
+            value = multiply(subtract(load(again, i + 2 * h + 1), load(again, i)), width)
+            square = add(square, _lane_settle(phi, i, residual, index[i], multiply(subtract(value, mean), mine)))
+        return square
+    mean = _lane_smooth(sums, again, half, accelerate, bounds, groups, work)
     for i in range(n):
         new = multiply(subtract(load(work, i), mean), mine)
-        step = subtract(new, load(phi, i))
-        store(phi, i, new)
-        store(residual, index[i], subtract(load(residual, index[i]), step))
-        square = add(square, multiply(step, step))
+        square = add(square, _lane_settle(phi, i, residual, index[i], new))
     return square
 
 
@@ -218,7 +251,7 @@ def _take(
 
 
 @compiled
-def correlations(  # noqa: PLR0912
+def correlations(  # noqa: PLR0912, PLR0915
     order: RankArray,
     bounds: RankArray,
     groups: Any,
@@ -255,7 +288,9 @@ def correlations(  # noqa: PLR0912
             running_sums(start, zero, order[j], start_sums)
             smooth(start_sums, half, accelerate, bounds[j], groups[j], first[j])
     theta, total, residual = np.empty((n, LANES)), np.empty((n, LANES)), np.empty((n, LANES))
-    last_total, work, sums = np.zeros((n, LANES)), np.empty((n, LANES)), np.zeros((n + 1, LANES))
+    last_total, work = np.zeros((n, LANES)), np.empty((n, LANES))
+    spare = (half + 1) // 2 if accelerate else 0
+    sums, again = np.empty((n + 1 + 2 * spare, LANES)), np.empty((n + 1 + 2 * spare, LANES))
     phi, last = np.zeros((p, n, LANES)), np.zeros((p, n, LANES))
     on, used = np.zeros((p, LANES)), np.zeros(p, np.bool_)
     momentum, result = np.zeros((1, LANES)), np.empty((4, LANES))
@@ -275,7 +310,20 @@ def correlations(  # noqa: PLR0912
             used[j] = False
             for v in range(LANES):
                 used[j] |= on[j, v] > 0 and not idle[v]
-        _lane_theta(total, last_total, momentum, half, accelerate, bounds[p], groups[p], theta, residual, sums, result[:1])
+        _lane_theta(
+            total,
+            last_total,
+            momentum,
+            half,
+            accelerate,
+            bounds[p],
+            groups[p],
+            theta,
+            residual,
+            sums,
+            again,
+            result[:1],
+        )
         for v in range(LANES):
             if result[0, v] == 0.0 and not idle[v]:
                 idle[v] = True
@@ -285,7 +333,7 @@ def correlations(  # noqa: PLR0912
             if used[j]:
                 square = _lane_phi(
                     phi[j], last[j], momentum, on, j, order[j], half, bounds[j], groups[j],
-                    residual, sums, work, accelerate,
+                    residual, sums, again, work, accelerate,
                 )  # fmt: skip
                 move = add(move, square)
         store(result, 0, move)

@@ -89,7 +89,8 @@ def maximal_correlations(
 ) -> MaximalCorrelations:
     """Compute the maximal correlation of every subset, for every test and displacement (W-10, W-12).
 
-    The transformations are those of `thermocomp.models.ace.ACE`. Stopped by the keyboard, it returns what is done.
+    The transformations are those of `thermocomp.models.ace.ACE`, with its `converged`. Stopped by the keyboard, it
+    returns what is done.
 
     Parameters
     ----------
@@ -99,11 +100,11 @@ def maximal_correlations(
     half_window : int
         N: the boxcar holds 2N + 1 ranks.
     converged : bool
-        True: sweep until the functions stand still, accelerated; False: until the error fails to decrease, as in the
-        paper.
+        True: sweep until the functions stand still; False: with the paper's boxcar, until the error fails to decrease.
     tolerance : float, optional
-        Root mean square by which a sweep may still move the functions, summed over all (1e-5 if not given); or the
-        decrease of the error that counts as a failure (0).
+        Root mean square by which a sweep may still move the functions, summed over all; the error then falls by about
+        its square a sweep. With 1e-3, taken if not given, Psi is mostly within 1e-4 of its limit. With the paper's
+        rule: the decrease of the error that counts as a failure, 0 if not given.
     max_sweeps : int
     jobs : int
         Threads; -1 takes all cores.
@@ -138,7 +139,7 @@ def maximal_correlations(
     # neighbours in this order share most of their members, which the kernel likes
     order = np.lexsort(members.T)
     if tolerance is None:
-        tolerance = 1e-5 if converged else 0.0
+        tolerance = 1e-3 if converged else 0.0
     psi = np.full((n_displacements, len(chosen), len(tests)), np.nan)
     pieces = [(k, d) for k in range(len(tests)) for d in range(n_displacements)]
     work = (
@@ -192,8 +193,8 @@ def _psi(
     max_sweeps: int,
     converged: bool,
 ) -> FloatArray:
-    from thermocomp.models.kernels import ace, ace_subsets  # numba takes its time
+    from thermocomp.models.kernels import ace_subsets, ranks  # numba takes its time
 
-    ranked = ace.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
     found: FloatArray = ace_subsets.correlations(*ranked, half_window, tolerance, max_sweeps, converged, members)[0]
     return found
