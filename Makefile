@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+BENCH ?= .venv-bench
 
 .PHONY: help demo test check bench docs clean
 
@@ -26,14 +27,17 @@ check: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: $(VENV)/.bench
-	$(BIN)/python benchmarks/run.py
+# in an environment of its own: the peers want older libraries. Without R its peers are left out.
+bench: $(BENCH)/.bench
+	-scripts/system_packages.sh r-base-core r-cran-acepack r-cran-leaps
+	$(BENCH)/bin/python benchmarks/run.py
 
 docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) demo docs/_build docs/auto_examples docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(BENCH) demo docs/_build docs/auto_examples docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+		src/thermocomp/models/kernels/__pycache__
 
 $(VENV)/.study: pyproject.toml
 	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]'
@@ -43,9 +47,9 @@ $(VENV)/.dev: pyproject.toml
 	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group dev
 	@touch $@ $(VENV)/.study
 
-$(VENV)/.bench: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group bench
-	@touch $@ $(VENV)/.study
+$(BENCH)/.bench: pyproject.toml
+	scripts/make_venv.sh $(PYTHON) $(BENCH) --editable '.[study]' --group bench
+	@touch $@
 
 $(VENV)/.docs: pyproject.toml
 	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group docs
