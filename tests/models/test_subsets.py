@@ -108,6 +108,25 @@ def test_nearly_the_same_channels(condition: float, route: Route) -> None:
     assert proven >= 28  # of 32: it does not take refuge in "not proven"
 
 
+@pytest.mark.parametrize("route", ROUTES)
+def test_nearly_the_same_channels_and_a_nearly_perfect_fit(route: Route) -> None:
+    # costs of 1e-11 of channels that leave beside pairs of condition 1e9: the inverse of the triangle must be good by row
+    proven = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        X = rng.normal(size=(60, 8))
+        X[:, 1] = X[:, 0] + 3e-10 * rng.normal(size=60)
+        X[:, 3] = X[:, 2] + 1e-8 * rng.normal(size=60)
+        y = X[:, 4:6] @ [3.0, -2.0] + 1e-5 * rng.normal(size=60)
+        every = twin_subsets.every_set(X, y, 8)
+        found = best_subsets(X, y, route=route)
+        for truth, subset in zip(every, found.best, strict=True):
+            assert subset.rss == pytest.approx(truth[0][0], rel=1e-5)
+            assert subset.columns == truth[0][1] or not subset.proven
+            proven += subset.proven
+    assert proven >= 32  # of 64: which one of a pair it takes makes no difference
+
+
 def test_what_rounding_cannot_tell_is_not_proven() -> None:
     X, y = chain(80, 6, 1)
     X[:, 4] = X[:, 1] * (1 + 1e-13 * np.random.default_rng(0).normal(size=80))

@@ -88,7 +88,7 @@ class Choice:
     ----------
     method : str
     target : str
-        Displacement channel, or several joined by ``, `` if the choice is for all of them.
+        Displacement channel, or several with commas in between if the choice is for all of them.
     sensors : tuple of str
     reason : str
         How they were chosen, in words.

@@ -44,7 +44,7 @@ class TransformRegressor(ThermalRegressor):
     Attributes
     ----------
     psi_ : float
-        Maximal correlation |corr(theta, sum phi)|, as reached (W-02).
+        Maximal correlation ``|corr(theta, sum phi)|``, as reached (W-02).
     theta_ : Table
         theta over y.
     phi_ : tuple of Table

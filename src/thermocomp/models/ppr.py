@@ -52,7 +52,7 @@ class ProjectionPursuit(ThermalRegressor):
     degrees_ : float
         Chosen degrees of freedom of each curve.
     intercept_ : float
-    directions_ : ndarray of shape (n_terms_, n_features)
+    directions_ : ndarray of shape (n_terms, n_features)
         On raw inputs.
     curves_ : tuple of Curve
         One per direction.

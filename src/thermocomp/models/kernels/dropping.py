@@ -69,13 +69,13 @@ def renew(state: State, source: int, level: int, inside: ByteArray, free: IntArr
     for r in range(m):
         triangles[level, p, r] = columns[kept + m, kept + r]
     numbers[4, level] = m
-    for i in range(m - 1, -1, -1):  # rows of the inverse of an upper triangle
+    for i in range(m):  # row by row: each is then the exact one of a triangle that is wrong in the last places only
         W[i, i] = 1.0 / columns[kept + i, kept + i]
         for c in range(i + 1, m):
             total = 0.0
-            for k in range(i + 1, c + 1):
-                total += columns[kept + k, kept + i] * W[k, c]
-            W[i, c] = -total * W[i, i]
+            for k in range(i, c):
+                total += W[i, k] * columns[kept + c, kept + k]
+            W[i, c] = -total / columns[kept + c, kept + c]
     M, D, B, C, limits = moments[level], work[1, level], work[2, level], work[3, level], work[5, level]
     M[:] = 0.0
     D[:] = 1.0

@@ -212,7 +212,7 @@ def _certified(
     for i, (rss, columns) in enumerate(fitted[:n_best]):
         others = min(beyond, fitted[i + 1][0]) if i + 1 < len(fitted) else beyond
         apart = others - rss > _SAME * rss + 2 * y_noise * math.sqrt(rss) + y_noise**2
-        found.append(Subset(columns, rss, complete and apart, min(rss, others)))
+        found.append(Subset(columns, rss, bool(complete and apart), float(min(rss, others))))
     # a later rank is only known if the ones before are
     return tuple(replace(s, proven=all(t.proven for t in found[: i + 1])) for i, s in enumerate(found))
 

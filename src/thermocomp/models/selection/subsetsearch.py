@@ -70,7 +70,7 @@ class Problem:
         size = float(np.linalg.norm(both[:, -1]))
         if rank == p:
             inverse = lapack.dtrtri(both[:p, :p])[0]
-            b = inverse @ both[:p, -1]
+            b = linalg.solve_triangular(both[:p, :p], both[:p, -1])
             full = float(np.sum(both[p:, -1] ** 2))
             constant = y_noise + float(least @ np.abs(b))
             slope = float(least @ np.linalg.norm(inverse, axis=1))
@@ -205,7 +205,8 @@ class Adding(Search):
         p = len(self.inside)
         self._order = _promising(problem, sizes)
         self._columns = np.ascontiguousarray(problem.triangle[:, [*self._order, -1]].T)
-        self._least = problem.least[self._order]
+        # where all columns together are independent, so are those of every set
+        self._least = problem.least[self._order] if problem.rank < p else np.zeros(p)
         levels = max(sizes - 1, 1)
         self._numbers = np.zeros((3, levels), dtype=np.int64)
         G, D, h, sums = np.zeros((levels, p, p)), np.ones((levels, p)), np.zeros((levels, p)), np.zeros((3, levels))
