@@ -16,7 +16,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
 from thermocomp.core.network import Perceptron
-from thermocomp.models.backprop import learning_rates, scaling_in, train_net
+from thermocomp.models.numerics.backprop import learning_rates, scaling_in, train_net
 
 FloatArray = NDArray[np.float64]
 

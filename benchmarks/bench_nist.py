@@ -15,7 +15,7 @@ import statsmodels.api as sm
 from numpy.typing import NDArray
 from sklearn.linear_model import LinearRegression
 
-from thermocomp.models.leastsquares import lstsq
+from thermocomp.models.numerics.leastsquares import lstsq
 
 FloatArray = NDArray[np.float64]
 Solver = Callable[[FloatArray, FloatArray, bool], FloatArray]

@@ -14,8 +14,8 @@ import statsmodels.api as sm
 from numpy.typing import NDArray
 
 from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.numerics.stepwise import AlphaThresholds, FThresholds, Rule, alpha_of_f
 from thermocomp.models.partial_f import PartialF
-from thermocomp.models.stepwise import AlphaThresholds, FThresholds, Rule, alpha_of_f
 
 FloatArray = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """The free run of an autoregressive model, literally: one test, one loop over the ticks, integrals by their definition.
 
-Slow and plain: the oracle for `thermocomp.core.autoregressive` and `thermocomp.models.freerun`. Also the series with
-known orders that the tests of the estimators share.
+Slow and plain: the oracle for `thermocomp.core.autoregressive` and `thermocomp.models.numerics.freerun`. And the series
+with known orders that the tests of the estimators share.
 """
 
 from collections.abc import Callable

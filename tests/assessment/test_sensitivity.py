@@ -15,7 +15,7 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.leastsquares import lstsq
+from thermocomp.models.numerics.leastsquares import lstsq
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack

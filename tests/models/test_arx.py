@@ -17,7 +17,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import table, triangle
 from thermocomp.models.selection import orders
 from thermocomp.recording.samples import Samples
 from twin_arx import SYSTEMS, clock, series

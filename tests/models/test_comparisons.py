@@ -24,15 +24,15 @@ from thermocomp.core.exceptions import FitError, InputError, ModelFileError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import modelfile
-from thermocomp.models import ridge
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.gp import GaussianProcess
 from thermocomp.models.lasso import ElasticNet, Lasso
 from thermocomp.models.methods import METHODS, Method
+from thermocomp.models.numerics import moments
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.pcr import PrincipalComponents
 from thermocomp.models.pls import PartialLeastSquares
-from thermocomp.models.ridge_regression import Ridge
+from thermocomp.models.ridge import Ridge
 from thermocomp.models.shrinkage import ShrunkRegressor, choose, scaling
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
@@ -150,7 +150,7 @@ def test_ridge_is_the_ridge_of_dynamic() -> None:
     T, y, cycle = cycles(2)
     estimator = Ridge(strengths=(0.03,)).fit(T, y, cycle=cycle)
     table = np.column_stack([T, np.ones(len(T)), y])
-    weights, intercepts = ridge.solve(table.T @ table, (0.03,), fit_intercept=True)
+    weights, intercepts = moments.solve(table.T @ table, (0.03,), fit_intercept=True)
     assert estimator.coef_ == pytest.approx(weights[:, 0], rel=1e-9)
     assert estimator.intercept_ == pytest.approx(intercepts[0], rel=1e-9)
 

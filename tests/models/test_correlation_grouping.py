@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.leastsquares import lstsq, table, triangle
+from thermocomp.models.numerics.leastsquares import lstsq, table, triangle
 from thermocomp.models.selection import exhaustive
 from thermocomp.models.selection.collinearity import spectrum
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models import ridge
 from thermocomp.models.dynamic import MINUTE, DynamicRidge
+from thermocomp.models.numerics.folds import number_folds
 from thermocomp.recording.samples import Samples
 
 LAGS = {"temperature_lags": ((), (20 * MINUTE,)), "speed_lags": ((20 * MINUTE,), (20 * MINUTE, 90 * MINUTE))}
@@ -120,7 +120,7 @@ def test_bad_input(samples: Samples) -> None:
 @given(st.lists(st.integers(-1, 3), min_size=1, max_size=200).filter(lambda c: max(c) >= 0))
 def test_folds_cover_what_is_learned_from(labels: list[int]) -> None:
     cycle = np.sort(np.array(labels))
-    folds, _ = ridge.number_folds(cycle, len(cycle))
+    folds, _ = number_folds(cycle, len(cycle))
     assert ((folds >= 0) == (cycle >= 0)).all()
     assert set(folds[folds >= 0]) == set(range(folds.max() + 1))
 

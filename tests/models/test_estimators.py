@@ -14,9 +14,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
-from thermocomp.models.leastsquares import lstsq
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.numerics.leastsquares import lstsq
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
 

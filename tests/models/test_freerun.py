@@ -14,10 +14,10 @@ from thermocomp.core.autoregressive import slowest
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel
 from thermocomp.files import modelfile
-from thermocomp.models import freerun, ticks
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.clocked import Clocked
+from thermocomp.models.numerics import freerun, ticks
 from twin_arx import SYSTEMS, clock, series
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import twin_grouping as twin
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.leastsquares import Triangle, lstsq, table, triangle
+from thermocomp.models.numerics.leastsquares import Triangle, lstsq, table, triangle
 from thermocomp.models.selection import exhaustive, grouping
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thermocomp.models.leastsquares import effective_sample_size, lstsq, solve, table, triangle
+from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq, solve, table, triangle
 from thermocomp.models.ols import LeastSquares
 
 FloatArray = NDArray[np.float64]

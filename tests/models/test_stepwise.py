@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.models.leastsquares import table, triangle
-from thermocomp.models.stepwise import (
+from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.stepwise import (
     AlphaThresholds,
     FThresholds,
     Rule,

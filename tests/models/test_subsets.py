@@ -110,7 +110,7 @@ def test_nearly_the_same_channels(condition: float, route: Route) -> None:
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_nearly_the_same_channels_and_a_nearly_perfect_fit(route: Route) -> None:
-    # costs of 1e-11 of channels that leave beside pairs of condition 1e9: the inverse of the triangle must be good by row
+    # what leaves costs 1e-11 beside pairs of condition 1e9: the inverse of the triangle must be good row by row
     proven = 0
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -125,6 +125,18 @@ def test_nearly_the_same_channels_and_a_nearly_perfect_fit(route: Route) -> None
             assert subset.columns == truth[0][1] or not subset.proven
             proven += subset.proven
     assert proven >= 32  # of 64: which one of a pair it takes makes no difference
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_three_nearly_the_same_channels(route: Route) -> None:
+    X, y = chain(40, 4, 2)
+    X[:, 1:3] = X[:, [0]] + 1e-9 * np.random.default_rng(3).normal(size=(40, 2))
+    found = best_subsets(X, y, route=route)
+    every = twin_subsets.every_set(X, y, 4)
+    assert [s.rss for s in found.best] == pytest.approx([t[0][0] for t in every], rel=1e-6)
+    assert all(s.columns == t[0][1] or not s.proven for s, t in zip(found.best, every, strict=True))
+    alone = best_subsets(X[:, :3], y, route=route)
+    assert alone.best[2].columns == (0, 1, 2)
 
 
 def test_what_rounding_cannot_tell_is_not_proven() -> None:

@@ -14,8 +14,8 @@ from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
-from thermocomp.models.leastsquares import effective_sample_size
 from thermocomp.models.methods import expand
+from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
 

@@ -13,14 +13,14 @@ from thermocomp.assessment.choice import Choice, Settings, Table
 from thermocomp.assessment.splits import Protocol
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.leastsquares import table, triangle
 from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.stepwise import Step
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.selection import grouping
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.models.selection.maximal_correlation import Test as DataSet
 from thermocomp.models.selection.maximal_correlation import maximal_correlations, subsets_up_to
-from thermocomp.models.stepwise import Step
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recording.samples import Samples
 

@@ -135,7 +135,6 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "seen_in_training": judged.seen,
             "verdict_when_fitted": {m.target: m.honest_error.verdict for m in judged.models if m.honest_error},
             "trouble": trouble,
-            "not_judged": comparison.left,
             "results": [_result(a) for a in judged.assessments],
         }
         _print_json(content, console)

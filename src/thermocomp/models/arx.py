@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input
-from thermocomp.models import ticks
 from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
-from thermocomp.models.freerun import Coefficients, output_error
-from thermocomp.models.leastsquares import triangle
+from thermocomp.models.numerics import ticks
+from thermocomp.models.numerics.freerun import Coefficients, output_error
+from thermocomp.models.numerics.leastsquares import triangle
 from thermocomp.models.selection import orders
 
 FloatArray = NDArray[np.float64]
@@ -42,8 +42,8 @@ class ARX(ClockedRegressor):
     and the orders from that criterion (P-02); k = 0 takes part, so there is always an order whose free run decays.
     Orders whose free run does not decay within the length of the longest test are not admissible. One-step errors
     are trivially small, and the noise of the probe biases the coefficients (E-P3); with ``"free-run"`` they are those
-    with the smallest error in free run (see `thermocomp.models.freerun.output_error`), and the orders those that leave
-    the smallest free-run error on thermal cycles left out. Several intervals are always judged by that.
+    with the smallest error in free run (see `thermocomp.models.numerics.freerun.output_error`), and the orders those
+    that leave the smallest free-run error on thermal cycles left out. Several intervals are always judged by that.
 
     Rows with cycle -1 are not learned from, but their inputs drive the model. Inputs that depend on others, or never
     leave zero, get no coefficient of their own.

@@ -13,11 +13,11 @@ from thermocomp.core.autoregressive import AutoregressiveNet
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Perceptron
-from thermocomp.models import ticks
 from thermocomp.models.arx import ARX
-from thermocomp.models.backprop import learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
-from thermocomp.models.ticks import Run
+from thermocomp.models.numerics import ticks
+from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
+from thermocomp.models.numerics.ticks import Run
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models import ridge, ticks
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.ticks import Run
+from thermocomp.models.numerics import ticks
+from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.numerics.ticks import Run
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -117,7 +118,7 @@ class ClockedRegressor(ThermalRegressor):
         checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
         rows: FloatArray = checked[0]
         step = ticks.steps(dt, len(rows))
-        folds, self.chosen_by_ = ridge.number_folds(cycle, len(rows))
+        folds, self.chosen_by_ = number_folds(cycle, len(rows))
         learned = np.ascontiguousarray(rows.T)  # by column in memory: the next two are ten times as fast
         if folds.min() < 0:
             learned = learned[:, folds >= 0]

@@ -13,8 +13,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import Input
 from thermocomp.core.terms import Term
-from thermocomp.models import ridge
 from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.numerics import moments as ridge
+from thermocomp.models.numerics.folds import number_folds
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -149,7 +150,7 @@ class DynamicRidge(ThermalRegressor):
         checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
         rows: FloatArray = checked[0]
         steps = _steps(dt, len(rows))
-        folds, self.chosen_by_ = ridge.number_folds(cycle, len(rows))
+        folds, self.chosen_by_ = number_folds(cycle, len(rows))
         learned = rows[folds >= 0]
         self.data_min_, self.data_max_ = learned.min(axis=0), learned.max(axis=0)
         self._split_columns()

@@ -5,12 +5,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
-from thermocomp.models.leastsquares import solve, table, triangle
 from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.leastsquares import solve, table, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
 from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
-from thermocomp.models.stepwise import ENOUGH
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.leastsquares import Solution, effective_sample_size, table
+from thermocomp.models.numerics.leastsquares import Solution, effective_sample_size, table
 
 FloatArray = NDArray[np.float64]
 

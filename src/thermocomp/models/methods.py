@@ -93,7 +93,7 @@ METHODS: dict[str, Method] = {
             speed="inputs",
             takes=("dt", "cycle"),
         ),
-        Method("ridge", "ridge regression on all temperatures", "ridge_regression.Ridge", takes=("cycle",)),
+        Method("ridge", "ridge regression on all temperatures", "ridge.Ridge", takes=("cycle",)),
         Method("pcr", "regression on the first principal components", "pcr.PrincipalComponents", takes=("cycle",)),
         Method("pls", "partial least squares", "pls.PartialLeastSquares", takes=("cycle",)),
         Method("lasso", "regression that drops temperatures by itself", "lasso.Lasso", takes=("cycle",)),

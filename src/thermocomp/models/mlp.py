@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.network import Affine
-from thermocomp.models import ridge
-from thermocomp.models.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.nets import NetRegressor, thinned
+from thermocomp.models.numerics.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
+from thermocomp.models.numerics.folds import number_folds
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -69,11 +69,11 @@ class SigmoidNet(NetRegressor):
     learning_rate, final_learning_rate : float
         In the first and in the last epoch.
     schedule : {'geometric', 'harmonic'}
-        See `thermocomp.models.backprop.learning_rates`.
+        See `thermocomp.models.numerics.backprop.learning_rates`.
     update : {'pattern', 'batch'}
         Change the weights after every pattern, Chen's choice; or once an epoch, by the mean over all patterns (C-30).
     order : {'shuffled', 'fixed'}
-        Of the patterns, see `thermocomp.models.backprop.train_net`.
+        Of the patterns, see `thermocomp.models.numerics.backprop.train_net`.
     momentum : float
         Part of the previous change of the weights that is added to the next; Chen has none.
     scaling : {'channel', 'common'}
@@ -169,7 +169,7 @@ class SigmoidNet(NetRegressor):
             A setting is out of its range.
         """
         change, deviation = self._read(X, y)
-        folds, left_out = ridge.number_folds(cycle, len(change))
+        folds, left_out = number_folds(cycle, len(change))
         learned = folds >= 0
         change, deviation, folds = change[learned], deviation[learned], folds[learned]
         self.sweep_: tuple[HiddenCount, ...] = ()

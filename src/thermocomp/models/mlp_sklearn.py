@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from sklearn.exceptions import ConvergenceWarning
 
 from thermocomp.core.network import Activation, Affine, Perceptron
-from thermocomp.models.backprop import constant
 from thermocomp.models.nets import FloatArray, NetRegressor, thinned
+from thermocomp.models.numerics.backprop import constant
 
 _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
 

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.terms import Term, TermTable, Variable, second_order_terms
 from thermocomp.models import steplog
-from thermocomp.models.leastsquares import solve, triangle
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.stepwise import ENOUGH, AlphaThresholds, stepwise
+from thermocomp.models.numerics.leastsquares import solve, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH, AlphaThresholds, stepwise
 
 FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input, Provenance, Support
 from thermocomp.core.network import Affine, Network, Perceptron
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.leastsquares import effective_sample_size
+from thermocomp.models.numerics.leastsquares import effective_sample_size
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]

@@ -3,15 +3,15 @@
 from numpy.typing import ArrayLike
 
 from thermocomp.core.terms import Variable
-from thermocomp.models.leastsquares import solve, triangle
 from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.leastsquares import solve, triangle
 
 
 class LeastSquares(TermRegressor):
     """Linear least squares on all inputs: the method others are compared with (T-08).
 
     Inputs that depend on others get the coefficient 0 and are told in ``dependent_``; how this is decided says
-    `thermocomp.models.leastsquares.lstsq`.
+    `thermocomp.models.numerics.leastsquares.lstsq`.
 
     Parameters
     ----------

@@ -4,9 +4,9 @@ from numpy.typing import ArrayLike
 
 from thermocomp.core.terms import Variable
 from thermocomp.models import steplog
-from thermocomp.models.leastsquares import solve, triangle
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.stepwise import ENOUGH, FThresholds, alpha_of_f, r_squared_of_f, stepwise
+from thermocomp.models.numerics.leastsquares import solve, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH, FThresholds, alpha_of_f, r_squared_of_f, stepwise
 
 
 class PartialF(TermRegressor):

@@ -1,77 +1,55 @@
-"""Ridge regression from moments, and the thermal cycles it is chosen by."""
+"""`ridge`: ridge regression on all inputs."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from sklearn.linear_model import ridge_regression
 
-from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.models.dynamic import STRENGTHS
+from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 
-def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
-    """Give every row its fold: the thermal cycle that is left out together with it.
+class Ridge(ShrunkRegressor):
+    """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: what `dynamic` is without its memory.
+
+    scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving thermal cycles out.
 
     Parameters
     ----------
-    cycle : array-like of int of shape (n_rows,), or None
-        Cycle of each row; -1 for rows that are not learned from.
-    n_rows : int
+    strengths : sequence of float
+        To choose from, per row and in units of each input's variance.
+    rule : {'one-standard-error', 'minimum'}
+        How the strength is chosen.
+    fit_intercept : bool
+        False: the model gives zero in the reference state.
 
-    Returns
-    -------
-    folds : ndarray of int of shape (n_rows,)
-        0, 1, ... in the order of the cycles; one too short to judge a model on joins the one before. -1 stays.
-    description : str
-        What is left out, in words.
+    Attributes
+    ----------
+    strength_ : float
+        Chosen strength.
+    cv_rms_, chosen_by_ : float, str
+        See `thermocomp.models.shrinkage.ShrunkRegressor`.
     """
-    if cycle is None:
-        return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
-    given = np.asarray(cycle)
-    if given.shape != (n_rows,):
-        raise InputError(f"cycle: want {n_rows} numbers, found {given.shape}")
-    learned = np.flatnonzero(given >= 0)
-    if learned.size == 0:
-        raise FitError("no row to learn from: every row has cycle -1")
-    folds = np.full(n_rows, -1, dtype=np.intp)
-    number = -1
-    for label in dict.fromkeys(given[learned].tolist()):
-        rows = np.flatnonzero(given == label)
-        if number < 0 or rows.size >= 0.05 * learned.size:
-            number += 1
-        folds[rows] = number
-    if number == 0:  # a single cycle cannot be left out
-        folds[learned] = np.arange(learned.size) * min(5, learned.size) // learned.size
-        return folds, "five stretches of one thermal cycle, left out in turn"
-    return folds, f"{number + 1} thermal cycles, left out in turn"
 
+    def __init__(
+        self,
+        *,
+        strengths: Sequence[float] = STRENGTHS,
+        rule: Rule = "one-standard-error",
+        fit_intercept: bool = True,
+    ) -> None:
+        self.strengths = strengths
+        self.rule = rule
+        self.fit_intercept = fit_intercept
 
-def part(moments: FloatArray, columns: IntArray) -> FloatArray:
-    """Return the moments of some features, the constant and y."""
-    keep = np.append(columns, [len(moments) - 2, len(moments) - 1])
-    return np.asarray(moments[np.ix_(keep, keep)])
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        strengths = sorted_strengths(self.strengths)
+        copies = np.repeat(y[:, None], strengths.size, axis=1)
+        weights: FloatArray = ridge_regression(Z, copies, alpha=len(y) * strengths, solver="svd")
+        return weights.reshape(1, strengths.size, -1)
 
-
-def solve(moments: FloatArray, strengths: Sequence[float], fit_intercept: bool) -> tuple[FloatArray, FloatArray]:
-    """Solve ridge regressions from their moments.
-
-    Returns
-    -------
-    weights : ndarray of shape (n_features, n_strengths)
-    intercepts : ndarray of shape (n_strengths,)
-    """
-    n = moments[-2, -2]
-    gram, right = moments[:-2, :-2], moments[:-2, -1]
-    means, mean_y = moments[:-2, -2] / n, moments[-2, -1] / n
-    if fit_intercept:
-        gram = gram - n * np.outer(means, means)
-        right = right - n * means * mean_y
-    scale = np.sqrt(np.maximum(np.diag(gram), 0.0) / n)
-    scale[scale <= 1e-12 * max(scale.max(initial=0.0), np.finfo(np.float64).tiny)] = np.inf  # constant columns
-    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
-    damped = np.maximum(values, 0.0)[:, None] + n * np.asarray(strengths)
-    weights = (vectors @ ((vectors.T @ (right / scale))[:, None] / damped)) / scale[:, None]
-    intercepts = mean_y - means @ weights if fit_intercept else np.zeros(len(strengths))
-    return weights, intercepts
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
+        self.strength_ = float(sorted_strengths(self.strengths)[setting])

@@ -9,9 +9,9 @@ from scipy import linalg
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
-from thermocomp.models import ridge
-from thermocomp.models.leastsquares import Solution
 from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.numerics.leastsquares import Solution
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -47,7 +47,7 @@ def learned_rows(X: FloatArray, y: FloatArray, cycle: ArrayLike | None) -> tuple
     FitError
         Fewer than two such rows.
     """
-    folds, description = ridge.number_folds(cycle, len(X))
+    folds, description = number_folds(cycle, len(X))
     learned = folds >= 0
     if learned.sum() < 2:
         raise FitError("a single row to learn from: at least 2 are needed")

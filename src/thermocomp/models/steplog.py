@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import Protocol
 
-from thermocomp.models.stepwise import Step
+from thermocomp.models.numerics.stepwise import Step
 
 
 class Stepped(Protocol):

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
-from thermocomp.models import ridge
-from thermocomp.models.leastsquares import solve, table, triangle
 from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.numerics.leastsquares import solve, table, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.subsets import Subsets, best_subsets
-from thermocomp.models.stepwise import ENOUGH
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -160,7 +160,7 @@ class BestSubset(TermRegressor):
                 f"criterion {criterion!r}, size {self.size}: want mse, adjr2, cp, bic or cycles, and a size from 1 on"
             )
         change, deviation, both = self._read(X, y)
-        folds, left_out = ridge.number_folds(cycle, len(change))
+        folds, left_out = number_folds(cycle, len(change))
         if (folds < 0).any():
             learned = folds >= 0
             change, deviation, folds = change[learned], deviation[learned], folds[learned]

@@ -132,14 +132,14 @@ def add(  # noqa: PLR0912, PLR0915
                 g = row[k]
                 det = here * diagonal[k] - g * g
                 both = y * y * diagonal[k] - 2 * y * others[k] * g + others[k] * others[k] * here
-                hits += (both > least_gain * det) | (det < LEFT * (here + diagonal[k]))
+                hits += (both > least_gain * det) | (det <= LEFT * (abs(here) + abs(diagonal[k])))
             if hits == 0:
                 continue
             for k in range(c + 1, p):
                 g = row[k]
                 det = here * diagonal[k] - g * g
                 both = y * y * diagonal[k] - 2 * y * others[k] * g + others[k] * others[k] * here
-                if both > (before - limit[size] - doubt) * det or det < LEFT * (here + diagonal[k]):
+                if both > (before - limit[size] - doubt) * det or det <= LEFT * (abs(here) + abs(diagonal[k])):
                     chosen[n] = k
                     try_exactly(columns, least, lists, inside, chosen, size)
     numbers[0, 0] = d

@@ -1,8 +1,8 @@
 """Exhaustive searches by the residual mean square: all subsets, and all combinations of one member of each group.
 
 Hwang, sections 2.3 and 2.4 (H-05 to H-07). Columns are told by their indices. All is done on the small triangular
-factor (`thermocomp.models.leastsquares.triangle`), never on a Gram matrix: sensors that nearly repeat each other are
-what the method is about.
+factor (`thermocomp.models.numerics.leastsquares.triangle`), never on a Gram matrix: sensors that nearly repeat each
+other are what the method is about.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError
-from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.numerics.leastsquares import Triangle
 from thermocomp.models.selection.collinearity import Spectrum, correlation, spectrum
 from thermocomp.models.selection.exhaustive import LIMIT, SAME, Search, search_members, search_subsets
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from thermocomp.core.autoregressive import slowest
-from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 

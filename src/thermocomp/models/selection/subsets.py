@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.leastsquares import Triangle, solve, table, triangle
+from thermocomp.models.numerics.leastsquares import Triangle, solve, table, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.subsetsearch import Problem, Route, Stop, run
-from thermocomp.models.stepwise import ENOUGH
 
 FloatArray = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.linalg import lapack
 
-from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.autoregressive import companion, slowest
-from thermocomp.models import ticks
-from thermocomp.models.ticks import Run
+from thermocomp.models.numerics import ticks
+from thermocomp.models.numerics.ticks import Run
 
 FloatArray = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Stepwise regression: one engine on a triangular factor, two rules.
 
-The data are factorised once (`thermocomp.models.leastsquares.triangle`); after that every step works on the small
-triangle. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates are always
+The data are factorised once (`thermocomp.models.numerics.leastsquares.triangle`); after that every step works on the
+small triangle. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates are always
 orthogonal to the model by construction, however many steps are taken.
 """
 
@@ -16,7 +16,7 @@ from scipy.linalg import blas, lapack
 from scipy.special import fdtrc, stdtrit
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.models.leastsquares import Triangle
+from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
 
