@@ -105,12 +105,12 @@ def test_the_budget_is_within_its_limit(choices: dict[str, tuple[Choice, ...]]) 
         assert str(errors.rows[errors.marked][-1]).split() == list(choice.sensors)
 
 
-def test_progress_is_told_piece_by_piece(crowd: Samples) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_progress_is_told_piece_by_piece(crowd: Samples, method: str) -> None:
     protocol = splits.leave_one_cycle_out(crowd)
-    for method in ("grouping", "ace", "pareto"):
-        heard: list[str] = []
-        selecting.select(method, crowd, protocol, SETTINGS, progress=heard.append)
-        assert len(heard) == selecting.n_pieces(method, crowd, protocol, SETTINGS)
+    heard: list[str] = []
+    selecting.select(method, crowd, protocol, SETTINGS, progress=lambda text, steps=1: heard.extend([text] * steps))
+    assert len(heard) == selecting.n_pieces(method, crowd, protocol, SETTINGS)
 
 
 def test_nothing_to_choose_from_is_an_error() -> None:

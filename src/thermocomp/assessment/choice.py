@@ -2,10 +2,17 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, Protocol
 
 Cell = str | float | int | None
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
+
+
+class Progress(Protocol):
+    """Is told what has been done."""
+
+    def __call__(self, text: str, /, steps: int = 1) -> None:
+        """Take a line of text, and how many pieces of work are done with it."""
 
 
 @dataclass(frozen=True, kw_only=True)

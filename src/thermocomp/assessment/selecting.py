@@ -1,6 +1,7 @@
 """Selection of sensors by each method, brought to one form: the sensors, why, and the tables behind it."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import pareto
 from thermocomp.assessment.candidates import Candidates
-from thermocomp.assessment.choice import Choice, Settings, Table
+from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.splits import Protocol
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
@@ -30,8 +31,6 @@ HALF_WINDOW = 10
 
 #: Psi from which on more sensors are not worth having (W-12)
 ENOUGH_PSI = 0.99
-
-Progress = Callable[[str], None]
 
 
 def n_pieces(method: str, samples: Samples, protocol: Protocol, settings: Settings) -> int:
@@ -62,7 +61,7 @@ def select(
     settings: Settings,
     *,
     jobs: int = 1,
-    progress: Progress = lambda _: None,
+    progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> tuple[Choice, ...]:
     """Choose sensors for every target.
 
@@ -77,7 +76,8 @@ def select(
     jobs : int
         Processes (or threads) to share the work among; -1 takes all cores.
     progress : callable
-        Called with a line of text after each piece of work; there are `n_pieces` of them.
+        Called with a line of text after each piece of work, of which there are `n_pieces`; and with ``steps=0`` about
+        once a second during a long search.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def select(
         return (_by_maximal_correlation(samples, settings, jobs=jobs, progress=progress),)
     choosers: dict[str, Callable[[Candidates], Choice]] = {
         "grouping": lambda c: _by_grouping(c, settings),
-        "subsets": lambda c: _by_subsets(c, settings, jobs=jobs),
+        "subsets": lambda c: _by_subsets(c, settings, jobs=jobs, progress=progress),
         "partial-f": lambda c: _by_steps(c, "partial-f"),
         "stepwise": lambda c: _by_steps(c, "stepwise"),
     }
@@ -195,10 +195,12 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
     )
 
 
-def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int) -> Choice:
+def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
     """Choose the exact best subset of every size (H-05), and a size."""
     most = min(settings.most("subsets"), len(candidates.names))
-    found = BestSubset(criterion=settings.criterion, max_size=most, jobs=effective_n_jobs(jobs))
+    found = BestSubset(
+        criterion=settings.criterion, max_size=most, jobs=effective_n_jobs(jobs), progress=partial(progress, steps=0)
+    )
     found.fit(candidates.X, candidates.y, cycle=candidates.cycle)
     headings = {"mse": "MSE_p [um^2]", "adjr2": "adjusted R2", "cp": "Cp", "bic": "BIC", "cycles": "RMS left out [um]"}
     shown = [k for k in headings if k in found.scores_]

@@ -4,7 +4,7 @@ What needs the training wing is imported inside the commands, so that ``thermoco
 without it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from thermocomp.assessment.choice import Progress as Told
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Flag,
@@ -369,8 +370,12 @@ def compare(
 
 
 @contextmanager
-def _progress(total: int, hidden: bool) -> Iterator[Callable[[str], None]]:
+def _progress(total: int, hidden: bool) -> Iterator[Told]:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
         task = bar.add_task("working", total=total)
-        yield lambda text: bar.update(task, description=text, advance=1)
+
+        def tell(text: str, /, steps: int = 1) -> None:
+            bar.update(task, description=text, advance=steps)
+
+        yield tell
