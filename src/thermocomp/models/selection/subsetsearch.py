@@ -89,7 +89,20 @@ class Problem:
 
 
 class Search(ABC):
-    """One thread's part of a search: what it works on, and the best sets it found."""
+    """One thread's part of a search: what it works on, and the best sets it found.
+
+    Parameters
+    ----------
+    problem : Problem
+    sizes : int
+        Largest size searched.
+    n_best : int
+        Sets wanted of each size.
+    limit : ndarray of shape (p + 1,)
+        Sum of squares from which on a set is of no interest, per size; shared by all threads and falling.
+    bound : ndarray of shape (p + 1,)
+        The same for whole branches.
+    """
 
     chunk = 200_000  # sets between two looks at the clock: well below 0.1 s
 
@@ -260,7 +273,15 @@ def _promising(problem: Problem, sizes: int) -> list[int]:
 
 
 class Result:
-    """A search that has ended, one way or the other."""
+    """A search that has ended, one way or the other.
+
+    Parameters
+    ----------
+    problem : Problem
+    limit : ndarray of shape (p + 1,)
+        See `Search`.
+    n_best : int
+    """
 
     def __init__(self, problem: Problem, limit: FloatArray, n_best: int) -> None:
         self.problem, self.limit, self.n_best = problem, limit, n_best
@@ -312,7 +333,25 @@ def run(
     seconds: float | None,
     progress: Callable[[str], None] | None,
 ) -> Result:
-    """Search; the parameters are those of `best_subsets`."""
+    """Search.
+
+    Parameters
+    ----------
+    problem : Problem
+    route : {'dropping', 'adding'}
+    sizes, n_best, jobs : int
+        Largest size, sets wanted of each, threads.
+    nodes : int or None
+        Stop after about so many sets.
+    seconds : float or None
+        Stop after about so long [s].
+    progress : callable or None
+        Called about once a second with a line of text.
+
+    Returns
+    -------
+    Result
+    """
     p = problem.triangle.shape[1] - 1
     limit = np.full(p + 1, -np.inf)
     limit[1 : sizes + 1] = np.inf
