@@ -15,7 +15,7 @@ from thermocomp.assessment.compare import Comparison, compare
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.report import html
-from thermocomp.report.summary import summarise, verdict
+from thermocomp.report.summary import cautions, summarise, verdict
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +35,13 @@ def test_verdict_is_one_true_sentence(comparison: Comparison) -> None:
     for target in ("z_um", "x_um"):
         best = comparison.best(target)
         assert best is None or best.model in text
+
+
+def test_the_best_of_many_is_suspected_of_luck(comparison: Comparison) -> None:
+    assert not any("luck" in c for c in cautions(comparison))
+    many = [replace(a, model=f"{a.model}{k}") for k in range(3) for a in comparison.assessments]
+    assert "9 methods were judged on the same cycles" in cautions(replace(comparison, assessments=tuple(many)))[0]
+    assert cautions(replace(comparison, left=2))[0].startswith("the work was stopped: 2 pairs")
 
 
 def test_no_model_no_recommendation(samples: Samples) -> None:

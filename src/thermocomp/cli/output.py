@@ -18,6 +18,7 @@ from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
+from thermocomp.report.summary import cautions
 
 _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
@@ -33,6 +34,7 @@ def show_comparison(
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
             "not_judged": comparison.left,
+            "cautions": cautions(comparison),
             "results": [_result(a) for a in comparison.assessments],
         }
         _print_json(content, console)
@@ -52,6 +54,8 @@ def show_comparison(
                 f"[bold green]{escape(target)}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
                 f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less)"
             )
+    for caution in cautions(comparison):
+        console.print(f"[yellow]but[/] {escape(caution)}")
     if comparison.left:
         console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
     if report is not None:

@@ -11,6 +11,8 @@ from thermocomp.models.methods import METHODS
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 
+#: methods beyond which the best is suspected of luck
+MANY = 6
 #: metrics of the big table, in its order
 TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
@@ -73,6 +75,11 @@ def cautions(comparison: Comparison) -> list[str]:
     found = []
     if comparison.left:
         found.append(f"the work was stopped: {comparison.left} pairs of method and target were not judged.")
+    if len(_models(comparison)) > MANY:
+        found.append(
+            f"{len(_models(comparison))} methods were judged on the same cycles, so the best of them is partly luck: "
+            "judge it on another recording."
+        )
     harmful = [f"{a.target} ({r.worst_lost[0]})" for a, r in known if r.worst_lost[1] >= a.none_metric("rms")]
     if harmful:
         found.append(f"a sensor that is cut off unnoticed makes it worse than none for {_list(harmful)}.")
