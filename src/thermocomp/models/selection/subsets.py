@@ -123,11 +123,13 @@ def best_subsets(
     and in the factorisation: for each column what rounding leaves of it (`Triangle.noise`) times its coefficient in the
     full model and the most by which this can differ in a set as good as the best. All sets within the margin are kept
     and refitted by a fresh QR of the original data, in extended precision where that matters; that decides. A set is
-    proven if the search came to its end, no set within the margin was lost, and no other has the same sum.
+    proven if the search came to its end, no set within the margin was lost, and one unit in the last place of every
+    number cannot make another as good.
 
-    Constant columns are left out, and so are copies of a column before (up to a factor and a shift): no set gets worse
-    by that. Where the others still depend on each other, as they do if there are more than rows, only *adding* is
-    possible, sets whose columns depend are no sets of their size, and `max_size` must be given unless there are few.
+    Constant columns are left out, and so are columns that are a copy of one before (up to a factor and a shift) as far
+    as rounding lets see. Unless such a copy is equal to the last bit, nothing is proven: it might have been better.
+    Where the others still depend on each other, as they do if there are more than rows, only *adding* is possible, sets
+    whose columns depend are no sets of their size, and `max_size` must be given unless there are few.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def best_subsets(
     if n_best < 1 or jobs < 1 or (max_size is not None and max_size < 1):
         raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: want at least 1")
     tri = triangle(table(X, y), intercept=intercept)
-    kept = _distinct(tri)
+    kept, same = _distinct(X, tri)
     if not kept:
         raise FitError("best subsets: every column is constant; there is nothing to select from")
     problem = Problem.of(tri, kept)
@@ -185,9 +187,12 @@ def best_subsets(
             where = tuple(sorted(kept[i] for i in columns))
             some = X[:, where]
             fresh = triangle(table(some, y), intercept=intercept)
-            fitted.append((solve(some, y, fresh, enough=ENOUGH).rss, where))
-        others = search.safe(size) if len(fitted) < math.comb(p, size) else (math.inf, True)
-        ranked.append(_certified(sorted(fitted), n_best, *others, problem.y_noise))
+            found = solve(some, y, fresh, enough=ENOUGH)
+            # what one unit in the last place of every number can do to the residual
+            blur = float(fresh.last_place[:-1] @ np.abs(found.coefficients)) + problem.y_noise
+            fitted.append((found.rss, where, blur))
+        beyond, complete = search.safe(size) if len(fitted) < math.comb(p, size) else (math.inf, True)
+        ranked.append(_certified(sorted(fitted), n_best, beyond, complete and same))
     return Subsets(
         ranked=tuple(ranked),
         n_columns=X.shape[1],
@@ -205,28 +210,42 @@ def best_subsets(
 
 
 def _certified(
-    fitted: Sequence[tuple[float, tuple[int, ...]]], n_best: int, beyond: float, complete: bool, y_noise: float
+    fitted: Sequence[tuple[float, tuple[int, ...], float]], n_best: int, beyond: float, complete: bool
 ) -> tuple[Subset, ...]:
-    """Rank the refitted sets; the others have a sum of at least `beyond`, which is firm if the list is `complete`."""
+    """Rank the refitted sets; the others have a sum of at least `beyond`, which is firm if the list is `complete`.
+
+    The data are known to their last place only, so sums that this can move past each other are not told apart.
+    """
     found = []
-    for i, (rss, columns) in enumerate(fitted[:n_best]):
+    for i, (rss, columns, blur) in enumerate(fitted[:n_best]):
+        apart = beyond - rss > _SAME * rss + _moved(rss, blur)
+        for other, _, theirs in fitted[i + 1 :]:
+            apart = apart and other - rss > _SAME * rss + _moved(rss, blur) + _moved(other, theirs)
         others = min(beyond, fitted[i + 1][0]) if i + 1 < len(fitted) else beyond
-        apart = others - rss > _SAME * rss + 2 * y_noise * math.sqrt(rss) + y_noise**2
-        found.append(Subset(columns, rss, bool(complete and apart), float(min(rss, others))))
+        proven = bool(complete and apart)
+        bound = rss if proven else max(min(rss, others) - _moved(rss, blur), 0.0)
+        found.append(Subset(columns, rss, proven, float(bound)))
     # a later rank is only known if the ones before are
     return tuple(replace(s, proven=all(t.proven for t in found[: i + 1])) for i, s in enumerate(found))
 
 
-def _distinct(tri: Triangle) -> list[int]:
-    """Return the columns that are neither constant nor a copy of one before."""
+def _moved(rss: float, blur: float) -> float:
+    """Return the most by which a change of the residual of norm `blur` moves a residual sum of squares."""
+    return 2 * blur * math.sqrt(rss) + blur**2
+
+
+def _distinct(X: FloatArray, tri: Triangle) -> tuple[list[int], bool]:
+    """Return the columns that are neither constant nor a copy of one before, and whether all copies are exact."""
     norms, noise = tri.norms[:-1], tri.noise[:-1]
     alive = np.flatnonzero(norms > noise)
     unit = tri.factor[:, alive] / norms[alive]
     share = noise[alive] / norms[alive]
     near = np.abs(np.triu(unit.T @ unit, 1)) > 1 - 1e-9
     copies = set()
+    same = True
     for i, j in zip(*np.nonzero(near), strict=True):
         other = np.copysign(1.0, unit[:, i] @ unit[:, j]) * unit[:, i]
         if i not in copies and np.linalg.norm(unit[:, j] - other) <= share[i] + share[j]:
             copies.add(j)
-    return [int(k) for i, k in enumerate(alive) if i not in copies]
+            same = same and np.array_equal(X[:, alive[i]], X[:, alive[j]])
+    return [int(k) for i, k in enumerate(alive) if i not in copies], same
