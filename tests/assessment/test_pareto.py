@@ -10,7 +10,7 @@ from smallmachine import crowded_machine, small_machine
 from thermocomp.assessment import pareto, splits
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.metrics import rms
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.recording.samples import Samples, stack
 
 
@@ -26,9 +26,9 @@ def found(crowd: Samples) -> pareto.Budget:
 
 def test_shapes_and_sizes(found: pareto.Budget) -> None:
     assert found.models == ("ols", "dynamic")
-    assert [len(s) for s in found.sensors] == [1, 2, 3, 4]
-    assert found.rms.shape == (2, 4, 4)
-    assert found.frequency.sum(axis=1) == pytest.approx([1, 2, 3, 4])
+    assert found.sizes == (1, 2, 3, 4, 6)  # the last is all there are
+    assert found.rms.shape == (2, 5, 4)
+    assert found.frequency.sum(axis=1) == pytest.approx([1, 2, 3, 4, 6])
     assert found.condition[0] == 1
     assert np.isfinite(found.rms).all()
 
@@ -53,7 +53,7 @@ def test_the_unseen_block_has_no_part_in_the_choice(crowd: Samples, found: paret
     after = pareto.budget(replace(crowd, deviations=spoiled), 0, only, ["ols"], max_sensors=3)
     assert np.array_equal(before.frequency, after.frequency)
     assert (after.rms > 1e4).all()
-    assert before.rms[0, :, 0] == pytest.approx(found.rms[0, :3, 2])
+    assert before.rms[0, :3, 0] == pytest.approx(found.rms[0, :3, 2])
 
 
 def test_enough_is_the_smallest_within_one_standard_error() -> None:
@@ -72,7 +72,25 @@ def test_enough_is_the_smallest_within_one_standard_error() -> None:
     )
     assert budget.enough("ols") == 2  # best is 3 with mean 4.5 and standard error 1
     assert budget.pooled()[0, 0] == pytest.approx(np.sqrt((10 * 81 + 30 * 121) / 40))
+    assert budget.recommended() == ("ols", 1)
     assert replace(budget, rms=np.full((1, 4, 2), np.nan)).enough("ols") is None
+    two = replace(budget, models=("ols", "dynamic"), rms=np.concatenate([errors, errors - 5]))
+    assert two.recommended() == ("dynamic", 1)
+    one = np.concatenate([errors, errors])
+    one[1, 0] = errors[0, 2]  # dynamic is as good with one sensor
+    assert replace(two, rms=one).recommended() == ("dynamic", 0)
+
+
+def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:
+    protocol = splits.leave_one_cycle_out(crowd)
+    gone = crowd.deviations.copy()
+    gone[protocol.splits[1].judge, 0] = np.nan
+    found = pareto.budget(replace(crowd, deviations=gone), 0, protocol, ["ols"], max_sensors=2)
+    assert len(found.blocks) == len(protocol.splits) - 1
+    assert np.isfinite(found.rms).all()
+    gone[:, 0] = np.nan
+    with pytest.raises(FitError, match="x_um has no number in any of the blocks"):
+        pareto.budget(replace(crowd, deviations=gone), 0, protocol, ["ols"], max_sensors=2)
 
 
 def test_sensors_that_repeat_are_told_by_the_condition(found: pareto.Budget) -> None:

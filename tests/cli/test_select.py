@@ -1,12 +1,21 @@
 """`thermocomp select`: tables for people, JSON for programs, a page, and clear refusals."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from smallmachine import crowded_machine
 from thermocomp.cli.app import run
+from thermocomp.core.machine import Channel
 from thermocomp.files import recordings
 
 
@@ -55,3 +64,73 @@ def test_refusals(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ):
         assert run([*line, *extra]) == 2, extra
         assert told in " ".join(capsys.readouterr().err.split()), extra
+
+
+def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
+    """One interrupt is enough, and what was found is not thrown away."""
+    rng = np.random.default_rng(0)
+    plain = crowded_machine()
+    more = {f"t{k}_C": 20 + np.cumsum(0.05 * rng.normal(size=len(plain))) for k in range(10, 130)}
+    table = pd.concat([plain.table, pd.DataFrame(more, index=plain.table.index)], axis=1)
+    channels = (*plain.channels, *(Channel(n, "temperature", "degC") for n in more))
+    path = tmp_path / "wide.csv"
+    recordings.write(replace(plain, table=table, channels=channels), path)
+    line = [
+        sys.executable,
+        "-m",
+        "thermocomp.cli.app",
+        "select",
+        str(path),
+        "--target",
+        "x_um",
+        "--seconds",
+        "300",
+        "--max-sensors",
+        "16",
+    ]
+    for method, code, told in (("subsets", 0, "interrupted"), ("pareto", 130, "stopped")):
+        running = subprocess.Popen(
+            [*line, "--method", method],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "COLUMNS": "120"},
+        )
+        time.sleep(8)
+        assert running.poll() is None, running.communicate()
+        os.killpg(running.pid, signal.SIGINT)
+        said, errors = running.communicate(timeout=60)
+        assert running.returncode == code, errors
+        assert told in said + errors
+        assert "Traceback" not in errors
+
+
+def test_one_thermal_cycle_is_enough_for_most(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = crowded_machine()
+    part = replace(plain, table=plain.table.iloc[:200], time=plain.time[:200], cycles=plain.cycles[:1])
+    path = tmp_path / "one.csv"
+    recordings.write(part, path)
+    for method in ("grouping", "partial-f", "stepwise", "subsets", "ace"):
+        assert run(["select", str(path), "--target", "x_um", "--method", method, "--jobs", "1"]) == 0, method
+    capsys.readouterr()
+    assert run(["select", str(path), "--target", "x_um", "--jobs", "1"]) == 2
+    assert "only one thermal cycle" in capsys.readouterr().err
+
+
+def test_no_number_is_cut_off_on_a_narrow_terminal(
+    drift: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    for method in ("subsets", "grouping", "pareto"):
+        assert run(["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1"]) == 0
+        assert "…" not in capsys.readouterr().out
+
+
+def test_a_target_that_does_not_move(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = crowded_machine()
+    path = tmp_path / "still.csv"
+    recordings.write(replace(plain, table=plain.table.assign(x_um=0.0)), path)
+    for method in ("pareto", "subsets", "grouping"):
+        assert run(["select", str(path), "--target", "x_um", "--method", method, "--jobs", "1"]) == 2
+        assert "x_um does not move" in capsys.readouterr().err

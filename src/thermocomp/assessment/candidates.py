@@ -44,7 +44,11 @@ class Candidates:
         rows = samples.valid & np.isfinite(samples.deviations[:, target])
         if rows.sum() < 3:
             raise FitError(f"{name}: {int(rows.sum())} complete rows to choose sensors by; at least 3 are needed")
+        if np.ptp(samples.deviations[rows, target]) == 0:
+            raise FitError(f"{name} does not move: there is nothing to choose sensors by")
         X = samples.frame().iloc[rows, temperatures].reset_index(drop=True)
+        if not (np.ptp(X.to_numpy(), axis=0) > 0).any():
+            raise FitError(f"{name}: no temperature changes: there is nothing to choose from")
         return cls(name, X, samples.deviations[rows, target], samples.cycle[rows])
 
     @property

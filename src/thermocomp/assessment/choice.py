@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from thermocomp.core.exceptions import InputError
+
 Cell = str | float | int | None
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
 
@@ -29,6 +31,8 @@ class Settings:
         grouping: temperature that is subtracted from the others.
     max_sensors : int
         subsets, ace, pareto: most sensors; 10 if not given, 3 for ace.
+    seconds : float
+        subsets, pareto: stop a search for the best sets after about so long [s]; what is not proven then, is told.
     criterion : str
         subsets: what the number of sensors is chosen by.
     models : list of str
@@ -43,13 +47,22 @@ class Settings:
     unsigned: bool = False
     reference: str | None = None
     max_sensors: int | None = None
+    seconds: float = 60.0
     criterion: Criterion = "cycles"
     models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
     level: float = 0.05
     holm: bool = False
 
     def most(self, method: str) -> int:
-        """Return the most sensors a method may choose."""
+        """Return the most sensors a method may choose.
+
+        Raises
+        ------
+        InputError
+            It is below 1.
+        """
+        if self.max_sensors is not None and self.max_sensors < 1:
+            raise InputError(f"--max-sensors {self.max_sensors}: want at least 1")
         return self.max_sensors if self.max_sensors is not None else 3 if method == "ace" else 10
 
 

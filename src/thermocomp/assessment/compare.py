@@ -14,7 +14,7 @@ from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Protocol, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
-from thermocomp.models.methods import expand
+from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
@@ -41,7 +41,7 @@ class Assessment:
     verdict : Verdict
         Of the do-no-harm gate.
     sensors : tuple of str
-        Inputs with an influence.
+        Inputs with an influence; those of all models, if several were trained.
     fit_s : float
         The fits took [s].
     n_effective : float
@@ -55,6 +55,8 @@ class Assessment:
         Why this is no honest test, whatever the figures say; empty if it is one.
     overall : bool
         It is the last word on this model and target: all that was judged, not one cycle of it.
+    n_sensors : tuple of (int, int)
+        Fewest and most inputs with an influence in one model.
     """
 
     model: str
@@ -74,6 +76,7 @@ class Assessment:
     failure: str = ""
     caveat: str = ""
     overall: bool = False
+    n_sensors: tuple[int, int] = (0, 0)
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
@@ -123,8 +126,8 @@ class Comparison:
         return tuple(a for a in self.assessments if a.overall)
 
     def best(self, target: str) -> Assessment | None:
-        """Return the accepted assessment with the smallest RMS for a target."""
-        fit = [a for a in self.overall() if a.target == target and a.accepted]
+        """Return the accepted assessment with the smallest RMS for a target, of the methods that can be deployed."""
+        fit = [a for a in self.overall() if a.target == target and a.accepted and deployable(a.model)]
         return min(fit, key=lambda a: a.metric("rms"), default=None)
 
 
@@ -234,6 +237,7 @@ def judge(
         cycle=samples.cycle[rows],
         verdict=harm.judge(measured, predicted, list(_segments(samples, rows))),
         sensors=model.sensors,
+        n_sensors=(len(model.sensors), len(model.sensors)),
         fit_s=fit_s,
         n_effective=effective_sample_size(measured - predicted),
         robustness=stressed.robustness if stressed else None,
@@ -319,6 +323,7 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         cycle=np.concatenate([a.cycle for a in parts]),
         verdict=harm.Verdict(tuple(c for a in parts for c in a.verdict.cycles), first.verdict.level),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
+        n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),
         fit_s=sum(a.fit_s for a in parts),
         n_effective=sum(a.n_effective for a in parts),
         robustness=pooled([(a.robustness, len(a.measured)) for a in parts]),

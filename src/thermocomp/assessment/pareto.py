@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import NDArray
 
 from thermocomp.assessment.candidates import Candidates
-from thermocomp.assessment.choice import Choice, Settings, Table
+from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.metrics import rms
 from thermocomp.assessment.replay import replay
@@ -33,7 +34,7 @@ class Budget:
     candidates : tuple of str
         The temperatures there are.
     sensors : tuple of tuple of str
-        For 1, 2, ... sensors: the best subset in all rows.
+        For 1, 2, ... sensors: the best subset in all rows; at the end all temperatures.
     models : tuple of str
     blocks : tuple of str
         Unseen blocks.
@@ -47,6 +48,8 @@ class Budget:
         Share of the blocks without which a sensor is among the best.
     condition : ndarray of shape (n_sizes,)
         Condition number of the correlation matrix of `sensors`.
+    proven : bool
+        Every set is the best of its size for sure.
     """
 
     target: str
@@ -59,6 +62,7 @@ class Budget:
     none: FloatArray
     frequency: FloatArray
     condition: FloatArray
+    proven: bool = True
 
     def pooled(self) -> FloatArray:
         """Return the RMS over all unseen blocks together, (n_models, n_sizes) [um]."""
@@ -68,19 +72,35 @@ class Budget:
         """Return the RMS over all unseen blocks without compensation [um]."""
         return float(np.sqrt((self.none**2 * self.rows).sum() / self.rows.sum()))
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Numbers of sensors."""
+        return tuple(len(s) for s in self.sensors)
+
     def enough(self, model: str) -> int | None:
         """Return the smallest number of sensors that is not clearly worse than the best number.
 
         Not clearly worse: its mean RMS over the blocks is within one standard error of the smallest, as in the choice
         of the strength of `DynamicRidge`. None if the model could not be fitted in one of the blocks.
         """
-        errors = self.rms[self.models.index(model)]
-        if not np.isfinite(errors).all():
+        found = self._fewest([self.models.index(model)])
+        return None if found is None else self.sizes[found[1]]
+
+    def recommended(self) -> tuple[str, int] | None:
+        """Return the model, and the place in `sensors`, with the fewest sensors that are enough among all models."""
+        found = self._fewest(range(len(self.models)))
+        return None if found is None else (self.models[found[0]], found[1])
+
+    def _fewest(self, models: Sequence[int]) -> tuple[int, int] | None:
+        fitted = [m for m in models if np.isfinite(self.rms[m]).all()]
+        if not fitted:
             return None
-        mean = errors.mean(axis=1)
-        best = errors[int(np.argmin(mean))]
+        mean = self.rms[fitted].mean(axis=2)
+        best = self.rms[fitted].reshape(-1, len(self.blocks))[int(np.argmin(mean))]
         margin = best.std(ddof=1) / np.sqrt(len(best)) if len(best) > 1 else 0.0
-        return int(np.flatnonzero(mean <= best.mean() + margin)[0]) + 1
+        near = [(self.sizes[k], mean[m, k], m, k) for m, k in np.argwhere(mean <= best.mean() + margin).tolist()]
+        _, _, m, k = min(near)
+        return fitted[m], k
 
 
 def budget(
@@ -90,13 +110,15 @@ def budget(
     models: Sequence[str],
     *,
     max_sensors: int = 10,
+    seconds: float | None = None,
     jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> Budget:
     """Judge the best subset of each size on unseen blocks.
 
-    In each split the sensors are the exact best subset (least squares) of the rows that may be learned from; every
-    model is then trained on these sensors, and on the spindle speed if it has a use for it.
+    In each split the sensors are the best subset (least squares) of the rows that may be learned from; every model is
+    then trained on these sensors, and on the spindle speed if it has a use for it. A block without a number of the
+    target is left out.
 
     Parameters
     ----------
@@ -107,6 +129,8 @@ def budget(
     models : sequence of str
         Methods that are trained on the chosen sensors.
     max_sensors : int
+    seconds : float, optional
+        Stop each search for the best subsets after about so long [s].
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -120,18 +144,28 @@ def budget(
     ------
     InputError
         `max_sensors` is below 1, or there is no temperature.
+    FitError
+        There is no block with a number of the target.
     """
     names = expand(models)
     temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
     if max_sensors < 1 or not temperatures:
         raise InputError(f"a sensor budget of {max_sensors} among {len(temperatures)} temperatures: want at least 1")
-    learned = [split.learn for split in protocol.splits]
+    deviation = samples.deviations[:, target]
+    splits = [split for split in protocol.splits if np.isfinite(deviation[split.judge]).any()]
+    if not splits:
+        raise FitError(f"{samples.targets[target].name} has no number in any of the blocks to judge by")
     everything = np.ones(len(samples), dtype=np.bool_)
-    chosen = [_best(samples, target, learn, temperatures, max_sensors) for learn in [everything, *learned]]
-    n_sizes = min(len(c) for c in chosen)
+    searched = partial(
+        _best, samples, target, temperatures, max_sensors, seconds, effective_n_jobs(jobs), partial(progress, steps=0)
+    )
+    results = [searched(learn) for learn in [everything, *(split.learn for split in splits)]]
+    n_sizes = min(len(sets) for sets, _ in results)
+    # the last of each is all temperatures
+    chosen = [[*sets[: n_sizes - 1], sets[-1]] for sets, _ in results]
     work = (
         delayed(_unseen_rms)(samples, target, split, sensors[size], name)
-        for split, sensors in zip(protocol.splits, chosen[1:], strict=True)
+        for split, sensors in zip(splits, chosen[1:], strict=True)
         for name in names
         for size in range(n_sizes)
     )
@@ -139,17 +173,16 @@ def budget(
     for value in Parallel(n_jobs=jobs, return_as="generator")(work):
         progress(f"{samples.targets[target].name}: judged")
         found.append(value)
-    deviation = samples.deviations[:, target]
-    judged = [split.judge & np.isfinite(deviation) for split in protocol.splits]
+    judged = [split.judge & np.isfinite(deviation) for split in splits]
     values = samples.change()[samples.valid]
     columns = [c.name for c in samples.inputs]
     return Budget(
         target=samples.targets[target].name,
         candidates=tuple(temperatures),
-        sensors=tuple(chosen[0][:n_sizes]),
+        sensors=tuple(chosen[0]),
         models=tuple(names),
-        blocks=tuple(split.block for split in protocol.splits),
-        rms=np.moveaxis(np.reshape(found, (len(protocol.splits), len(names), n_sizes)), 0, 2),
+        blocks=tuple(split.block for split in splits),
+        rms=np.moveaxis(np.reshape(found, (len(splits), len(names), n_sizes)), 0, 2),
         rows=np.array([rows.sum() for rows in judged]),
         none=np.array([rms(deviation[rows], np.zeros(rows.sum())) for rows in judged]),
         frequency=np.array(
@@ -161,14 +194,15 @@ def budget(
         condition=np.array(
             [
                 collinearity(values[:, [columns.index(s) for s in sensors]], sensors).condition_number
-                for sensors in chosen[0][:n_sizes]
+                for sensors in chosen[0]
             ]
         ),
+        proven=all(proven for _, proven in results),
     )
 
 
 def choose(
-    samples: Samples, target: int, protocol: Protocol, settings: Settings, *, jobs: int, progress: Callable[[str], None]
+    samples: Samples, target: int, protocol: Protocol, settings: Settings, *, jobs: int, progress: Progress
 ) -> Choice:
     """Choose by the error on unseen blocks against the number of sensors.
 
@@ -200,52 +234,60 @@ def choose(
         protocol,
         settings.models,
         max_sensors=settings.most("pareto"),
+        seconds=settings.seconds,
         jobs=jobs,
         progress=progress,
     )
     pooled = found.pooled()
-    enough = {m: found.enough(m) for m in found.models}
-    known = {m: n for m, n in enough.items() if n is not None}
-    if not known:
+    recommended = found.recommended()
+    if recommended is None:
         raise FitError(f"{candidates.target}: none of {', '.join(found.models)} could be judged in every block")
-    model = min(known, key=lambda m: pooled[found.models.index(m), known[m] - 1])
-    size = known[model]
+    model, place = recommended
+    sensors = found.sensors[place]
     errors = Table(
         f"Error on unseen blocks: {protocol.name}",
         ("sensors", *(f"{m} RMS [um]" for m in found.models), "condition", "chosen in all rows"),
         tuple(
-            (k + 1, *(float(v) for v in pooled[:, k]), float(found.condition[k]), " ".join(found.sensors[k]))
-            for k in range(len(found.sensors))
+            (size, *(float(v) for v in pooled[:, k]), float(found.condition[k]), " ".join(found.sensors[k]))
+            for k, size in enumerate(found.sizes)
         ),
-        size - 1,
-        f"Without compensation {found.none_pooled():.2f} um. Marked: enough for {model}; "
-        + "; ".join(f"{m}: {n or 'not judged'}" for m, n in enough.items() if m != model),
+        place,
+        f"Without compensation {found.none_pooled():.2f} um. Enough (mean over the blocks within one standard error of "
+        "the best): " + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models) + ".",
     )
-    order = np.argsort(-found.frequency[size - 1], kind="stable")
+    order = np.argsort(-found.frequency[place], kind="stable")
     frequency = Table(
-        f"How surely a sensor is among the best {size}",
+        f"How surely a sensor is among the best {len(sensors)}",
         ("sensor", "share of the blocks [%]"),
         tuple(
-            (found.candidates[j], float(100 * found.frequency[size - 1, j]))
+            (found.candidates[j], float(100 * found.frequency[place, j]))
             for j in order
-            if found.frequency[size - 1, j] > 0
+            if found.frequency[place, j] > 0
         ),
         None,
         "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
     )
-    sensors = found.sensors[size - 1]
-    best = float(pooled[found.models.index(model), size - 1])
+    least = np.unravel_index(int(np.nanargmin(pooled)), pooled.shape)
+    notes = [
+        "Sensors of each number are the best subset by least squares in the rows to learn from, whatever model is then "
+        "trained on them. Their number was chosen by the errors shown, so they flatter it a little."
+    ]
+    if not found.proven:
+        notes.append("Not all of these sets are proven to be the best of their size.")
+    if len(found.blocks) < len(protocol.splits):
+        notes.append(
+            f"{len(protocol.splits) - len(found.blocks)} block(s) without a number of the target were left out."
+        )
     return Choice(
         "pareto",
         candidates.target,
         sensors,
-        f"{model} with {size} of {len(found.candidates)} temperatures leaves {best:.2f} um RMS on unseen cycles, "
-        f"instead of {found.none_pooled():.2f} um; more sensors are not clearly better",
+        f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves "
+        f"{float(pooled[found.models.index(model), place]):.2f} um RMS on unseen cycles, instead of "
+        f"{found.none_pooled():.2f} um; the best of the table, {found.models[int(least[0])]} with "
+        f"{found.sizes[int(least[1])]}, leaves {float(pooled[least]):.2f} um",
         (errors, frequency, candidates.repeats(sensors)),
-        (
-            "Sensors of each number are the exact best subset by least squares in the rows to learn from, whatever "
-            "model is then trained on them. That number was chosen by the errors shown, so they flatter it a little.",
-        ),
+        tuple(notes),
         found,
     )
 
@@ -265,19 +307,37 @@ def n_pieces(samples: Samples, protocol: Protocol, models: Sequence[str], max_se
     int
     """
     temperatures = sum(c.quantity == "temperature" for c in samples.inputs)
-    return len(protocol.splits) * len(expand(models)) * min(max_sensors, temperatures)
+    return len(protocol.splits) * len(expand(models)) * min(max_sensors + 1, temperatures)
 
 
 def _best(
-    samples: Samples, target: int, learn: BoolArray, temperatures: Sequence[str], max_sensors: int
-) -> list[tuple[str, ...]]:
-    """Return the best sensors of every number, in the rows that may be learned from."""
+    samples: Samples,
+    target: int,
+    temperatures: Sequence[str],
+    max_sensors: int,
+    seconds: float | None,
+    jobs: int,
+    progress: Callable[[str], None],
+    learn: BoolArray,
+) -> tuple[list[tuple[str, ...]], bool]:
+    """Return the best sensors of every number, and all, by the rows that may be learned from; and the certificate."""
     columns = [j for j, c in enumerate(samples.inputs) if c.name in temperatures]
     rows = learn & samples.valid & np.isfinite(samples.deviations[:, target])
     if rows.sum() < 3:
         raise FitError(f"{int(rows.sum())} complete rows of {samples.targets[target].name} to choose sensors by")
-    found = best_subsets(samples.change()[rows][:, columns], samples.deviations[rows, target], max_size=max_sensors)
-    return [tuple(samples.inputs[columns[j]].name for j in subset.columns) for subset in found.best]
+    found = best_subsets(
+        samples.change()[rows][:, columns],
+        samples.deviations[rows, target],
+        max_size=max_sensors,
+        seconds=seconds,
+        jobs=jobs,
+        progress=progress,
+    )
+    if found.stopped == "interrupted":
+        raise KeyboardInterrupt
+    best = [tuple(samples.inputs[columns[j]].name for j in subset.columns) for subset in found.best]
+    everything = tuple(samples.inputs[j].name for j in columns)
+    return best if len(best[-1]) == len(everything) else [*best, everything], found.proven
 
 
 def _unseen_rms(samples: Samples, target: int, split: Split, sensors: Sequence[str], name: str) -> float:

@@ -199,7 +199,11 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
     """Choose the exact best subset of every size (H-05), and a size."""
     most = min(settings.most("subsets"), len(candidates.names))
     found = BestSubset(
-        criterion=settings.criterion, max_size=most, jobs=effective_n_jobs(jobs), progress=partial(progress, steps=0)
+        criterion=settings.criterion,
+        max_size=most,
+        jobs=effective_n_jobs(jobs),
+        seconds=settings.seconds,
+        progress=partial(progress, steps=0),
     )
     found.fit(candidates.X, candidates.y, cycle=candidates.cycle)
     headings = {"mse": "MSE_p [um^2]", "adjr2": "adjusted R2", "cp": "Cp", "bic": "BIC", "cycles": "RMS left out [um]"}
@@ -266,7 +270,8 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
     total = dict(zip(same.subsets, same.summed.sum(axis=0).tolist(), strict=True))
     enough = psi.least_size(ENOUGH_PSI)
     equals = same.common or tuple(dict.fromkeys(same.subsets[k] for k in same.best))
-    small = [s for s in equals if len(s) <= (enough or settings.most("ace"))] or equals
+    least = max(enough or settings.most("ace"), min(len(s) for s in equals))
+    small = [s for s in equals if len(s) <= least]
     chosen = max(small, key=lambda s: total[s])
     per_target = Table(
         "Best set for each displacement",
@@ -297,7 +302,7 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
     )
     notes = list(dict.fromkeys(n.partition(": ")[2] for n in same.notes))
     number = enough or f"more than {settings.most('ace')}"
-    notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement takes {number} sensors.")
+    notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement takes {number} sensor(s), no more are chosen.")
     notes.append("Psi is a fit within each cycle, not an error on unseen ones: judge the set with 'compare --inputs'.")
     if not same.common:
         notes.append("No set is as good as the best for all displacements: the one shown is the best for one of them.")

@@ -17,6 +17,7 @@ app = App(
     version=__version__,
     # every command returns its exit code; nothing but `main` leaves the process
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 
 for command in (

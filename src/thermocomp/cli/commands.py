@@ -196,12 +196,14 @@ def select(
     tests = read_recordings(recordings, study.mapping)
     with needs("study"):
         from thermocomp.assessment import selecting
+        from thermocomp.assessment.splits import Protocol
         from thermocomp.cli import output as out
     if output is not None:
         refuse_existing([output], overwrite, recordings)
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
-    protocol = study.protocol(samples)
+    # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
+    protocol = study.protocol(samples) if method == "pareto" else Protocol("", ())
     with _progress(selecting.n_pieces(method, samples, protocol, settings), json) as progress:
         choices = selecting.select(method, samples, protocol, settings, jobs=study.jobs, progress=progress)
     if output is not None:

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.assessment.choice import Choice, written
+from thermocomp.assessment.choice import Table as ChoiceTable
 from thermocomp.assessment.compare import Assessment, Comparison
 from thermocomp.assessment.harm import CycleVerdict
 from thermocomp.assessment.study import Fitted, Judged
@@ -86,14 +87,7 @@ def show_choices(
     for c in choices:
         for t in c.tables:
             console.print(f"\n[bold]{escape(c.target)}: {escape(t.title)}[/]")
-            table = Table()
-            for j, heading in enumerate(t.columns):
-                table.add_column(escape(heading), justify="left" if j in t.words else "right")
-            for k, row in enumerate(t.rows):
-                table.add_row(*(escape(written(cell)) for cell in row), style="bold green" if k == t.marked else None)
-            console.print(table)
-            if t.caption:
-                console.print(escape(t.caption), style="dim")
+            _print_table(t, console)
         for note in c.notes:
             console.print(f"[dim]note[/] {escape(note)}")
         console.print(
@@ -101,6 +95,29 @@ def show_choices(
         )
     if page is not None:
         console.print(f"Page: {page}")
+
+
+def _print_table(t: ChoiceTable, console: Console) -> None:
+    """Print a table; where it is too wide, its lists of names follow below it."""
+    lists = [j for j in t.words if any(" " in str(row[j]) for row in t.rows)]
+    for below in ([], lists):
+        table = Table()
+        columns = [j for j in range(len(t.columns)) if j not in below]
+        for j in columns:
+            table.add_column(escape(t.columns[j]), justify="left" if j in t.words else "right", overflow="fold")
+        for k, row in enumerate(t.rows):
+            cells = (escape(written(row[j])) for j in columns)
+            table.add_row(*cells, style="bold green" if k == t.marked else None)
+        if console.measure(table).maximum <= console.width:
+            break
+    console.print(table)
+    for j in below:
+        console.print(f"[dim]{escape(t.columns[j])}[/]")
+        for k, row in enumerate(t.rows):
+            style = "bold green" if k == t.marked else None
+            console.print(f"  {escape(written(row[0]))}: {escape(written(row[j]))}", style=style)
+    if t.caption:
+        console.print(escape(t.caption), style="dim")
 
 
 def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
@@ -234,7 +251,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Table:
         for a in mine:
             figures = (_number(a.metric(m)) for m in ("mae", "rms", "max_abs"))
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
-            table.add_row(a.model, *figures, less, str(len(a.sensors)), _verdict(_word(a)))
+            table.add_row(a.model, *figures, less, _span(a.n_sensors), _verdict(_word(a)))
     return table
 
 
@@ -245,7 +262,7 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Table:
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
     space = " " if down is models else ""  # where others have their mark
     table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = refused")
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for heading in across:
         table.add_column(escape(heading), justify="right", no_wrap=across is models)
     for mine in _by_target(assessments):
@@ -267,6 +284,10 @@ def _passed(cycle: CycleVerdict) -> str:
 def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:
     overall = [a for a in assessments if a.overall]
     return [[a for a in overall if a.target == t] for t in dict.fromkeys(a.target for a in overall)]
+
+
+def _span(numbers: tuple[int, int]) -> str:
+    return "-".join(str(n) for n in dict.fromkeys(numbers))
 
 
 def _number(value: float) -> str:
@@ -297,7 +318,8 @@ def _result(a: Assessment) -> dict[str, Any]:
         "verdict": _word(a),
         "reason": a.reason,
         "sensors": list(a.sensors),
-        "n_sensors": len(a.sensors),
+        "n_sensors": a.n_sensors[1],
+        "n_sensors_least": a.n_sensors[0],
         "fit_s": a.fit_s,
         "n_rows": len(a.measured),
         "n_effective": a.n_effective,

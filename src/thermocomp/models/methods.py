@@ -67,7 +67,7 @@ METHODS: dict[str, Method] = {
         ),
         Method("grouping", "Hwang's correlation grouping and successive regression", "grouping.CorrelationGrouping"),
         Method("subsets", "exact best subset of the temperatures", "subsets.BestSubset", takes=("cycle",)),
-        Method("ace", "Wessel's optimal transformations, inverted by nearest neighbours", "ace.ACE"),
+        Method("ace", "Wessel's optimal transformations as printed, for a few temperatures", "ace.ACE"),
         Method("ace-monotone", "the same with a transformation that can be inverted", "ace_monotone.MonotoneACE"),
         Method("mlp", "Chen's sigmoid net of 20 hidden nodes, trained by back-propagation", "mlp.SigmoidNet"),
         Method("mlp-sklearn", "scikit-learn's net with one hidden layer", "mlp_sklearn.SklearnNet"),
@@ -135,3 +135,8 @@ def expand(names: Sequence[str]) -> list[str]:
     """
     listed = [n for name in names for n in (METHODS if name == ALL_METHODS else [name])]
     return [method(name).name for name in dict.fromkeys(listed)]
+
+
+def deployable(name: str) -> bool:
+    """Return whether models of this name can run at a machine: False for methods that cannot be frozen."""
+    return name not in METHODS or METHODS[name].kind.freezable

@@ -99,7 +99,8 @@ class BestSubset(TermRegressor):
     proven_ : bool
         Whether no other set of that size fits as well.
     criterion_ : str
-        What the size was chosen by; ``size`` if it was given.
+        What the size was chosen by; ``size`` if it was given. After a KeyboardInterrupt the search stops with what it
+        has found, and ``bic`` takes the place of ``cycles``.
     chosen_by_ : str
         What was left out to choose; empty if nothing was.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
@@ -176,13 +177,14 @@ class BestSubset(TermRegressor):
                 raise InputError("best subsets: stopped before a set was found; give it more sets or seconds")
             self.scores_ = scores(self.subsets_)
             self.criterion_ = "size" if self.size is not None else criterion
+            place = -1
             if self.criterion_ == "cycles":
-                self.chosen_by_ = left_out
-                place = self._by_cycles(change, deviation, folds)
-            elif self.criterion_ == "size":
-                place = -1
-            else:
-                score = self.scores_[criterion] * (-1 if criterion == "adjr2" else 1)
+                try:
+                    place, self.chosen_by_ = self._by_cycles(change, deviation, folds), left_out
+                except KeyboardInterrupt:  # what was found is not thrown away
+                    self.criterion_ = "bic"
+            if self.criterion_ in ("mse", "adjr2", "cp", "bic"):
+                score = self.scores_[self.criterion_] * (-1 if self.criterion_ == "adjr2" else 1)
                 place = int(np.nanargmin(score)) if not np.isnan(score).all() else 0
             chosen = self.subsets_.best[place]
             self.selected_, self.proven_ = chosen.columns, chosen.proven
@@ -206,6 +208,8 @@ class BestSubset(TermRegressor):
 
     def _by_cycles(self, X: FloatArray, y: FloatArray, folds: IntArray) -> int:
         """Return the place in ``subsets_.best`` that predicts cycles best that neither search nor fit have seen."""
+        if self.subsets_.stopped == "interrupted":
+            raise KeyboardInterrupt
         sizes = [len(s.columns) for s in self.subsets_.best]
         n_folds = int(folds.max()) + 1
         squares = np.full((len(sizes), n_folds), np.nan)

@@ -65,6 +65,7 @@ def grouping(g: CorrelationGrouping, target: str) -> str:
 def budget(b: Budget) -> str:
     """Show what each further sensor buys: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
     sizes = np.arange(1, len(b.sensors) + 1)
+    names = [str(n) for n in b.sizes]
     with drawing("budget" + b.target):
         figure = Figure(figsize=(9.6, 4.2 + 0.17 * len(b.candidates)), layout="constrained")
         errors, repeats, chosen = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1.1, 0.16 * len(b.candidates)])
@@ -74,7 +75,8 @@ def budget(b: Budget) -> str:
             errors.plot(sizes, b.pooled()[k], "-o", color=colour, label=model, ms=4)
             enough = b.enough(model)
             if enough is not None:
-                errors.plot(enough, b.pooled()[k][enough - 1], "o", color=colour, mfc="none", ms=12, mew=1.6)
+                place = b.sizes.index(enough)
+                errors.plot(sizes[place], b.pooled()[k][place], "o", color=colour, mfc="none", ms=12, mew=1.6)
         errors.axhline(b.none_pooled(), color=NONE, lw=2.5, label="no compensation")
         errors.plot([], [], ".", color="#888", label="one unseen block")
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
@@ -103,7 +105,7 @@ def budget(b: Budget) -> str:
         )
         chosen.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         chosen.set_xlabel("number of temperature sensors")
-        chosen.xaxis.set_major_locator(MaxNLocator(integer=True))
+        chosen.set_xticks(sizes, names)
         return svg(figure)
 
 

@@ -126,6 +126,7 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
         "reason": a.reason,
         "best": best is not None and a.model == best.model,
         "sensors": a.sensors,
+        "n_sensors": a.n_sensors,
         "n_effective": a.n_effective,
         "rows": len(a.measured),
         "fit_s": a.fit_s,
