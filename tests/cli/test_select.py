@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from smallmachine import crowded_machine
+from thermocomp.assessment.choice import LOOKED_AT_BY, Settings
 from thermocomp.cli.app import run
 from thermocomp.core.machine import Channel
 from thermocomp.files import recordings
@@ -31,7 +32,8 @@ def test_every_method_for_people_and_programs(
     drift: Path, method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page = tmp_path / "sensors.html"
-    line = ["select", str(drift), "--target", "x_um", "--method", method, "--max-sensors", "2", "--jobs", "1"]
+    line = ["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1"]
+    line += ["--max-sensors", "2"] if method in ("subsets", "ace", "pareto") else []
     assert run([*line, "-o", str(page)]) == 0
     said = capsys.readouterr().out
     assert "x_um: t" in said
@@ -59,6 +61,12 @@ def test_refusals(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["--max-sensors", "0"], "want at least 1"),
         (["--models", "gpp"], "unknown model 'gpp'"),
         (["--method", "ace", "--level", "3"], "level 3.0"),
+        (["--method", "ace", "--threshold", "0.5"], "--threshold is for --method grouping, not for ace"),
+        (
+            ["--method", "grouping", "--max-sensors", "4"],
+            "--max-sensors is for --method subsets or ace or pareto, not for",
+        ),
+        (["--holm"], "--holm is for --method ace, not for pareto"),
         (["--method", "ace", "--max-sensors", "0"], "at least"),
         (["--method", "subsets", "--max-sensors", "0"], "at least 1"),
     ):
@@ -70,6 +78,12 @@ def processor_time(pid: int) -> float:
     """Return the seconds a process has computed."""
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def test_every_setting_says_who_looks_at_it() -> None:
+    assert set(LOOKED_AT_BY) == {f.name for f in fields(Settings)}
+    described = {n: (Settings.__doc__ or "").split(f"    {n} : ")[1].split("\n")[1].split(":")[0] for n in LOOKED_AT_BY}
+    assert {n: tuple(text.strip().split(", ")) for n, text in described.items()} == LOOKED_AT_BY
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks Linux how long a process has computed")

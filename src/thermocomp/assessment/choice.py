@@ -1,13 +1,27 @@
 """A selection of sensors: what it can be told, and what it comes out as: the sensors, why, and the tables behind it."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Literal, Protocol
 
 from thermocomp.core.exceptions import InputError
 
 Cell = str | float | int | None
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
+
+
+#: which methods look at which of the settings
+LOOKED_AT_BY = {
+    "threshold": ("grouping",),
+    "unsigned": ("grouping",),
+    "reference": ("grouping",),
+    "max_sensors": ("subsets", "ace", "pareto"),
+    "seconds": ("subsets", "pareto"),
+    "criterion": ("subsets",),
+    "models": ("pareto",),
+    "level": ("ace",),
+    "holm": ("ace",),
+}
 
 
 class Progress(Protocol):
@@ -52,6 +66,20 @@ class Settings:
     models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
     level: float = 0.05
     holm: bool = False
+
+    def check(self, method: str) -> None:
+        """Refuse what has no meaning for a method.
+
+        Raises
+        ------
+        InputError
+            Something was set that only other methods look at.
+        """
+        for f in fields(self):
+            default = f.default_factory() if f.default_factory is not MISSING else f.default
+            if getattr(self, f.name) != default and method not in LOOKED_AT_BY[f.name]:
+                option = "--" + f.name.replace("_", "-")
+                raise InputError(f"{option} is for --method {' or '.join(LOOKED_AT_BY[f.name])}, not for {method}")
 
     def most(self, method: str) -> int:
         """Return the most sensors a method may choose.

@@ -193,6 +193,7 @@ def select(
     int
         0 done, 2 unusable input.
     """
+    settings.check(method)
     tests = read_recordings(recordings, study.mapping)
     with needs("study"):
         from thermocomp.assessment import selecting
