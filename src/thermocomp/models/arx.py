@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input
-from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
+from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, Recursion, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
@@ -168,25 +168,9 @@ class ARX(ClockedRegressor):
         self.free_run_rms_ = rms(self._free_error(clocked, c, folds >= 0)) if dt is not None else math.nan
         return self
 
-    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-        dt : array-like of shape (n_rows,), optional
-            As in `fit`. Without it, the deviation at which each row would settle is given.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        inputs = self._given(X)
-        if dt is None:
-            return self._coefficients.settled(inputs)
-        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
-        parts = [self._coefficients.at_rows(r) for r in runs]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    @property
+    def _recursion(self) -> Recursion:
+        return self._coefficients
 
     def one_step(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike) -> FloatArray:
         """Predict each tick from the measured displacements before it: a diagnostic, not a prediction (E-P3).

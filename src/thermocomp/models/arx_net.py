@@ -14,7 +14,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.models.arx import ARX
-from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, rms, too_few
+from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, Recursion, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.numerics.ticks import Run
@@ -192,25 +192,9 @@ class NetARX(ClockedRegressor):
         self.free_run_rms_ = rms(self._free_error(data, self._net, folds >= 0)) if dt is not None else math.nan
         return self
 
-    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-        dt : array-like of shape (n_rows,), optional
-            As in `fit`. Without it, the deviation at which each row would settle is given.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        inputs = self._given(X)
-        if dt is None:
-            return self._net.settled(inputs)
-        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
-        parts = [self._net.at_rows(r) for r in runs]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    @property
+    def _recursion(self) -> Recursion:
+        return self._net
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> AutoregressiveNet:
         return AutoregressiveNet(

@@ -4,7 +4,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -108,8 +108,45 @@ class Clocked:
         return math.exp(-1.0 / (MEMORY * max(longest, 1)))
 
 
+class Recursion(Protocol):
+    """What an autoregressive estimator fits."""
+
+    def settled(self, inputs: FloatArray) -> FloatArray:
+        """Return the deviation at which it would come to rest with each row's inputs."""
+
+    def at_rows(self, run: Run) -> FloatArray:
+        """Return its free run through a test, at the rows."""
+
+
 class ClockedRegressor(ThermalRegressor):
     """What the autoregressive estimators share: which inputs, on which clock, chosen by which cycles."""
+
+    interval_: float
+
+    @property
+    @abstractmethod
+    def _recursion(self) -> Recursion:
+        """What was fitted."""
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`. Without it, the deviation at which each row would settle is given.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        inputs = self._given(X)
+        if dt is None:
+            return self._recursion.settled(inputs)
+        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
+        parts = [self._recursion.at_rows(r) for r in runs]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _start(
         self, X: ArrayLike, y: ArrayLike, dt: ArrayLike | None, cycle: ArrayLike | None
