@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from thermocomp.models.ace import ACE
 from thermocomp.models.kernels import ace as kernel
 from thermocomp.models.kernels import ranks
-from thermocomp.models.selection.maximal_correlation import Test, maximal_correlations, subsets_up_to
+from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
 
 FloatArray = NDArray[np.float64]
 
@@ -156,7 +156,7 @@ def wessel(quick: bool) -> bool:
     rng = np.random.default_rng(0)
     subsets = subsets_up_to(TEMPERATURES)
     tests = [
-        Test(f"test {k}", *test_run(int(rng.integers(450, 551)), TEMPERATURES, DISPLACEMENTS, seed=k))
+        DataSet(f"test {k}", *test_run(int(rng.integers(450, 551)), TEMPERATURES, DISPLACEMENTS, seed=k))
         for k in range(TESTS)
     ]
     models = len(subsets) * TESTS * DISPLACEMENTS

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from bench_stepwise import network
 from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.selection.subsetrun import run
 from thermocomp.models.selection.subsets import Subsets, best_subsets
-from thermocomp.models.selection.subsetsearch import Problem, run
+from thermocomp.models.selection.subsetsearch import Problem
 
 FloatArray = NDArray[np.float64]
 

@@ -138,8 +138,8 @@ def test_intervals_and_orders_are_judged_on_cycles_left_out(samples: Samples) ->
     X, y, dt, cycle = samples.frame(), samples.deviations[:, 0], samples.dt(), samples.cycle
     e = ARX(inputs=["spindle_rpm"], interval=(120.0, 600.0), criterion="free-run", k_max=2, m_max=1, fit_intercept=None)
     e.fit(X, y, dt=dt, cycle=cycle)
-    assert len(e.choices_) == 2 * 3 * 2 * 2
-    best = min(e.choices_, key=lambda c: c.cv_rms)
+    assert len(e.trials_) == 2 * 3 * 2 * 2
+    best = min(e.trials_, key=lambda c: c.cv_rms)
     assert (e.interval_, e.k_, e.m_, e.intercept_ != 0) == (best.interval, best.k, best.m, best.intercept)
     assert e.cv_rms_ == best.cv_rms
     assert e.chosen_by_ == "4 thermal cycles, left out in turn"
@@ -162,20 +162,20 @@ def test_a_setting_that_cannot_be_fitted_without_a_cycle_is_not_chosen() -> None
     u, z = series((1, 0), 3, n=120)
     dt, cycle = clock(120, 60.0), np.arange(120) // 60
     e = ARX(interval=(60.0, 1200.0), k=3, m=3).fit(u, z, dt=dt, cycle=cycle)
-    assert [math.isfinite(c.cv_rms) for c in e.choices_] == [True, False]
+    assert [math.isfinite(c.cv_rms) for c in e.trials_] == [True, False]
     assert e.interval_ == 60.0
     net = NetARX(interval=1800.0, k=2, hidden=(2, 3), epochs=50).fit(u, z, dt=dt, cycle=cycle)
-    assert [c.cv_rms for c in net.choices_] == [math.inf, math.inf]
+    assert [c.cv_rms for c in net.trials_] == [math.inf, math.inf]
 
 
 def test_hidden_nodes_are_judged_on_cycles_left_out(samples: Samples) -> None:
     X, y, dt, cycle = samples.frame(), samples.deviations[:, 0], samples.dt(), samples.cycle
     e = NetARX(inputs=["spindle_rpm"], **QUICK).fit(X, y, dt=dt, cycle=cycle)
-    assert [c.hidden for c in e.choices_] == [2, 4]
-    assert e.hidden_ == min(e.choices_, key=lambda c: c.cv_rms).hidden
+    assert [c.hidden for c in e.trials_] == [2, 4]
+    assert e.hidden_ == min(e.trials_, key=lambda c: c.cv_rms).hidden
     assert e.net_.shape == (2, e.hidden_, 1)
     again = NetARX(inputs=["spindle_rpm"], **QUICK, jobs=1).fit(X, y, dt=dt, cycle=cycle)
-    assert again.choices_ == e.choices_
+    assert again.trials_ == e.trials_
     linear = ARX(inputs=["spindle_rpm"]).fit(X, y, dt=dt, cycle=cycle)
     searched = NetARX(inputs=["spindle_rpm"], k=None, m=None, **QUICK).fit(X, y, dt=dt, cycle=cycle)
     assert (searched.k_, searched.m_) == (linear.k_, linear.m_)  # E-P2: the same search

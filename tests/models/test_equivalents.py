@@ -1,5 +1,6 @@
 """Sets of sensors that are as good as the best, against scipy and against all signs (W-10 to W-12)."""
 
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
@@ -9,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.models.selection.equivalents import Row, enough_sensors, equivalents, signed_rank_p
+from thermocomp.models.selection.equivalents import Row, equivalents, signed_rank_p
+from thermocomp.models.selection.maximal_correlation import MaximalCorrelations
 
 FloatArray = NDArray[np.float64]
 
@@ -157,22 +158,7 @@ def test_thousands_of_sets() -> None:
 def test_number_of_sensors_that_is_enough() -> None:
     # W-12: triples reach more than 0.99
     psi, subsets = study()
-    assert enough_sensors(psi, subsets) == 3
-    assert enough_sensors(psi, subsets, least=0.97) == 2
-    assert enough_sensors([*psi, psi[0] - 0.05], subsets) is None
-
-
-@pytest.mark.parametrize(
-    ("psi", "level", "message"),
-    [
-        ([np.ones((2, 8))], 1.0, "level 1.0: want a significance"),
-        ([np.ones((3, 8))], 0.05, "want 2 sets by data sets"),
-        ([np.ones((2, 8)), np.ones(2)], 0.05, "psi of displacement 1: want 2 sets"),
-        ([np.ones((2, 0))], 0.05, "want 2 sets by data sets"),
-        ([np.array([[1.0, 1.0], [1.0, np.nan]])], 0.05, r"psi of displacement 0, set \(1, 2\), data set 1: nan"),
-        ([], 0.05, "at least one displacement"),
-    ],
-)
-def test_bad_input(psi: list[FloatArray], level: float, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        equivalents(psi, [(0,), (1, 2)], level=level)
+    found = MaximalCorrelations(np.array(psi), tuple(tuple(s) for s in subsets), ("",) * psi[0].shape[1], complete=True)
+    assert found.least_size(0.99) == 3
+    assert found.least_size(0.97) == 2
+    assert replace(found, psi=np.array([*psi, psi[0] - 0.05])).least_size(0.99) is None

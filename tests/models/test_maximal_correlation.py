@@ -9,19 +9,18 @@ from numpy.typing import NDArray
 
 import twin_ace
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.selection.maximal_correlation import Test as Trial
-from thermocomp.models.selection.maximal_correlation import maximal_correlations, subsets_up_to
+from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
 
 FloatArray = NDArray[np.float64]
 
 
-def trial(seed: int, n: int = 90, p: int = 4, m: int = 2, step: float = 0.0) -> Trial:
+def trial(seed: int, n: int = 90, p: int = 4, m: int = 2, step: float = 0.0) -> DataSet:
     rng = np.random.default_rng(seed)
     T = np.cumsum(rng.normal(size=(n, p)), axis=0)
     S = np.column_stack([np.exp(T[:, k] / 9) + 0.3 * T[:, -1] + 0.2 * rng.normal(size=n) for k in range(m)])
     if step:
         T, S = np.round(T / step) * step, np.round(S / step) * step
-    return Trial(f"test {seed}", T, S)
+    return DataSet(f"test {seed}", T, S)
 
 
 def test_counts_of_the_paper() -> None:
@@ -56,8 +55,8 @@ def test_converged_is_the_limit_of_the_sweeps(step: float) -> None:
 
     t = trial(3, 70, p=3, step=step)
     T, S = np.asarray(t.temperatures), np.asarray(t.displacements)[:, :1]
-    tight = maximal_correlations([Trial("t", T, S)], tolerance=1e-8, max_sweeps=50_000)
-    usual = maximal_correlations([Trial("t", T, S)])
+    tight = maximal_correlations([DataSet("t", T, S)], tolerance=1e-8, max_sweeps=50_000)
+    usual = maximal_correlations([DataSet("t", T, S)])
     for i, subset in enumerate(tight.subsets):
         limit = twin_ace.fit(T[:, list(subset)], S[:, 0], 10, -1.0, 300, twice=True).psi
         ranked = ranks.rank(np.ascontiguousarray(np.vstack([T[:, list(subset)].T, S[:, 0]])))
@@ -79,7 +78,7 @@ def test_many_temperatures_that_rise_together_have_a_limit() -> None:
     S = np.sqrt(heat) + 0.01 * rng.normal(size=heat.shape)
     ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S[:, 0]])))
     assert kernel.solve(*ranked, 10, -1.0, 2000)[2] < 0.9
-    found = maximal_correlations([Trial("t", T, S)], subsets_up_to(8))
+    found = maximal_correlations([DataSet("t", T, S)], subsets_up_to(8))
     assert found.psi.min() > 0.999
     best = [max(p for p, s in zip(found.psi[0, :, 0], found.subsets, strict=True) if len(s) == k) for k in range(1, 9)]
     assert (np.diff(best) > -1e-6).all()
@@ -122,10 +121,11 @@ def test_the_right_set_wins() -> None:
         rng = np.random.default_rng(seed)
         T = rng.uniform(0, 3, size=(300, 5))
         S = np.log(1 + 2 * T[:, 1] ** 2 + np.exp(T[:, 3])) + 0.01 * rng.normal(size=300)
-        tests.append(Trial(f"{seed}", T, S[:, None]))
+        tests.append(DataSet(f"{seed}", T, S[:, None]))
     found = maximal_correlations(tests, subsets_up_to(5, 2))
-    assert found.best(0) == (1, 3)
-    assert found.scores()[0].max() > 3 * 0.99
+    summed = found.psi[0].sum(axis=1)
+    assert found.subsets[int(summed.argmax())] == (1, 3)
+    assert summed.max() > 3 * 0.99
     assert found.least_size(0.98) == 2
     assert found.least_size(0.9999) is None
 
@@ -133,7 +133,7 @@ def test_the_right_set_wins() -> None:
 def test_measured_series(shared_data: Path) -> None:
     data = pd.read_csv(shared_data / "fl_thermal" / "recording.csv").iloc[::30]
     T = data.filter(regex=r"^t\d+_C$").to_numpy()[:, :6]  # steps of 0.1 degC, near-duplicates
-    found = maximal_correlations([Trial("fl", T, data[["ch1_um", "ch3_um"]])], subsets_up_to(6))
+    found = maximal_correlations([DataSet("fl", T, data[["ch1_um", "ch3_um"]])], subsets_up_to(6))
     assert ((found.psi > 0) & (found.psi < 1)).all()
     assert found.psi[1].max() > 0.99
     for d in range(2):  # more temperatures explain more, up to what is left of the last sweeps and of the boxcar
@@ -148,7 +148,7 @@ def test_dead_channels_do_no_harm() -> None:
     T, S = np.asarray(t.temperatures).copy(), np.asarray(t.displacements).copy()
     T[:, 0] = 21.5
     S[:, 1] = 3.0
-    found = maximal_correlations([Trial("t", T, S)], [(0,), (1,), (0, 1)])
+    found = maximal_correlations([DataSet("t", T, S)], [(0,), (1,), (0, 1)])
     assert found.psi[0, 0, 0] == 0.0
     assert found.psi[0, 1, 0] == found.psi[0, 2, 0] > 0
     assert (found.psi[1] == 0).all()
@@ -160,15 +160,15 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="no test given"):
         maximal_correlations([])
     with pytest.raises(FitError, match="short: 20 rows, but the boxcar holds 21"):
-        maximal_correlations([Trial("short", T[:20], S[:20])])
+        maximal_correlations([DataSet("short", T[:20], S[:20])])
     with pytest.raises(InputError, match=r"found the shapes \(90, 4\) and \(90,\)"):
-        maximal_correlations([Trial("t", T, S[:, 0])])
+        maximal_correlations([DataSet("t", T, S[:, 0])])
     with pytest.raises(InputError, match=r"differ in their numbers.*\(3, 2\), \(4, 2\)"):
-        maximal_correlations([t, Trial("t", T[:, :3], S)])
+        maximal_correlations([t, DataSet("t", T[:, :3], S)])
     with pytest.raises(InputError, match=r"subset \(0, 9\): want indices of the 4"):
         maximal_correlations([t], [(0, 9)])
     with pytest.raises(InputError, match="half_window >= 1"):
         maximal_correlations([t], half_window=0)
     T[7, 2] = np.nan
     with pytest.raises(FitError, match="hole: row 7 holds a value that is no number"):
-        maximal_correlations([Trial("hole", T, S)])
+        maximal_correlations([DataSet("hole", T, S)])

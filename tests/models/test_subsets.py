@@ -16,8 +16,8 @@ import twin_subsets
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.files import modelfile
 from thermocomp.models.selection import subsetsearch
+from thermocomp.models.selection.subsetrun import Route
 from thermocomp.models.selection.subsets import best_subsets
-from thermocomp.models.selection.subsetsearch import Route
 from thermocomp.models.subsets import BestSubset, scores
 
 FloatArray = NDArray[np.float64]

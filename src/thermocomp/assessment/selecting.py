@@ -20,8 +20,7 @@ from thermocomp.models.numerics.stepwise import Step
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.selection import grouping
 from thermocomp.models.selection.equivalents import equivalents
-from thermocomp.models.selection.maximal_correlation import Test as DataSet
-from thermocomp.models.selection.maximal_correlation import maximal_correlations, subsets_up_to
+from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recording.samples import Samples
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input
-from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, Recursion, rms, too_few
+from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
@@ -78,7 +78,7 @@ class ARX(ClockedRegressor):
     intercept_ : float
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
-    choices_ : tuple of Choice
+    trials_ : tuple of Trial
         What was judged in free run on cycles left out; empty if nothing was.
     cv_rms_ : float
         Of the choice; nan if nothing was judged.
@@ -150,16 +150,16 @@ class ARX(ClockedRegressor):
         # one-step criteria choose among all orders by themselves
         groups = [((k,), (m,)) for k in ks for m in ms] if self.criterion == "free-run" else [(ks, ms)]
         tried = [_Setting(d, k, m, c) for d in data for k, m in groups for c in constants]
-        self.choices_: tuple[Choice, ...] = ()
+        self.trials_: tuple[Trial, ...] = ()
         best = 0
         if len(tried) > 1:
             errors = [self._judge(t) for t in tried]
-            self.choices_ = tuple(
-                Choice(t.data.interval, max(t.ks), max(t.ms), t.intercept, 0, e)
+            self.trials_ = tuple(
+                Trial(t.data.interval, max(t.ks), max(t.ms), t.intercept, 0, e)
                 for t, e in zip(tried, errors, strict=True)
             )
             best = int(np.argmin(errors))
-        self.cv_rms_ = self.choices_[best].cv_rms if self.choices_ else math.nan
+        self.cv_rms_ = self.trials_[best].cv_rms if self.trials_ else math.nan
         clocked = tried[best].data
         self._coefficients, self.orders_, self.one_step_rms_ = self._solve(tried[best], clocked.targets())
         self.interval_ = clocked.interval

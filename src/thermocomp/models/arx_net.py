@@ -14,7 +14,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.models.arx import ARX
-from thermocomp.models.clocked import Choice, Clocked, ClockedRegressor, Recursion, rms, too_few
+from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.numerics.ticks import Run
@@ -104,7 +104,7 @@ class NetARX(ClockedRegressor):
     interval_ : float
         [s]
     net_ : Perceptron
-    choices_ : tuple of Choice
+    trials_ : tuple of Trial
         Numbers of hidden nodes that were judged; empty if there was nothing to choose.
     cv_rms_ : float
     chosen_by_ : str
@@ -176,16 +176,16 @@ class NetARX(ClockedRegressor):
         data = Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
         self.k_, self.m_ = (0, 0) if dt is None else self._chosen_orders(inputs, deviation, dt, cycle)
         best = 0
-        self.choices_: tuple[Choice, ...] = ()
+        self.trials_: tuple[Trial, ...] = ()
         if len(sizes) > 1 and dt is not None:
             jobs = [(size, fold) for size in sizes for fold in range(int(folds.max()) + 1)]
             errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
             means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
-            self.choices_ = tuple(
-                Choice(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
+            self.trials_ = tuple(
+                Trial(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
             )
             best = int(np.argmin(means))
-        self.cv_rms_ = self.choices_[best].cv_rms if self.choices_ else math.nan
+        self.cv_rms_ = self.trials_[best].cv_rms if self.trials_ else math.nan
         self.hidden_, self.interval_ = sizes[best], h
         self._net = self._train(data, self.hidden_, None)
         self.net_ = self._net.net

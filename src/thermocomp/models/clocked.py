@@ -30,7 +30,7 @@ NO_SPEED = (
 
 
 @dataclass(frozen=True)
-class Choice:
+class Trial:
     """One setting that was tried, judged in free run on thermal cycles left out.
 
     Parameters

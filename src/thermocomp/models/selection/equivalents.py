@@ -201,24 +201,3 @@ def _rejected(p: FloatArray, level: float, holm: bool) -> BoolArray:
     rejected = np.zeros(len(p), dtype=np.bool_)
     rejected[order[: int(np.argmin(np.append(holds, False)))]] = True
     return rejected
-
-
-def enough_sensors(psi: Sequence[ArrayLike], subsets: Sequence[Sequence[int]], *, least: float = 0.99) -> int | None:
-    """Return the number of sensors beyond which there is no need to look (W-12).
-
-    Parameters
-    ----------
-    psi : sequence of array-like of shape (n_subsets, n_tests)
-        One per displacement.
-    subsets : sequence of sequence of int
-    least : float
-        What the mean psi of the best set must exceed; the paper stopped at triples, with more than 0.99.
-
-    Returns
-    -------
-    int or None
-        Smallest size of a set that does so for every displacement; None if there is none.
-    """
-    sizes = np.array([len(s) for s in subsets])
-    means = np.array([np.asarray(values, dtype=np.float64).mean(axis=1) for values in psi])
-    return next((int(s) for s in np.unique(sizes) if (means[:, sizes == s].max(axis=1) > least).all()), None)

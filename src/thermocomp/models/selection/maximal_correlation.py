@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
+class DataSet:
     """One test, as arrays.
 
     Parameters
@@ -49,14 +49,6 @@ class MaximalCorrelations:
     tests: tuple[str, ...]
     complete: bool
 
-    def scores(self) -> FloatArray:
-        """Return Psi summed over the tests that are done, (n_displacements, n_subsets)."""
-        return np.asarray(np.nansum(self.psi, axis=2))
-
-    def best(self, displacement: int) -> tuple[int, ...]:
-        """Return the subset with the greatest sum of Psi for a displacement."""
-        return self.subsets[int(np.argmax(self.scores()[displacement]))]
-
     def least_size(self, level: float) -> int | None:
         """Return the number of temperatures from which on a subset reaches `level` on average, everywhere (W-12).
 
@@ -77,7 +69,7 @@ def subsets_up_to(n_temperatures: int, size: int | None = None) -> tuple[tuple[i
 
 
 def maximal_correlations(
-    tests: Sequence[Test],
+    tests: Sequence[DataSet],
     subsets: Sequence[Sequence[int]] | None = None,
     *,
     half_window: int = 10,
@@ -94,7 +86,7 @@ def maximal_correlations(
 
     Parameters
     ----------
-    tests : sequence of Test
+    tests : sequence of DataSet
     subsets : sequence of sequence of int, optional
         Indices of the temperatures; all subsets up to three if not given.
     half_window : int
@@ -157,7 +149,7 @@ def maximal_correlations(
     return MaximalCorrelations(psi, chosen, tuple(t.name for t in tests), complete)
 
 
-def _checked(test: Test, half_window: int) -> tuple[FloatArray, FloatArray]:
+def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
     T = np.asarray(test.temperatures, dtype=np.float64)
     S = np.asarray(test.displacements, dtype=np.float64)
     if T.ndim != 2 or S.ndim != 2 or len(T) != len(S):

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.numerics.leastsquares import Triangle, solve, table, triangle
 from thermocomp.models.numerics.stepwise import ENOUGH
-from thermocomp.models.selection.subsetsearch import Problem, Route, Stop, run
+from thermocomp.models.selection.subsetrun import Route, Stop, run
+from thermocomp.models.selection.subsetsearch import Problem
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,153 @@
+"""A run of the searches of `best_subsets`: threads, clock, and what is safe to say when it has ended."""
+
+import time
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from thermocomp.models.selection.subsetsearch import Adding, Dropping, Problem, Search, Swapping
+
+FloatArray = NDArray[np.float64]
+
+Route = Literal["dropping", "adding"]
+Stop = Literal["", "nodes", "seconds", "interrupted"]
+
+
+class Result:
+    """A search that has ended, one way or the other.
+
+    Parameters
+    ----------
+    problem : Problem
+    limit : ndarray of shape (p + 1,)
+        See `Search`.
+    n_best : int
+    """
+
+    def __init__(self, problem: Problem, limit: FloatArray, n_best: int) -> None:
+        self.problem, self.limit, self.n_best = problem, limit, n_best
+        self.parts: list[Search] = []
+        self.looked = 0
+        self.stopped: Stop = ""
+        self._open = np.full(len(limit), np.inf)
+
+    def sets(self, size: int) -> list[tuple[int, ...]]:
+        """Return the sets of a size that may be the best: those within the margin, and at least those asked for."""
+        found = self._merged(size)
+        return [c for i, (v, c) in enumerate(found) if v < self.limit[size] or i < self.n_best]
+
+    def safe(self, size: int) -> tuple[float, bool]:
+        """Return the sum of squares that all other sets of a size reach, and whether none was lost below the margin."""
+        found = self._merged(size)
+        if not found:
+            return self.problem.full_rss, False
+        lost = min(float(part.lost[size]) for part in self.parts)
+        beyond = min(lost, float(self._open[size]), float(self.limit[size]))
+        worst = found[min(self.n_best, len(found)) - 1][0]
+        needed = (np.sqrt(worst) + 2 * self.problem.error(worst)) ** 2
+        complete = min(lost, float(self._open[size])) >= self.limit[size] and self.limit[size] >= needed * (1 - 1e-12)
+        if beyond == np.inf:
+            return beyond, complete
+        return float(max(np.sqrt(beyond) - self.problem.error(max(beyond, worst)), 0.0) ** 2), complete
+
+    def _merged(self, size: int) -> list[tuple[float, tuple[int, ...]]]:
+        found: dict[tuple[int, ...], float] = {}
+        for part in self.parts:
+            for value, flags in zip(part.values[size], part.contents[size], strict=True):
+                if value < np.inf:
+                    columns = part.columns(flags)
+                    found[columns] = min(float(value), found.get(columns, np.inf))
+        return sorted((v, c) for c, v in found.items())
+
+    def leave_open(self, least: FloatArray) -> None:
+        """Note what was not looked at."""
+        self._open = np.minimum(self._open, least)
+
+
+def run(
+    problem: Problem,
+    route: Route,
+    sizes: int,
+    n_best: int,
+    jobs: int,
+    nodes: int | None,
+    seconds: float | None,
+    progress: Callable[[str], None] | None,
+) -> Result:
+    """Search.
+
+    Parameters
+    ----------
+    problem : Problem
+    route : {'dropping', 'adding'}
+    sizes, n_best, jobs : int
+        Largest size, sets wanted of each, threads.
+    nodes : int or None
+        Stop after about so many sets.
+    seconds : float or None
+        Stop after about so long [s].
+    progress : callable or None
+        Called about once a second with a line of text.
+
+    Returns
+    -------
+    Result
+    """
+    p = problem.triangle.shape[1] - 1
+    limit = np.full(p + 1, -np.inf)
+    limit[1 : sizes + 1] = np.inf
+    bound = limit.copy()
+    kind: Any = {"dropping": Dropping, "adding": Adding}[route]
+    result = Result(problem, limit, n_best)
+    result.parts = [kind(problem, sizes, n_best, limit, bound) for _ in range(jobs)]
+    n_tasks = result.parts[0].tasks
+    for part in result.parts:
+        part.start(0, 0)
+    if route == "dropping":
+        result.parts.append(Swapping(problem, sizes, n_best, limit, bound))
+    # dropping begins with the cheap branches at the end, which find good sets; so does adding with those at the begin
+    turns = list(range(n_tasks)) if route == "dropping" else list(range(n_tasks))[::-1]
+    whole = jobs == 1
+    began = said = time.monotonic()
+
+    def work(part: Search) -> None:
+        nonlocal said
+        while turns and not result.stopped:
+            if whole:
+                part.start(0, n_tasks)
+                turns.clear()
+            else:
+                task = turns.pop()  # one at a time: the interpreter's lock sees to it
+                part.start(task, task + 1)
+            chunk = part.chunk if nodes is None else min(part.chunk, nodes)
+            while not result.stopped:
+                done = part.go_on(chunk)
+                result.looked += done
+                if done == 0:
+                    break
+                now = time.monotonic()
+                if nodes is not None and result.looked >= nodes:
+                    result.stopped = "nodes"
+                elif seconds is not None and now - began >= seconds:
+                    result.stopped = "seconds"
+                if progress is not None and now - said >= 1:
+                    said = now
+                    progress(f"best subsets: {result.looked:,} sets looked at in {now - began:.0f} s")
+
+    try:
+        if whole:
+            work(result.parts[0])
+        else:
+            Parallel(n_jobs=jobs, prefer="threads")(delayed(work)(part) for part in result.parts[:jobs])
+    except KeyboardInterrupt:
+        result.stopped = "interrupted"
+    for part in result.parts:
+        result.leave_open(part.open_from())
+    for task in turns:
+        part = kind(problem, sizes, n_best, limit.copy(), bound.copy())
+        part.start(task, task + 1)
+        result.leave_open(part.open_from())
+    return result
