@@ -84,6 +84,7 @@ def test_subsets_show_the_best_of_every_size(choices: dict[str, tuple[Choice, ..
     )
     assert [str(row[-1]).split() for row in shown.rows] == [[columns[j] for j in s.columns] for s in expected.best]
     assert all(row[-2] == "proven" for row in shown.rows)
+    assert shown.caption.endswith("the others cannot be better.")
     assert shown.marked is not None
     assert str(shown.rows[shown.marked][-1]).split() == list(choice.sensors)
     assert X.shape[1] == 6
@@ -134,3 +135,12 @@ def test_cells_as_text() -> None:
     assert words == (1,)
     assert np.isfinite(Settings().most("ace"))
     assert (Settings().most("ace"), Settings().most("subsets"), Settings(max_sensors=5).most("ace")) == (3, 10, 5)
+
+
+def test_a_search_that_was_stopped_does_not_claim_the_best(crowd: Samples) -> None:
+    settings = Settings(max_sensors=3, seconds=0.0)
+    (choice, _) = selecting.select("subsets", crowd, splits.leave_one_cycle_out(crowd), settings)
+    shown = table(choice, "Best subset")
+    proven = all(row[-2] == "proven" for row in shown.rows)
+    assert shown.caption.endswith("the others cannot be better.") == proven
+    assert proven or any("not proven" in n for n in choice.notes)

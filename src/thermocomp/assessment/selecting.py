@@ -221,7 +221,8 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
             for row, s in enumerate(best)
         ),
         next((row for row, s in enumerate(best) if s.columns == found.selected_), None),
-        f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at; the others cannot be better.",
+        f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at"
+        + ("; the others cannot be better." if found.subsets_.proven else "."),
     )
     notes = _dependence(found.n_effective_, len(candidates.y))
     if found.subsets_.stopped:
