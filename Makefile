@@ -36,7 +36,7 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) $(BENCH) demo docs/_build docs/auto_examples docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis \
+	rm -rf $(VENV) $(BENCH) demo docs/_build docs/auto_examples docs/auto_papers docs/reference/generated .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis \
 		src/thermocomp/models/kernels/__pycache__
 
 $(VENV)/.study: pyproject.toml

@@ -29,8 +29,8 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-# The tutorial's source is read by sphinx-gallery, what comes of it lies in auto_examples.
-exclude_patterns = ["_build", "tutorial"]
+# Sources of the galleries are read by sphinx-gallery, what comes of them lies in auto_examples and auto_papers.
+exclude_patterns = ["_build", "tutorial", "papers"]
 templates_path = ["_templates"]
 
 # `name` in a page or a docstring is a link where it names something of thermocomp, else it is set as code.
@@ -51,8 +51,8 @@ numpydoc_show_class_members = False
 toc_object_entries = False
 
 sphinx_gallery_conf = {
-    "examples_dirs": "tutorial",
-    "gallery_dirs": "auto_examples",
+    "examples_dirs": ["tutorial", "papers"],
+    "gallery_dirs": ["auto_examples", "auto_papers"],
     "filename_pattern": "plot_",
     "abort_on_example_error": True,
     "download_all_examples": False,

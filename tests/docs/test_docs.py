@@ -47,7 +47,7 @@ VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]
 TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
 # Written by Sphinx itself, or not a page.
-_MADE = ("_build", "_templates", "auto_examples", "reference", "tutorial")
+_MADE = ("_build", "_templates", "auto_examples", "auto_papers", "papers", "reference", "tutorial")
 
 
 def _page(name: str) -> str:
@@ -129,7 +129,9 @@ def test_the_mapping_of_the_page_reads_the_real_logs(shared_data: Path) -> None:
         assert recording.table["z"].iloc[0] == 0
 
 
-@pytest.mark.parametrize("example", sorted(DOCS.glob("tutorial/plot_*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "example", sorted([*DOCS.glob("tutorial/plot_*.py"), *DOCS.glob("papers/plot_*.py")]), ids=lambda path: path.stem
+)
 def test_every_example_asserts_a_number(example: Path) -> None:
     asserts = [
         node for node in ast.walk(ast.parse(example.read_text(encoding="utf-8"))) if isinstance(node, ast.Assert)

@@ -9,6 +9,7 @@ from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import commands
+from thermocomp.cli.papers import papers
 from thermocomp.core.exceptions import ThermocompError
 
 app = App(
@@ -28,6 +29,7 @@ for command in (
     commands.fit,
     commands.assess,
     commands.compare,
+    papers,
 ):
     app.command(command)
 

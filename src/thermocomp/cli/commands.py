@@ -51,7 +51,7 @@ def demo(
     output : Path
         Folder for recording, model and report.
     seed : int
-        Of the sensors' noise.
+        Of weather and noise.
     overwrite : bool
         Write over the files of an earlier run.
     json : bool
@@ -90,16 +90,18 @@ def simulate(
     json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Record an experiment on the virtual machine tool.
+    """Record an experiment on a virtual machine.
 
     Parameters
     ----------
     experiment : str
-        chen1996, chen1996-new, chen1996-slope, wessel-fem, hwang, stepwise2017, precompensation, etve, random or demo.
+        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-new, chen1996-slope, demo,
+        etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing, random, stepwise2017,
+        stepwise2017-online, wessel-fem, wessel-milling, wessel-sets, wessel-tool.
     output : Path
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     seed : int
-        Of the sensors' noise.
+        Of weather, noise, and what is drawn by lot.
     noise : float
         Standard deviation of the temperature noise [degC]; the sensor's own if not given.
     overwrite : bool
@@ -114,15 +116,18 @@ def simulate(
     """
     with needs("study"):
         from thermocomp.cli import output as out
-        from thermocomp.datasets.virtual import record
+        from thermocomp.datasets import virtual
         from thermocomp.files import recordings
-    tests = record(experiment, seed=seed, sensor_noise=noise)
+    found = virtual.find(experiment)
+    n_tests = len(found.names)
     paths = (
         [output]
-        if len(tests) == 1
-        else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, len(tests) + 1)]
+        if n_tests == 1
+        else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, n_tests + 1)]
     )
     refuse_existing(paths, overwrite)
+    with _progress(n_tests, json or quiet) as progress:
+        tests = virtual.record(found, seed=seed, sensor_noise=noise, progress=progress)
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)
     if not quiet:

@@ -38,7 +38,7 @@ def show_comparison(
             "cautions": cautions(comparison),
             "results": [_result(a) for a in comparison.assessments],
         }
-        _print_json(content, console)
+        print_json(content, console)
         return
     console.print(f"Judged on: {comparison.protocol.name}")
     console.print(_assessment_table(comparison.assessments))
@@ -82,7 +82,7 @@ def show_choices(
                 for c in choices
             ],
         }
-        _print_json(content, console)
+        print_json(content, console)
         return
     for c in choices:
         for t in c.tables:
@@ -125,7 +125,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
         content = {"protocol": fitted.comparison.protocol.name, "file": str(path), "trouble": trouble, "models": models}
-        _print_json(content, console)
+        print_json(content, console)
         return
     console.print(f"Judged on: {fitted.comparison.protocol.name}")
     table = Table()
@@ -158,7 +158,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "trouble": trouble,
             "results": [_result(a) for a in judged.assessments],
         }
-        _print_json(content, console)
+        print_json(content, console)
         return
     console.print(_assessment_table(judged.assessments))
     console.print(_cycle_table(judged.assessments))
@@ -192,7 +192,7 @@ def show_check(
     """Print what recordings hold and what is wrong with them."""
     if as_json:
         content = [_recording(r, found) for r, found in zip(tests, findings, strict=True)]
-        _print_json({"recordings": content}, console)
+        print_json({"recordings": content}, console)
         return
     for r, found in zip(tests, findings, strict=True):
         hours = (r.time[-1] - r.time[0]) / 3600
@@ -227,7 +227,7 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
     """Print what was recorded on the virtual machine."""
     if as_json:
         content = [{"file": str(p), **_recording(r, ())} for r, p in zip(tests, paths, strict=True)]
-        _print_json({"recordings": content}, console)
+        print_json({"recordings": content}, console)
         return
     for r, p in zip(tests, paths, strict=True):
         hours = (r.time[-1] - r.time[0]) / 3600
@@ -367,7 +367,8 @@ def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def _print_json(content: Any, console: Console) -> None:
+def print_json(content: Any, console: Console) -> None:
+    """Print what a program shall read."""
     # JSON has no nan and no infinity: what is not known is null
     console.file.write(json.dumps(_nulled(content), indent=2, ensure_ascii=False) + "\n")
 

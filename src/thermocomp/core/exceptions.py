@@ -9,6 +9,23 @@ class InputError(ThermocompError):
     """Something handed in cannot be used: a file, a column, an option, a channel name."""
 
 
+class SettingError(InputError, ValueError):
+    """A value of a setting cannot be used.
+
+    It is a `ValueError` too, so that pydantic, which reads settings from files, says where the value stands.
+
+    Parameters
+    ----------
+    message : str
+    path : tuple of str or int
+        Keys and positions that lead to the value from the object that refuses it.
+    """
+
+    def __init__(self, message: str, path: tuple[str | int, ...] = ()) -> None:
+        super().__init__(message)
+        self.path = path
+
+
 class RecordingError(InputError):
     """A recording, or the file it comes from, cannot be used."""
 

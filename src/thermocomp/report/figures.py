@@ -53,7 +53,7 @@ def measured(recording: Recording) -> str:
         rest = list(axes)
         if speed is not None:
             ax = rest.pop(0)
-            ax.plot(*_thinned(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
+            ax.plot(*thinned(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
             ax.set_ylabel("1/min")
             ax.set_title("spindle speed", pad=14)
             for cycle in recording.cycles:
@@ -72,7 +72,7 @@ def measured(recording: Recording) -> str:
             for k, c in enumerate(channels):
                 colour = COLOURS[k % len(COLOURS)]
                 style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-                ax.plot(*_thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=c.name)
+                ax.plot(*thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=c.name)
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
@@ -141,14 +141,14 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             hours = _clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
             ax.plot(
-                *_thinned(hours, block.measured, points),
+                *thinned(hours, block.measured, points),
                 color=MEASURED,
                 lw=1.8,
                 label="measured = without compensation",
             )
-            ax.plot(*_thinned(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
+            ax.plot(*thinned(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
             ax.plot(
-                *_thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
+                *thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
             )
             mark = "" if block.accepted else "  REFUSED"
             ax.set_title(
@@ -213,7 +213,7 @@ def _shade_cycles(ax: Axes, recording: Recording) -> None:
             ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
 
 
-def _thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
+def thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
     """Return at most about `points` points, the extremes of each stretch among them."""
     stretch = len(x) // (points // 2)
     if stretch < 2 or not np.isfinite(y).all():

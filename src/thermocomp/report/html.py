@@ -27,7 +27,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
     -------
     str
     """
-    environment = _environment()
+    pages = environment()
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -42,7 +42,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
             ]
             drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
     stressed = dict.fromkeys(model for model, _ in drawn.values())
-    return environment.get_template("report.html").render(
+    return pages.get_template("report.html").render(
         **summarise(comparison, recordings),
         measured=[figures.measured(r) for r in recordings],
         overview=figures.overview(comparison),
@@ -69,7 +69,7 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
     str
     """
     return (
-        _environment()
+        environment()
         .get_template("selection.html")
         .render(
             version=__version__,
@@ -91,18 +91,19 @@ def write(comparison: Comparison, recordings: Sequence[Recording], path: Path) -
     path.write_text(render(comparison, recordings), encoding="utf-8")
 
 
-def _environment() -> Environment:
-    environment = Environment(
+def environment() -> Environment:
+    """Return what makes the pages: the templates with their filters."""
+    pages = Environment(
         loader=PackageLoader("thermocomp.report"),
         autoescape=select_autoescape(["html"]),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["um"] = _number
-    environment.filters["hours"] = lambda value: f"{value:.1f}"
-    environment.filters["cell"] = written
-    return environment
+    pages.filters["um"] = _number
+    pages.filters["hours"] = lambda value: f"{value:.1f}"
+    pages.filters["cell"] = written
+    return pages
 
 
 def _number(value: float | None) -> str:

@@ -1,19 +1,26 @@
-"""A virtual horizontal machining centre: a thermal network that expands."""
+"""A virtual horizontal machining centre: reduced finite elements, friction, a chiller, joints."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.expansion import Geometry
 from thermocomp.simulation.heat import HeatSources
-from thermocomp.simulation.machine import Air, Drive, Truth
-from thermocomp.simulation.network import Network, Regime
-from thermocomp.simulation.parts import LINKS, NODES
+from thermocomp.simulation.joints import Joints, play
+from thermocomp.simulation.machine import Air, Drive, Truth, stretches
+from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
+
+#: places that friction and thermostat look at after every step
+_WATCHED = ("front_bearing", "rear_bearing", "shaft", "front_seat", "coolant", "bed_front")
+#: inputs that depend on them
+_FRICTION = ("front_bearing", "rear_bearing", "coolant")
+_COLUMN = ("column_front_right", "column_front_left", "column_rear_right", "column_rear_left")
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,58 +29,70 @@ class CentreState:
 
     Parameters
     ----------
-    temperatures : ndarray of shape (n_nodes,)
-        [degC]
+    field : ndarray of shape (n_states,)
+        Of the reduced model.
     chilling : bool
         The chiller runs.
     slid : float
         How far the column's foot has slid on the bed [um].
     """
 
-    temperatures: FloatArray
+    field: FloatArray
     chilling: bool
     slid: float
 
 
 @dataclass(frozen=True, eq=False)
 class MachiningCentre:
-    """The virtual machine tool of `thermocomp.simulation.parts` (X-01); fills `VirtualMachine`.
+    """The virtual machine tool (X-01); fills `thermocomp.simulation.machine.VirtualMachine`.
 
-    Time constants from half a minute (bearings) over minutes (shaft) to half a day (bed); heat that is nonlinear in
-    speed and temperature; hysteresis by the chiller's thermostat and by friction under the column.
+    Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
+    headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants
+    from half a minute (bearings) to half a day (bed); heat that is nonlinear in speed and temperature; hysteresis by
+    the chiller's thermostat and by friction under the column.
 
     Parameters
     ----------
-    network : Network
+    model : ReducedModel
+        Of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
     heat : HeatSources
-    geometry : Geometry
+    joints : Joints
     longest_step : float
-        Heat and thermostat are looked at this often [s].
+        Friction and thermostat are looked at this often [s].
     """
 
-    network: Network = field(default_factory=lambda: Network(NODES, LINKS))
+    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("centre"))
     heat: HeatSources = field(default_factory=HeatSources)
-    geometry: Geometry = field(default_factory=Geometry)
+    joints: Joints = field(default_factory=Joints)
     longest_step: float = 20.0
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of the nodes."""
-        return self.network.names
+        """Names of the places whose temperatures are known."""
+        return self.model.places
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of the displacements and angles."""
+        return self.model.observables
 
     def init(self, air: Air) -> CentreState:
         """Return the state of a machine that was switched off for long, in this air."""
-        temperatures = self.network.steady(np.zeros(len(self.places)), self._air(air), Regime())
-        return CentreState(temperatures, chilling=False, slid=self.geometry.wish(temperatures, self.network.index))
+        rest = Drive(powered=False)
+        state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, self._theta(rest))
+        wish = self._observable("slide") @ (state - REFERENCE_TEMPERATURE * self.model.one)
+        return CentreState(state, chilling=False, slid=float(wish))
 
-    def step(self, state: CentreState, drive: Drive, dt: float) -> tuple[CentreState, Truth]:
-        """Advance by `dt`, in equal steps no longer than `longest_step`.
+    def run(self, state: CentreState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[CentreState, Truth]:
+        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
 
         Parameters
         ----------
         state : CentreState
-        drive : Drive
-            Holds during the whole of `dt`.
+        drives : sequence of Drive
+            Each holds during the whole of its step.
+        air : ndarray of shape (n_steps, 3)
+            `Air.values` of each step.
         dt : float
             [s]
 
@@ -85,40 +104,94 @@ class MachiningCentre:
         Raises
         ------
         InputError
-            `dt` is not positive, or the speed is beyond the top speed.
+            `dt` is not positive, a speed is beyond the top speed, or a load is put in where there is no place for it.
         """
         if not (dt > 0 and math.isfinite(dt)):
             raise InputError(f"step of {dt} s: must be positive")
-        if not abs(drive.speed) <= self.heat.top_speed:
-            raise InputError(f"spindle speed {drive.speed} 1/min is beyond the machine's {self.heat.top_speed:g} 1/min")
-        index = self.network.index
-        regime = Regime(self.heat.rotation(drive.speed), drive.cooled and drive.powered)
-        air = self._air(drive.air)
-        temperatures, chilling, slid = state.temperatures, state.chilling, state.slid
-        n_steps = math.ceil(dt / self.longest_step)
-        for _ in range(n_steps):
-            temperatures, chilling = self._advance(temperatures, chilling, drive, air, regime, dt / n_steps)
-            slid = self.geometry.slide(slid, self.geometry.wish(temperatures, index))
-        ratio = abs(drive.speed) / self.heat.top_speed
-        return CentreState(temperatures, chilling, slid), self.geometry.truth(temperatures, index, ratio, slid)
+        parts = math.ceil(dt / self.longest_step)
+        fields = np.empty((len(drives) * parts, len(self.model.one)))
+        ratio = np.empty(len(drives))
+        current, chilling = state.field, state.chilling
+        for first, last in stretches(drives):
+            drive = drives[first]
+            ratio[first:last] = abs(drive.speed) / self.heat.top_speed
+            rows = slice(first * parts, last * parts)
+            stretch = np.repeat(air[first:last], parts, axis=0)
+            chilling = self._advance(current, chilling, drive, stretch, dt / parts, fields[rows])
+            current = fields[rows.stop - 1]
+        truth, slid = self._truth(fields, np.repeat(ratio, parts), state.slid)
+        ends = slice(parts - 1, None, parts)
+        return CentreState(current, chilling, slid), Truth(truth.temperatures[ends], truth.observables[ends])
 
     def _advance(
-        self, before: FloatArray, chilling: bool, drive: Drive, air: FloatArray, regime: Regime, dt: float
-    ) -> tuple[FloatArray, bool]:
-        """Return temperatures and whether the chiller runs after a step in which it switches once at most."""
-        index, network, heat = self.network.index, self.network, self.heat
-        chilling = chilling and regime.flow
-        after = network.advance(before, heat.power(before, index, drive, chilling), air, regime, dt)
-        if not regime.flow:
-            return after, False
-        coolant, bed = index["coolant"], index["bed_front"]
-        share = heat.until_switch(chilling, before[coolant] - before[bed], after[coolant] - after[bed])
-        if share == 1.0:
-            return after, chilling
-        # The chiller runs a part of the step: without it the times of switching, and the step's length, would matter.
-        duty = share if chilling else 1.0 - share
-        return network.advance(before, heat.power(before, index, drive, duty), air, regime, dt), not chilling
+        self, now: FloatArray, chilling: bool, drive: Drive, air: FloatArray, dt: float, fields: FloatArray
+    ) -> bool:
+        """Fill in the fields after each step of one drive; return whether the chiller runs at the end."""
+        self._check(drive)
+        heat, ratio = self.heat, abs(drive.speed) / self.heat.top_speed
+        operators = self.model.operators(self._theta(drive), dt, _WATCHED)
+        flow = drive.cooled and drive.powered
+        forcing = air @ operators.air.T + operators.heat @ self._given(drive)
+        variable = operators.heat[:, [self.model.inputs.index(n) for n in _FRICTION]]
+        front, rear, shaft, seat, coolant, bed = (self.model.rows(_WATCHED) @ now).tolist()
+        n = len(now)
+        power = np.zeros(len(_FRICTION))
+        turning = ratio > 0 and drive.powered
+        for k in range(len(fields)):
+            if turning:
+                tightening = shaft - seat
+                power[0] = heat.front.heat(ratio, front, tightening)
+                power[1] = heat.rear.heat(ratio, rear, tightening)
+            power[2] = -heat.chiller if flow and chilling else 0.0
+            after = operators.state @ now
+            after += forcing[k]
+            after += variable @ power
+            if flow:
+                end = after[n:].tolist()
+                share = heat.until_switch(chilling, coolant - bed, end[4] - end[5])
+                if share < 1.0:
+                    # The chiller runs a part of the step: without it the times of switching, and the step's length,
+                    # would matter.
+                    change = heat.chiller * (1.0 - share)
+                    after += variable[:, 2] * (change if chilling else -change)
+                    chilling = not chilling
+            front, rear, shaft, seat, coolant, bed = after[n:].tolist()
+            fields[k] = now = after[:n]
+        return chilling and flow
 
-    def _air(self, air: Air) -> FloatArray:
-        rise = air.stratification * (self.network.height - Air.REFERENCE_HEIGHT) + air.side * self.network.side
-        return air.temperature + rise
+    def _truth(self, fields: FloatArray, ratio: FloatArray, slid: float) -> tuple[Truth, float]:
+        temperatures = fields @ self.model.temperature.T
+        observables = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
+        place = dict(zip(self.places, temperatures.T, strict=True))
+        index = {name: k for k, name in enumerate(self.observables)}
+        slide = play(slid, observables[:, index["slide"]], self.joints.stiction)
+        shaft = self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
+        head = 0.6 * place["headstock_front"] + 0.4 * place["headstock_rear"]
+        column = np.mean([place[c] for c in _COLUMN], axis=0)
+        observables[:, index["z"]] += slide - shaft
+        observables[:, index["y"]] += self.joints.headstock(head - column, ratio)
+        observables[:, [index["nose"], index["tip"]]] += shaft[:, None]
+        observables[:, index["slide"]] = slide
+        return Truth(temperatures, observables), float(slide[-1])
+
+    def _theta(self, drive: Drive) -> tuple[float, ...]:
+        """Return what decides the conductances, in steps of a 64th: nobody knows them better."""
+        shares = {"rotation": self.heat.rotation(drive.speed), "flow": float(drive.cooled and drive.powered)}
+        shares |= {f"feed_{a}": self.heat.moving(f) for a, f in zip("xyz", drive.feed, strict=True)}
+        return tuple(round(64.0 * shares[name]) / 64.0 for name in self.model.theta)
+
+    def _given(self, drive: Drive) -> FloatArray:
+        given = self.heat.given(drive)
+        return np.array([given.get(name, 0.0) for name in self.model.inputs])
+
+    def _check(self, drive: Drive) -> None:
+        if not abs(drive.speed) <= self.heat.top_speed:
+            raise InputError(f"spindle speed {drive.speed} 1/min is beyond the machine's {self.heat.top_speed:g} 1/min")
+        for place in drive.loads:
+            if place not in self.model.inputs:
+                near = get_close_matches(place, self.model.inputs, n=3, cutoff=0.4) or self.model.inputs
+                raise InputError(f"no heat can be put in at {place!r}; the nearest are {', '.join(near)}")
+
+    def _observable(self, name: str) -> FloatArray:
+        row: FloatArray = self.model.observable[self.observables.index(name)]
+        return row

@@ -1,10 +1,9 @@
-"""The tests of the papers, and others, run on the virtual machine tool (X-01)."""
+"""Tests run on the virtual machines (X-01): from a protocol and a seed to what the instruments said."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +11,22 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.centre import MachiningCentre
-from thermocomp.simulation.instruments import PROBES, displacement, felt, temperature
-from thermocomp.simulation.machine import Air, Drive, Truth, VirtualMachine
-from thermocomp.simulation.programmes import EXPERIMENTS, Programme, Segment
-from thermocomp.simulation.sensors import Fault, Sensor, measure, with_faults
+from thermocomp.simulation.instruments import Instrument
+from thermocomp.simulation.kits import Kit, unknown
+from thermocomp.simulation.machine import Truth, VirtualMachine
+from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Programme, stream
+from thermocomp.simulation.sensors import Fault, follow, read, with_faults
+from thermocomp.simulation.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
 S = TypeVar("S")
 
-__all__ = ["EXPERIMENTS", "SimulatedTest", "run", "simulate"]
-
 #: the machine is asked at least this often [s]
 LONGEST_TICK = 20.0
+#: ticks that are worked on at once: what is between machine and recording takes no more memory than these
+BLOCK = 4096
+#: by the names that protocols use
+MACHINES: dict[str, Callable[[], VirtualMachine[Any]]] = {"centre": MachiningCentre, "tool": RestingTool}
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,8 @@ class SimulatedTest:
     time : ndarray of shape (n_rows,)
         [s], from 0
     channels : tuple of Channel
-        Temperatures [degC], displacements [um], spindle speed [1/min], feed [mm/min] where the axes move.
+        Temperatures [degC]; displacements [um]; spindle speed [1/min], if there is a spindle; feed [mm/min], where axes
+        move.
     values : ndarray of shape (n_rows, n_channels)
         What sensors and probes said; displacements are zero at the start but for the probes' noise.
     truth : ndarray of shape (n_rows, n_displacements)
@@ -56,48 +60,47 @@ class SimulatedTest:
 
 
 def simulate(
-    experiment: str, *, seed: int = 0, sensor_noise: float | None = None, faults: Sequence[Fault] = ()
-) -> list[SimulatedTest]:
-    """Run an experiment on the virtual machining centre.
+    experiment: Experiment, *, seed: int = 0, sensor_noise: float | None = None, faults: Sequence[Fault] = ()
+) -> Iterator[SimulatedTest]:
+    """Run the tests of an experiment, one after the other.
 
     Parameters
     ----------
-    experiment : str
-        A key of `EXPERIMENTS`.
+    experiment : Experiment
     seed : int
         Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC] (C-33: 0.4); the sensors' own if not given. The truth does
         not depend on it.
     faults : sequence of Fault
-        Befall every test.
+        Befall every test, beside those of the protocol.
 
     Returns
     -------
-    list of SimulatedTest
+    iterator of SimulatedTest
+        Each test is run when it is asked for; none depends on the others.
 
     Raises
     ------
     InputError
-        The experiment or a fault's channel is unknown, or seed or noise are negative.
+        A fault's channel is unknown, or seed or noise are negative.
     """
-    if experiment not in EXPERIMENTS:
-        near = get_close_matches(experiment, EXPERIMENTS, n=3, cutoff=0.4) or list(EXPERIMENTS)
-        raise InputError(f"unknown experiment {experiment!r}; the nearest are {', '.join(near)}")
     if seed < 0:
         raise InputError(f"seed {seed}: must not be negative")
     if sensor_noise is not None and not (sensor_noise >= 0 and np.isfinite(sensor_noise)):
         raise InputError(f"sensor noise {sensor_noise} degC: must be finite and not negative")
-    machine = MachiningCentre()
-    tests = []
-    for number, programme in enumerate(EXPERIMENTS[experiment].programmes(np.random.default_rng([seed, 0])), start=1):
-        weather, noise = (np.random.default_rng([seed, number, stream]) for stream in (1, 2))
-        tests.append(run(machine, programme, weather, noise, sensor_noise=sensor_noise, faults=faults))
-    return tests
+    machine = MACHINES[experiment.machine]()
+
+    def test(programme: Programme) -> SimulatedTest:
+        weather, noise = (np.random.default_rng(stream(seed, programme.name, what)) for what in ("weather", "noise"))
+        return run(machine, experiment.kit, programme, weather, noise, sensor_noise=sensor_noise, faults=faults)
+
+    return map(test, experiment.programmes(seed))
 
 
 def run(
     machine: VirtualMachine[S],
+    kit: Kit,
     programme: Programme,
     weather: np.random.Generator,
     noise: np.random.Generator,
@@ -110,6 +113,8 @@ def run(
     Parameters
     ----------
     machine : VirtualMachine
+    kit : Kit
+        What is mounted on it.
     programme : Programme
         What is done and what is recorded.
     weather, noise : numpy.random.Generator
@@ -117,6 +122,7 @@ def run(
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of Fault
+        Beside those of the programme.
 
     Returns
     -------
@@ -125,66 +131,96 @@ def run(
     Raises
     ------
     InputError
-        A segment does not last a whole number of samplings.
+        A place, a probe, or the channel of a fault is not there, or the machine refuses what it is asked to do.
     """
+    instruments = programme.instruments(kit, sensor_noise)
+    sensors = [i.sensor for i in instruments]
+    weights = _weights(machine, instruments)
+    moves = np.array([s.channel.quantity == "displacement" for s in sensors])
+    lags = np.array([s.lag for s in sensors])
+    channels, driven = _driven(programme, kit)
+    time: FloatArray = programme.sampling * np.arange(len(driven), dtype=np.float64)
     every = math.ceil(programme.sampling / LONGEST_TICK)
     tick = programme.sampling / every
-    drives = _drives(programme, tick)
-    lead = round(programme.soak / tick)
-    airs = programme.climate.air(tick * np.arange(-lead, len(drives) + 1, dtype=np.float64), weather)
-    state = machine.init(programme.climate.middle)
-    for air in airs[: lead + 1]:
-        state, truth = machine.step(state, Drive(air, cooled=programme.cooled), tick)
-    truths = [truth]
-    for air, segment in zip(airs[lead + 1 :], drives, strict=True):
-        state, truth = machine.step(state, Drive(air, segment.speed, segment.feed, programme.cooled), tick)
-        truths.append(truth)
+    drives = [s.drive for s in programme.segments for _ in range(round(s.duration / tick))]
 
-    true, sensors = _true_values(machine, programme, truths, airs[lead:], sensor_noise)
-    values = measure(sensors, true, tick, every, noise)
-    time: FloatArray = programme.sampling * np.arange(len(values), dtype=np.float64)
-    # A row tells the speed that led to it.
-    in_force = [Segment(0.0), *drives][::every]
-    channels = [s.channel for s in sensors]
-    columns = [values, np.array([[s.speed] for s in in_force])]
-    channels.append(Channel("spindle_rpm", "spindle_speed", "1/min", "spindle"))
-    if any(s.feed != (0.0, 0.0, 0.0) for s in drives):
-        columns.append(np.array([[math.hypot(*s.feed)] for s in in_force]))
-        channels.append(Channel("feed_mm_min", "feed", "mm/min", "of the axes, along the path"))
-    recorded = with_faults(time, channels, np.hstack(columns), faults)
-    return SimulatedTest(programme.name, time, tuple(channels), recorded, true[::every, len(programme.places) :])
+    state, sky, true = _soaked(machine, programme, weights, weather)
+    shift = np.array([i.cold for i in instruments]) - np.where(moves, true, 0.0)
+    recorded = np.empty((len(time), len(sensors) + len(channels)))
+    recorded[:, len(sensors) :] = driven
+    truth = np.empty((len(time), int(moves.sum())))
+    # Sensors have long felt what is true when the test begins.
+    felt = true
+    recorded[0, : len(sensors)] = read(sensors, (felt + shift)[None], time[:1], noise)
+    truth[0] = (true + shift)[moves]
+    block = max(BLOCK // every, 1) * every
+    for first in range(0, len(drives), block):
+        part = drives[first : first + block]
+        sky, air = programme.climate.air(sky, first * tick, tick, len(part), weather)
+        state, done = machine.run(state, part, air, tick)
+        values = _values(done, air, weights)
+        followed = follow(lags, felt, true, values, tick)
+        felt, true = followed[-1], values[-1]
+        rows = slice(1 + first // every, 1 + (first + len(part)) // every)
+        recorded[rows, : len(sensors)] = read(sensors, followed[every - 1 :: every] + shift, time[rows], noise)
+        truth[rows] = (values[every - 1 :: every] + shift)[:, moves]
 
-
-def _drives(programme: Programme, tick: float) -> list[Segment]:
-    """Return the segment in force during each tick."""
-    drives = []
-    for segment in programme.segments:
-        rows = segment.duration / programme.sampling
-        if abs(rows - round(rows)) > 1e-9 or rows < 1:
-            raise InputError(
-                f"{programme.name}: a segment of {segment.duration} s is no multiple of the {programme.sampling} s "
-                "between two rows"
-            )
-        drives += [segment] * round(segment.duration / tick)
-    return drives
+    if programme.touch:
+        idle = ~programme.touch.rows(time, driven[:, 0] == 0.0)
+        recorded[np.ix_(idle, np.flatnonzero([i.touches for i in instruments]))] = np.nan
+    channels = [*(s.channel for s in sensors), *channels]
+    if programme.faults or faults:
+        recorded = with_faults(time, channels, recorded, [*programme.faults, *faults])
+    return SimulatedTest(programme.name, time, tuple(channels), recorded, truth)
 
 
-def _true_values(
-    machine: VirtualMachine[S],
-    programme: Programme,
-    truths: Sequence[Truth],
-    airs: Sequence[Air],
-    sensor_noise: float | None,
-) -> tuple[FloatArray, list[Sensor]]:
-    """Return what is true at each sensor at each tick, and the sensors."""
-    perfect = programme.perfect
-    sensors = [temperature(p, perfect=perfect, noise=sensor_noise) for p in programme.places]
-    sensors += [displacement(p, perfect=perfect) for p in programme.probes]
-    true = np.empty((len(truths), len(sensors)))
-    temperatures = np.array([t.temperatures for t in truths])
-    for k, place in enumerate(programme.places):
-        true[:, k] = felt(place, machine.places, temperatures, airs, perfect=perfect)
-    for k, probe in enumerate(programme.probes, start=len(programme.places)):
-        reads = [PROBES[probe].reads(t) for t in truths]
-        true[:, k] = np.array(reads) - reads[0] + PROBES[probe].cold
-    return true, sensors
+def _soaked(
+    machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
+) -> tuple[S, FloatArray, FloatArray]:
+    """Return the state in which a test begins, that of the weather, and what is true at each instrument."""
+    climate = programme.climate
+    state, sky = machine.init(climate.middle), climate.init(weather)
+    begin = -sum(s.duration for s in programme.soak)
+    values = np.empty((1, weights.shape[1]))
+    for segment in programme.soak:
+        n_ticks = math.ceil(segment.duration / LONGEST_TICK)
+        tick = segment.duration / n_ticks
+        for first in range(0, n_ticks, BLOCK):
+            n = min(BLOCK, n_ticks - first)
+            sky, air = climate.air(sky, begin + first * tick, tick, n, weather)
+            state, truth = machine.run(state, [segment.drive] * n, air, tick)
+            values = _values(truth, air, weights)
+        begin += segment.duration
+    return state, sky, values[-1]
+
+
+def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> FloatArray:
+    """Return what each instrument reads of temperatures, observables and air, of shape (n_values, n_instruments)."""
+    names = {n: k for k, n in enumerate([*machine.places, *machine.observables])}
+    weights = np.zeros((len(names) + 3, len(instruments)))
+    for k, instrument in enumerate(instruments):
+        for name, weight in instrument.reads.items():
+            if name not in names:
+                raise unknown("value", name, names)
+            weights[names[name], k] = weight
+        weights[-3:, k] = instrument.air
+    return weights
+
+
+def _values(truth: Truth, air: FloatArray, weights: FloatArray) -> FloatArray:
+    values: FloatArray = np.hstack([truth.temperatures, truth.observables, air]) @ weights
+    return values
+
+
+def _driven(programme: Programme, kit: Kit) -> tuple[list[Channel], FloatArray]:
+    """Return what is recorded of the drive; a row tells the one that led to it."""
+    segments = programme.segments
+    lengths = [1, *(round(s.duration / programme.sampling) for s in segments)]
+    channels, columns = [], []
+    if kit.top_speed:
+        channels.append(SPEED)
+        columns.append([0.0, *(s.drive.speed for s in segments)])
+    if any(any(s.drive.feed) for s in segments):
+        channels.append(FEED)
+        columns.append([0.0, *(math.hypot(*s.drive.feed) for s in segments)])
+    return channels, np.repeat(np.array(columns).reshape(len(columns), len(lengths)).T, lengths, axis=0)

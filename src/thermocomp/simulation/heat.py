@@ -1,15 +1,16 @@
 """Where the heat of the virtual machining centre comes from; plausible engineering values, not a certain machine's."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermocomp.simulation.machine import Drive
+from thermocomp.simulation.machine import AXES, Drive
 
-FloatArray = NDArray[np.float64]
+#: travel of the axes, from 0 [mm]
+TRAVEL = {"x": 600.0, "y": 550.0, "z": 600.0}
+#: hat functions along each screw that take the heat of its nut
+N_HATS = 7
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,13 @@ class HeatSources:
     hold : float
         Motor of the vertical axis Y, which holds the headstock [W].
     cabinet, cabinet_share : float
-        From the electric cabinet on the column's rear right: always [W], and per watt of spindle loss.
+        From the electric cabinet on the column's rear right: always [W], and per watt of motor loss.
+    rotor_share : float
+        Of the motor's loss that arises in the rotor; the rest in the stator.
+    screw_share : float
+        Of the nut's friction that goes into the screw.
+    top_feed : float
+        Feed rate at which a screw has all its extra convection [mm/min].
     hydraulics : float
         From the hydraulic unit at the bed's rear [W].
     pump : float
@@ -77,6 +84,9 @@ class HeatSources:
     hold: float = 12.0
     cabinet: float = 12.0
     cabinet_share: float = 0.04
+    rotor_share: float = 0.35
+    screw_share: float = 0.5
+    top_feed: float = 10_000.0
     hydraulics: float = 25.0
     pump: float = 160.0
     chiller: float = 1500.0
@@ -87,44 +97,31 @@ class HeatSources:
         """Share of the rotating parts' extra convection in force at a speed [1/min]: turbulent, with n^0.7."""
         return float((abs(speed) / self.top_speed) ** 0.7)
 
-    def power(self, temperatures: FloatArray, index: Mapping[str, int], drive: Drive, chilling: float) -> FloatArray:
-        """Return the heat put into each node.
+    def moving(self, feed: float) -> float:
+        """Share of a turning screw's extra convection in force at a feed rate [mm/min], in the same way."""
+        return float(min(abs(feed) / self.top_feed, 1.0) ** 0.7)
 
-        Parameters
-        ----------
-        temperatures : ndarray of shape (n_nodes,)
-            [degC]
-        index : mapping of str to int
-            Of each node, by name.
-        drive : Drive
-        chilling : float
-            Share of the time that the chiller runs.
-
-        Returns
-        -------
-        ndarray of shape (n_nodes,)
-            [W]
-        """
-        power = np.zeros(len(temperatures))
+    def given(self, drive: Drive) -> dict[str, float]:
+        """Return the heat put in at each named place that does not depend on temperatures [W]."""
         if not drive.powered:
-            return power
+            return {}
         ratio = abs(drive.speed) / self.top_speed
-        loss = 0.0
-        if ratio > 0:
-            tightening = float(temperatures[index["shaft"]] - temperatures[index["housing"]])
-            for name, bearing in (("front_bearing", self.front), ("rear_bearing", self.rear)):
-                power[index[name]] = bearing.heat(ratio, float(temperatures[index[name]]), tightening)
-            power[index["motor"]] = self.motor_on + self.motor_top * ratio**2
-            loss = float(power.sum())
-        for axis, feed in zip("xyz", drive.feed, strict=True):
-            power[index[f"{axis}_nut"]] = self.drive_nut * abs(feed) / 1000.0
-            power[index[f"{axis}_bearing"]] = self.drive_bearing * abs(feed) / 1000.0
-        power[index["y_bearing"]] += self.hold
-        power[index["column_rear_right"]] = self.cabinet + self.cabinet_share * loss
-        power[index["bed_rear"]] = self.hydraulics
+        motor = self.motor_on + self.motor_top * ratio**2 if ratio > 0 else 0.0
+        heat = {"rotor": self.rotor_share * motor, "stator": (1.0 - self.rotor_share) * motor}
+        heat["cabinet"] = self.cabinet + self.cabinet_share * motor
+        heat["hydraulics"] = self.hydraulics
+        for axis, feed, stroke in zip(AXES, drive.feed, drive.stroke, strict=True):
+            nut = self.drive_nut * abs(feed) / 1000.0
+            heat[f"{axis}_nut"] = (1.0 - self.screw_share) * nut
+            heat[f"{axis}_bearing"] = self.drive_bearing * abs(feed) / 1000.0
+            shares = swept(stroke or (0.0, TRAVEL[axis]), TRAVEL[axis])
+            heat |= {f"{axis}_screw_{k}": self.screw_share * nut * share for k, share in enumerate(shares)}
+        heat["y_bearing"] += self.hold
         if drive.cooled:
-            power[index["coolant"]] = self.pump - self.chiller * chilling
-        return power
+            heat["coolant"] = self.pump
+        for place, load in drive.loads.items():
+            heat[place] = heat.get(place, 0.0) + load
+        return heat
 
     def until_switch(self, chilling: bool, before: float, after: float) -> float:
         """Return the share of a step before the thermostat switches; 1 if it does not.
@@ -140,3 +137,27 @@ class HeatSources:
         if (after > limit) == chilling:
             return 1.0
         return min(max((limit - before) / (after - before), 0.0), 1.0) if after != before else 0.0
+
+
+def swept(stroke: tuple[float, float], travel: float) -> list[float]:
+    """Return how an even movement over a stroke spreads over the hat functions along a travel.
+
+    Parameters
+    ----------
+    stroke : tuple of float
+        From where to where [mm]; a movement on the spot has both alike.
+    travel : float
+        [mm], from 0
+
+    Returns
+    -------
+    list of float
+        One share per hat function, their sum is 1.
+    """
+    knots = np.linspace(0.0, travel, N_HATS)
+    low, high = (min(max(p, 0.0), travel) for p in sorted(stroke))
+    # Exact for piecewise linear hats where every knot within the stroke is a node of the trapezoidal rule.
+    nodes = np.unique([low, high, *knots[(knots > low) & (knots < high)]])
+    hats = np.maximum(0.0, 1.0 - np.abs(nodes[:, None] - knots) / (knots[1] - knots[0]))
+    shares = np.trapezoid(hats, nodes, axis=0) / (high - low) if len(nodes) > 1 else hats[0]
+    return [float(s) for s in shares]

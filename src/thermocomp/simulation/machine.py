@@ -1,19 +1,21 @@
 """The interface of a virtual machine tool: state in, state out.
 
-A machine with a handful of lumped capacities (`thermocomp.simulation.centre`) fills it, and a reduced finite-element
-model can: both are asked the same and answer the same.
+Reduced finite-element models fill it (`thermocomp.simulation.centre`, `thermocomp.simulation.toolsystem`): they are
+asked the same and answer the same.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.correction import Deviation
-
 FloatArray = NDArray[np.float64]
 S = TypeVar("S")
+
+#: names of the linear axes, in the order of `Drive.feed`
+AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class Air:
         """Temperature [degC] at a height above the floor [m] and a distance to the right of the middle [m]."""
         return self.temperature + self.stratification * (height - self.REFERENCE_HEIGHT) + self.side * side
 
+    @property
+    def values(self) -> FloatArray:
+        """Temperature, stratification, side: a row of what `VirtualMachine.run` takes."""
+        return np.array([self.temperature, self.stratification, self.side])
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -48,45 +55,44 @@ class Drive:
 
     Parameters
     ----------
-    air : Air
     speed : float
         Spindle speed [1/min].
     feed : tuple of float
         Mean feed rates of X, Y, Z [mm/min].
+    stroke : tuple of (tuple of float or None)
+        From where to where X, Y and Z move [mm]; None: over the whole travel.
+    loads : mapping of str to float
+        Further heat put in at a named place, such as that of cutting [W].
     cooled : bool
         The coolant loop runs.
     powered : bool
         The machine is switched on; if not there is no heat at all, and no coolant loop.
     """
 
-    air: Air
     speed: float = 0.0
     feed: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stroke: tuple[tuple[float, float] | None, tuple[float, float] | None, tuple[float, float] | None] = (None,) * 3
+    loads: Mapping[str, float] = field(default_factory=dict)
     cooled: bool = True
     powered: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What the machine really does, before any sensor.
+    """What the machine really does, before any sensor: one row per step.
 
     Parameters
     ----------
-    temperatures : ndarray of shape (n_places,)
+    temperatures : ndarray of shape (n_steps, n_places)
         In the order of `VirtualMachine.places` [degC].
-    x, y, z : Deviation
-        Tool point against the workpiece, actual minus commanded, in machine coordinates (ISO 841): a spindle that
-        grows towards the workpiece has a negative z. Offset [um], slope along the axis [um/m].
-    tilt_a, tilt_b : float
-        Rotation of the spindle axis about X and Y [urad] (A0C, B0C; C-01).
+    observables : ndarray of shape (n_steps, n_observables)
+        In the order of `VirtualMachine.observables` [um], angles [urad]. Of the tool point against the workpiece,
+        actual minus commanded, in machine coordinates (ISO 841): a spindle that grows towards the workpiece has a
+        negative z.
     """
 
     temperatures: FloatArray
-    x: Deviation
-    y: Deviation
-    z: Deviation
-    tilt_a: float
-    tilt_b: float
+    observables: FloatArray
 
 
 class VirtualMachine(Protocol[S]):
@@ -97,10 +103,35 @@ class VirtualMachine(Protocol[S]):
         """Where temperatures are known, as names."""
         ...
 
-    def init(self, air: Air) -> S:
-        """Return the state of a machine that has long been at rest in this air."""
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """What deviates, as names."""
         ...
 
-    def step(self, state: S, drive: Drive, dt: float) -> tuple[S, Truth]:
-        """Return the state after `dt` [s] of `drive`, and what is true then."""
+    def init(self, air: Air) -> S:
+        """Return the state of a machine that was switched off for long, in this air."""
         ...
+
+    def run(self, state: S, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[S, Truth]:
+        """Return the state after `n_steps` steps of `dt`, and what was true at the end of each.
+
+        Parameters
+        ----------
+        state : S
+        drives : sequence of Drive
+            One per step.
+        air : ndarray of shape (n_steps, 3)
+            `Air.values` of each step.
+        dt : float
+            [s]
+        """
+        ...
+
+
+def stretches(drives: Sequence[Drive]) -> Iterator[tuple[int, int]]:
+    """Yield where each stretch of one and the same drive begins and ends."""
+    first = 0
+    for k in range(1, len(drives) + 1):
+        if k == len(drives) or (drives[k] is not drives[first] and drives[k] != drives[first]):
+            yield first, k
+            first = k

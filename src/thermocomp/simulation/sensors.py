@@ -9,8 +9,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.machine import Channel
+from thermocomp.simulation.climate import DAY, remember
 
 FloatArray = NDArray[np.float64]
 FaultKind = Literal["stuck", "lost", "drift", "spike"]
@@ -31,6 +32,8 @@ class Sensor:
         Step of the reading, in the channel's unit; 0 for none.
     bias : float
         In the channel's unit.
+    drift : float
+        Of the zero, in the channel's unit per day.
     """
 
     channel: Channel
@@ -38,43 +41,62 @@ class Sensor:
     lag: float = 0.0
     resolution: float = 0.0
     bias: float = 0.0
+    drift: float = 0.0
 
 
-def measure(sensors: Sequence[Sensor], true: FloatArray, dt: float, every: int, rng: np.random.Generator) -> FloatArray:
-    """Return what the sensors say.
+def follow(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
+    """Return what sensors feel that lag behind the truth.
+
+    Parameters
+    ----------
+    lags : ndarray of shape (n_sensors,)
+        Time constants [s]; 0: no lag.
+    felt, before : ndarray of shape (n_sensors,)
+        What they felt, and what was true, before the first step.
+    true : ndarray of shape (n_steps, n_sensors)
+        At the end of each step.
+    dt : float
+        [s]
+
+    Returns
+    -------
+    ndarray of shape (n_steps, n_sensors)
+        Exact for a truth that changes linearly in every step.
+    """
+    slow = lags > 0
+    said = true.copy()
+    if slow.any():
+        keep = np.exp(-dt / lags[slow])
+        new = 1.0 - lags[slow] / dt * (1.0 - keep)
+        now = true[:, slow]
+        past = np.vstack([before[slow], now[:-1]])
+        said[:, slow] = remember(keep, new * now + (1.0 - keep - new) * past, felt[slow])
+    return said
+
+
+def read(sensors: Sequence[Sensor], felt: FloatArray, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return what the sensors say: what they feel with bias, drift of the zero, noise, and in steps.
 
     Parameters
     ----------
     sensors : sequence of Sensor
-    true : ndarray of shape (n_ticks, n_sensors)
-        In house units; the sensors rest at its first row before it begins.
-    dt : float
-        Time between two rows of `true` [s].
-    every : int
-        One reading is taken every so many ticks, from the first.
+    felt : ndarray of shape (n_rows, n_sensors)
+        From `follow`, in house units.
+    time : ndarray of shape (n_rows,)
+        [s]
     rng : Generator
         Of the noise.
 
     Returns
     -------
-    ndarray of shape (n_readings, n_sensors)
+    ndarray of shape (n_rows, n_sensors)
     """
-    keep = np.array([math.exp(-dt / s.lag) if s.lag > 0 else 0.0 for s in sensors])
-    # Exact for a truth that changes linearly between two ticks.
-    lag = np.array([s.lag for s in sensors])
-    new = 1.0 - lag / dt * (1.0 - keep)
-    old = 1.0 - keep - new
-    readings = np.empty(true[::every].shape)
-    felt = true[0]
-    readings[0] = felt
-    for k in range(1, len(true)):
-        felt = keep * felt + new * true[k] + old * true[k - 1]
-        if k % every == 0:
-            readings[k // every] = felt
-    noise = np.array([s.noise for s in sensors])
-    readings += np.array([s.bias for s in sensors]) + noise * rng.standard_normal(readings.shape)
-    steps = np.array([s.resolution if s.resolution > 0 else np.nan for s in sensors])
-    return np.where(np.isnan(steps), readings, np.round(readings / steps) * steps)
+    noise, bias, drift, steps = np.array([(s.noise, s.bias, s.drift, s.resolution) for s in sensors]).T
+    said: FloatArray = felt + bias + np.outer(time / DAY, drift) + noise * rng.standard_normal(felt.shape)
+    stepped = steps > 0
+    # The second rounding takes away the last binary digit, that 21.9 is not written as 21.900000000000002.
+    said[:, stepped] = np.round(np.round(said[:, stepped] / steps[stepped]) * steps[stepped], 9)
+    return said
 
 
 @dataclass(frozen=True)
@@ -103,11 +125,11 @@ class Fault:
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(FaultKind):
-            raise InputError(
+            raise SettingError(
                 f"fault of {self.channel}: unknown kind {self.kind!r}; known are {', '.join(get_args(FaultKind))}"
             )
         if not math.isfinite(self.start) or (self.end is not None and not self.end > self.start):
-            raise InputError(
+            raise SettingError(
                 f"fault of {self.channel}: start {self.start} s must be finite and before end {self.end} s"
             )
 

@@ -1,0 +1,203 @@
+"""``thermocomp papers``: the papers' studies redone, their number beside ours."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Flag,
+    Json,
+    OptionalNames,
+    OptionalOutput,
+    read_recordings,
+    refuse_existing,
+    tell_trouble,
+)
+from thermocomp.core.exceptions import InputError
+
+if TYPE_CHECKING:
+    from thermocomp.papers.study import Progress as Told
+    from thermocomp.papers.study import Study
+    from thermocomp.papers.study import Table as StudyTable
+    from thermocomp.recording.recording import Recording
+
+Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
+Names = Annotated[list[Name], Parameter(negative=(), allow_leading_hyphen=False, show_default=False)]
+Measured = Annotated[list[Path], Parameter(name="--with", consume_multiple=True, negative=(), show_default=False)]
+#: what is not a paper's study but the table of all methods on all experiments (X-03)
+CROSS = "cross"
+
+_console = Console(highlight=False)
+_progress_console = Console(stderr=True)
+_STYLES = {"yes": "green", "no": "bold red", "-": "dim"}
+
+
+def papers(
+    names: Names = [],  # noqa: B006 - never changed
+    /,
+    *,
+    measured: Measured = [],  # noqa: B006 - never changed
+    mapping: Path | None = None,
+    target: OptionalNames = None,
+    models: OptionalNames = None,
+    seed: int = 0,
+    output: OptionalOutput = None,
+    overwrite: Flag = False,
+    json: Json = False,
+) -> int:
+    """Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds here.
+
+    A claim that does not hold is a finding, not a failure.
+
+    Parameters
+    ----------
+    names : list of str
+        Papers; all five if none is named. cross is the table of all methods on all experiments.
+    measured : list of Path
+        Recordings on which the methods of cross are judged as well; each is one test.
+    mapping : Path
+        TOML file that says what their columns are.
+    target : list of str
+        Their displacements that cross judges; all of them if not given.
+    models : list of str
+        Methods of cross, or all; without it those that take seconds.
+    seed : int
+        Of the weather, the sensors' noise and what is drawn by lot.
+    output : Path
+        Page with claims, figures and tables to write (.html).
+    overwrite : bool
+        Write over an existing page.
+    json : bool
+        Print results for a machine instead of tables.
+
+    Returns
+    -------
+    int
+        0 the studies ran, whatever holds; 2 unusable input.
+    """
+    if seed < 0:
+        raise InputError(f"--seed {seed}: must not be negative")
+    with needs("study"):
+        from thermocomp.cli.output import print_json
+        from thermocomp.papers.studies import STUDIES
+    chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
+    asked = {"--with": measured, "--mapping": mapping, "--target": target, "--models": models}
+    for option in (o for o, value in asked.items() if value):
+        if CROSS not in chosen:
+            raise InputError(f"{option} is for {CROSS}: thermocomp papers {CROSS} {option} ...")
+        if not measured and option in ("--mapping", "--target"):
+            raise InputError(f"{option} is for measured recordings: name them by --with")
+    if output is not None:
+        refuse_existing([output], overwrite, measured)
+    tests = read_recordings(measured, mapping) if measured else []
+    tell_trouble(tests)
+    done: list[tuple[Study, float]] = []
+    for number, name in enumerate(chosen, start=1):
+        begin = time.perf_counter()
+        with _progress(f"{number}/{len(chosen)} {name}", json) as progress:
+            study = _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, progress)
+        done.append((study, time.perf_counter() - begin))
+        if not json:
+            _show(*done[-1])
+    if output is not None:
+        with needs("study"):
+            from thermocomp.report import papers as pages
+        pages.write([study for study, _ in done], output, seed=seed)
+        if not json:
+            _console.print(f"Page: {output}")
+    if json:
+        print_json({"seed": seed, "studies": [_content(*d) for d in done]}, _console)
+    return 0
+
+
+def _run(name: str, seed: int, progress: "Told") -> "Study":
+    with needs("study"):
+        from thermocomp.papers import studies
+    return studies.run(name, seed=seed, progress=progress)
+
+
+def _cross(
+    seed: int, progress: "Told", tests: "list[Recording]", models: list[str] | None, targets: list[str] | None
+) -> "Study":
+    with needs("study"):
+        from thermocomp.papers import cross
+    return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets)
+
+
+def _show(study: "Study", seconds: float) -> None:
+    with needs("study"):
+        from thermocomp.report.papers import headline, verdict
+    _console.print(f"\n[bold]{escape(study.title)}[/]")
+    if study.claims:
+        table = Table()
+        for heading in ("id", "claim", "paper", "ours"):
+            table.add_column(heading, overflow="fold")
+        table.add_column("holds", no_wrap=True)
+        for c in study.claims:
+            word = verdict(c)
+            cells = (", ".join(c.ids), c.text, c.paper or "-", c.ours or "-")
+            table.add_row(*map(escape, cells), f"[{_STYLES[word]}]{word}[/]")
+        _console.print(table)
+        for c in study.claims:
+            if c.finding:
+                style = _STYLES[verdict(c)]
+                _console.print(f"[{style}]{escape(', '.join(c.ids))}[/] {escape(c.finding)}")
+    if study.name == CROSS:
+        for t in study.tables:
+            _console.print(_table(t))
+    said = f"{headline(study)}; " if study.claims else ""
+    _console.print(f"{escape(said)}{seconds:.0f} s")
+
+
+def _table(t: "StudyTable") -> Table:
+    with needs("study"):
+        from thermocomp.report.papers import words
+    left = words(t)
+    table = Table(caption=escape(t.caption))
+    for k, heading in enumerate(t.header):
+        table.add_column(escape(heading), justify="left" if k in left else "right", overflow="fold")
+    for row in t.rows:
+        table.add_row(*map(escape, row))
+    return table
+
+
+def _content(study: "Study", seconds: float) -> dict[str, Any]:
+    return {
+        "name": study.name,
+        "title": study.title,
+        "seconds": seconds,
+        "claims": [
+            {
+                "ids": c.ids,
+                "claim": c.text,
+                "paper": c.paper,
+                "ours": c.ours,
+                "holds": c.holds,
+                "finding": c.finding,
+            }
+            for c in study.claims
+        ],
+        "tables": [{"caption": t.caption, "header": t.header, "rows": t.rows} for t in study.tables],
+        "numbers": study.numbers,
+    }
+
+
+@contextmanager
+def _progress(name: str, hidden: bool) -> "Iterator[Told]":
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
+        task = bar.add_task(name, total=1.0)
+
+        def tell(share: float, text: str) -> None:
+            bar.update(task, completed=share, description=f"{name}: {text}")
+
+        yield tell

@@ -1,0 +1,323 @@
+"""Chen, Yuan, Ni 1996, sections 3.2 and 4.2: the drifts of the spindle, fitted by regression and by a net."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from thermocomp.core.model import ErrorModel
+from thermocomp.models.mlp import SigmoidNet
+from thermocomp.models.mra import StepwiseMRA
+from thermocomp.papers import common
+from thermocomp.papers.chen1996_setup import (
+    CLOSELY,
+    COMPETITIVE,
+    DIFFERENCES,
+    DRIFTS,
+    SUBGROUPS,
+    TEMPERATURES,
+    drift_samples,
+    recordings,
+)
+from thermocomp.papers.common import judged, shown
+from thermocomp.papers.study import Claim
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+
+#: printed: unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
+CANDIDATES = {"x": 20, "y": 35, "z": 20}
+TERMS = {"x": 7, "y": 15, "z": 7}
+MAE_NET = {"x": 6.5, "y": 4.2, "z": 6.0}
+MAE_MRA = {"x": 8.9, "y": 3.8, "z": 6.9}
+#: printed: fit of x (C-19), removals in the log, which is that of y (C-17, E-C1)
+R2_X, SEE_X, REMOVALS = 0.988, 10.628, 6
+#: hidden nodes of the chosen net (C-26), how often it is trained, and what else is tried, how often
+HIDDEN, STARTS = 20, 5
+SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A net, from one start.
+
+    Parameters
+    ----------
+    net : SigmoidNet
+    models : mapping of str to ErrorModel
+        One per drift.
+    mae : mapping of str to float
+        After training [um].
+    """
+
+    net: SigmoidNet
+    models: Mapping[str, ErrorModel]
+    mae: Mapping[str, float]
+
+    @property
+    def mean(self) -> float:
+        """Mean of the three [um]."""
+        return float(np.mean(list(self.mae.values())))
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """All that was learned from the 810 sets.
+
+    Parameters
+    ----------
+    samples : Samples
+    regressions : mapping of str to StepwiseMRA
+        Per drift.
+    models : mapping of str to ErrorModel
+        The same, frozen.
+    wide : mapping of str to ErrorModel
+        Ours, to tell what the choice of the subgroups does: stepwise regressions on all nine, as the net gets them.
+    nets : sequence of Trained
+        9-20-3, each from another start.
+    others : mapping of str to sequence of Trained
+        What the paper tried and rejected (C-26, C-28, C-30).
+    """
+
+    samples: Samples
+    regressions: Mapping[str, StepwiseMRA]
+    models: Mapping[str, ErrorModel]
+    wide: Mapping[str, ErrorModel]
+    nets: Sequence[Trained]
+    others: Mapping[str, Sequence[Trained]]
+
+    @cached_property
+    def typical(self) -> Trained:
+        """The net with the median error after training: the one that is drawn."""
+        return sorted(self.nets, key=lambda t: t.mean)[len(self.nets) // 2]
+
+    @cached_property
+    def mra_residual(self) -> dict[str, FloatArray]:
+        """Of the regressions on the 810 rows [um]."""
+        return {t: common.residual(m, self.samples) for t, m in self.models.items()}
+
+    def mae_net(self, target: str) -> FloatArray:
+        """Return the mean absolute errors of the nets after training, shape (n_starts,) [um]."""
+        return np.array([n.mae[target] for n in self.nets])
+
+
+def learn(seed: int, told: Callable[[float], None]) -> Learned:
+    """Run the five tests and fit what the paper fits.
+
+    Parameters
+    ----------
+    seed : int
+        Of weather and noise; the nets' own starts are the same for every seed.
+    told : callable
+        Is told the share done (0..1).
+
+    Returns
+    -------
+    Learned
+    """
+    samples = drift_samples(recordings("chen1996", seed))
+    heat = samples.only(TEMPERATURES)
+    regressions = {t: StepwiseMRA(differences=DIFFERENCES, subset=group) for t, group in SUBGROUPS.items()}
+    models = {t: common.fitted(r, heat, [t])[t] for t, r in regressions.items()}
+    wide = {t: common.fitted(StepwiseMRA(), heat, [t])[t] for t in DRIFTS}
+    kinds: dict[str, tuple[SigmoidNet, int]] = {"": (SigmoidNet(hidden=HIDDEN), STARTS)}
+    kinds |= {f"9-{h}-3": (SigmoidNet(hidden=h), SWEEP_STARTS) for h in SWEEP}
+    kinds["common scaling"] = SigmoidNet(hidden=HIDDEN, scaling="common"), SWEEP_STARTS
+    kinds["batch update"] = SigmoidNet(hidden=HIDDEN, update="batch"), SWEEP_STARTS
+    jobs = [(kind, start) for kind, (_, n) in kinds.items() for start in range(n)]
+    trained: Iterator[Trained] = Parallel(n_jobs=-1, prefer="threads", return_as="generator")(
+        delayed(_train)(SigmoidNet(**{**kinds[kind][0].get_params(), "seed": start}), heat) for kind, start in jobs
+    )
+    by_kind: dict[str, list[Trained]] = {}
+    for done, ((kind, _), net) in enumerate(zip(jobs, trained, strict=True), start=1):
+        by_kind.setdefault(kind, []).append(net)
+        told(done / len(jobs))
+    return Learned(samples, regressions, models, wide, by_kind.pop(""), by_kind)
+
+
+def _train(net: SigmoidNet, heat: Samples) -> Trained:
+    models = common.fitted(net, heat, tuple(DRIFTS))
+    residual = heat.deviations - net.predict(heat.frame())
+    mae = dict(zip(DRIFTS, np.abs(residual).mean(axis=0).tolist(), strict=True))
+    return Trained(net, models, mae)
+
+
+# -- claims --------------------------------------------------------------------------------------------------------
+
+
+def claims(found: Learned) -> list[Claim]:
+    """Judge what the paper says about the fits, by criteria that were fixed beforehand."""
+    return [*_regression_claims(found), *_net_claims(found)]
+
+
+def _regression_claims(found: Learned) -> list[Claim]:
+    samples, regressions = found.samples, found.regressions
+    candidates = {t: len(r.candidates_) for t, r in regressions.items()}
+    terms = {t: len(r.terms_) for t, r in regressions.items()}
+    removals = {t: sum(s.action == "remove" for s in r.log_) for t, r in regressions.items()}
+    r2 = {t: r.r_squared_ for t, r in regressions.items()}
+    independent = {t: r.n_effective_ for t, r in regressions.items()}
+    n_tests = len(samples.test_names)
+    weakest, *others = sorted(screening(found).items(), key=lambda item: max(item[1]))
+    loose = [t for t in DRIFTS if round(r2[t], 3) < CLOSELY]
+    many = [t for t in DRIFTS if terms[t] > candidates[t] / 2]
+    return [
+        judged(
+            ("C-14",),
+            "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down",
+            "810",
+            f"{len(samples)} of {n_tests} tests",
+            (len(samples), n_tests) == (810, 5),
+            f"the experiment has {len(samples)} rows in {n_tests} tests",
+        ),
+        shown(
+            ("C-11",),
+            "The nine temperatures have strong correlations with the drifts",
+            "",
+            f"|r| with the drift it goes with best: {max(weakest[1]):.2f} ({weakest[0]}) to {max(others[-1][1]):.2f}",
+        ),
+        judged(
+            ("C-09", "C-10", "C-12", "C-13"),
+            "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
+            _listed(CANDIDATES),
+            _listed(candidates),
+            candidates == CANDIDATES,
+            "the subgroups do not have the sizes of Table 2",
+        ),
+        judged(
+            ("C-15", "C-20"),
+            "Stepwise regression reduces the coefficients in every direction to half or fewer",
+            f"{_listed(TERMS)} are left",
+            f"{_listed(terms)} are left",
+            not many,
+            f"more than half stay in {_named(many)}: significances take the {len(samples)} rows as independent, but "
+            f"they count as {_listed(independent, '.0f')}",
+        ),
+        judged(
+            ("C-16", "C-17"),
+            "Terms that have entered are removed again later",
+            f"{REMOVALS} times in y",
+            f"{_listed(removals)} times in x, y, z",
+            any(removals.values()),
+            "no term that entered lost its significance to later ones",
+        ),
+        judged(
+            ("C-19", "C-36"),
+            f"The regressions fit the drifts closely (R2 >= {CLOSELY}, without constant, about zero: E-C10)",
+            f"R2 {R2_X} in x",
+            _listed(r2, ".3f"),
+            not loose,
+            f"these temperatures do not explain {_named(loose)} that far: standard error of estimate "
+            f"{_listed({t: regressions[t].standard_error_ for t in DRIFTS}, '.2f')} um in x, y, z "
+            f"beside drifts of {_listed(_ranges(samples), '.0f')} um",
+        ),
+        shown(
+            ("C-18", "C-19"),
+            "Standard error of estimate in x",
+            f"{SEE_X:.1f} um",
+            f"{regressions['x'].standard_error_:.2f} um; the drift in x ranges over {_ranges(samples)['x']:.0f} um",
+        ),
+        shown(
+            ("E-C12",),
+            "The rows of a drift are no independent observations: of 810, the residuals count as (ours)",
+            "",
+            f"{_listed(independent, '.0f')} in x, y, z",
+        ),
+    ]
+
+
+def _net_claims(found: Learned) -> list[Claim]:
+    regressions, mra = found.regressions, {t: float(np.abs(e).mean()) for t, e in found.mra_residual.items()}
+    wide = {t: float(np.abs(common.residual(m, found.samples)).mean()) for t, m in found.wide.items()}
+    net = {t: float(np.median(found.mae_net(t))) for t in DRIFTS}
+    apart = [t for t in DRIFTS if not 1 / COMPETITIVE <= net[t] / mra[t] <= COMPETITIVE]
+    at_20 = np.array([n.mean for n in found.nets])
+    above = {h: np.mean([n.mean for n in found.others[f"9-{h}-3"]]) for h in SWEEP if h > HIDDEN}
+    better = [f"{h}" for h, error in above.items() if error < at_20.mean() - at_20.std(ddof=1)]
+    return [
+        judged(
+            ("C-25", "C-26"),
+            "More than 20 hidden nodes do not improve the net (mean error after training, beyond what the start of the "
+            "training makes)",
+            "9-20-3",
+            f"{at_20.mean():.2f} +- {at_20.std(ddof=1):.2f} um with 20, "
+            + ", ".join(f"{e:.2f} with {h}" for h, e in above.items()),
+            not better,
+            f"{_named(better)} nodes learn the 810 rows better; whether that is worth anything only new tests tell",
+        ),
+        _rejected(
+            found, "C-28", "Scaling each channel by its own range is better than a common factor", "common scaling"
+        ),
+        _rejected(found, "C-30", "Pattern update ends with smaller errors than batch update", "batch update"),
+        judged(
+            ("C-29", "C-31"),
+            f"Mean absolute errors of net and regression are very close (within a factor of {COMPETITIVE:g} of each "
+            "other in every direction)",
+            f"net {_listed(MAE_NET, '.1f')}, regression {_listed(MAE_MRA, '.1f')} um",
+            f"net {_listed(net, '.2f')}, regression {_listed(mra, '.2f')} um",
+            not apart,
+            f"in {_named(apart)} the net has {_listed({t: net[t] / mra[t] for t in apart}, '.2f')} of the regression's "
+            f"error. Against {_listed({t: len(r.terms_) for t, r in regressions.items()})} terms it has "
+            f"{found.typical.net.n_parameters_} weights and thresholds, and all nine temperatures: a regression on "
+            f"these gets {_listed(wide, '.2f')} um in x, y, z. What is learned by heart of it, the new tests tell",
+        ),
+        shown(
+            ("C-31",),
+            "A net depends on its start (ours): smallest and largest mean absolute error of "
+            f"{len(found.nets)} trainings",
+            "",
+            "; ".join(f"{t} {found.mae_net(t).min():.2f}-{found.mae_net(t).max():.2f}" for t in DRIFTS) + " um",
+        ),
+    ]
+
+
+def _rejected(found: Learned, identifier: str, text: str, kind: str) -> Claim:
+    """Judge what the paper rejected: its mean error after training must be above that of the chosen net."""
+    chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
+    return judged(
+        (identifier,),
+        text,
+        "",
+        f"{chosen:.2f} um; {kind} {other:.2f} um",
+        chosen < other,
+        f"after the same {found.typical.net.n_epochs} epochs {kind} ends with {other:.2f} um, not above {chosen:.2f}",
+    )
+
+
+def screening(found: Learned) -> dict[str, tuple[float, ...]]:
+    """Return the correlation of each of the nine temperatures with x, y, z, without its sign (C-11)."""
+    change = found.samples.change()
+    return {
+        name: tuple(abs(float(np.corrcoef(change[:, j], y)[0, 1])) for y in found.samples.deviations.T)
+        for j, name in enumerate(TEMPERATURES)
+    }
+
+
+def _ranges(samples: Samples) -> dict[str, float]:
+    return {t: float(np.ptp(common.measured(samples, t))) for t in DRIFTS}
+
+
+def _listed(values: Mapping[str, float], form: str = "") -> str:
+    return " / ".join(format(v, form) for v in values.values())
+
+
+def _named(names: Sequence[str]) -> str:
+    return " and ".join(names)
+
+
+def numbers(found: Learned) -> dict[str, float]:
+    """Return the figures that a page can assert; of the nets the median."""
+    made: dict[str, float] = {}
+    for t, r in found.regressions.items():
+        made |= {f"candidates_{t}": float(len(r.candidates_)), f"terms_{t}": float(len(r.terms_))}
+        made |= {
+            f"r2_mra_{t}": r.r_squared_,
+            f"see_mra_{t}_um": r.standard_error_,
+            f"n_effective_mra_{t}": r.n_effective_,
+        }
+        made[f"mae_mra_{t}_um"] = float(np.abs(found.mra_residual[t]).mean())
+        made[f"mae_net_{t}_um"] = float(np.median(found.mae_net(t)))
+    return {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)} | made

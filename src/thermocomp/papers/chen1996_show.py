@@ -1,0 +1,103 @@
+"""Chen, Yuan, Ni 1996, sections 3.2 and 4.2: tables and figures of the fits to the 810 sets."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from thermocomp.models.mra import StepwiseMRA
+from thermocomp.papers import common
+from thermocomp.papers.chen1996_drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
+from thermocomp.papers.chen1996_setup import DRIFTS, SENSORS, SUBGROUPS
+from thermocomp.papers.study import Curve, Figure, Panel, Table
+
+#: Eq. 5 (C-18)
+EQ5 = {
+    "T2": -0.586,
+    "T3": 7.527,
+    "(T6-T7)": -36.966,
+    "(T8-T9)": 10.809,
+    "T3*T3": -0.149,
+    "(T6-T7)*(T6-T7)": -18.119,
+    "T2*(T6-T7)": 2.499,
+}
+
+
+def tables(found: Learned) -> list[Table]:
+    """Return Tables 1 and 2, the fits, Eq. 5 beside ours, the logs of Fig. 2 and the sweep."""
+    first = [
+        [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
+        for name, row in screening(found).items()
+    ]
+    fits = [
+        [
+            t,
+            ", ".join(SUBGROUPS[t]),
+            f"{len(r.candidates_)}",
+            f"{len(r.terms_)} ({TERMS[t]})",
+            f"{r.r_squared_:.3f}" + (f" ({R2_X})" if t == "x" else ""),
+            f"{r.standard_error_:.2f}" + (f" ({SEE_X:.1f})" if t == "x" else ""),
+            f"{np.abs(found.mra_residual[t]).mean():.2f} ({MAE_MRA[t]})",
+            f"{np.median(found.mae_net(t)):.2f} ({MAE_NET[t]})",
+            f"{r.n_effective_:.0f}",
+        ]
+        for t, r in found.regressions.items()
+    ]
+    ours = dict(zip(found.regressions["x"].terms_, found.regressions["x"].coef_, strict=True))
+    eq5 = [[name, _number(ours.get(name)), _number(EQ5.get(name))] for name in {**ours, **EQ5}]
+    sweep = {**found.others, "9-20-3": found.nets}
+    counts = [["9-20-3" if kind in ("", "9-20-3") else kind, *_sweep_row(nets)] for kind, nets in sweep.items()]
+    fit_header = (
+        "",
+        "variables",
+        "terms",
+        "left (paper)",
+        "R2",
+        "SEE [um]",
+        "MAE [um]",
+        "MAE net [um]",
+        "independent rows",
+    )
+    return [
+        Table("Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first),
+        Table("Table 2 and the fits, the paper's numbers in brackets", fit_header, fits),
+        Table("Drift in x: coefficients [um/degC, um/degC2] here and in Eq. 5", ("term", "here", "Eq. 5"), eq5),
+        *(_log(found.regressions[t], t) for t in ("x", "y")),
+        Table(
+            "Nets: mean absolute error after training, mean over the starts", ("", "starts", *DRIFTS, "mean"), counts
+        ),
+    ]
+
+
+def _sweep_row(nets: Sequence[Trained]) -> list[str]:
+    mae = [float(np.mean([n.mae[t] for n in nets])) for t in DRIFTS]
+    return [f"{len(nets)}", *(f"{m:.2f}" for m in mae), f"{np.mean(mae):.2f}"]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
+
+
+def _log(regression: StepwiseMRA, target: str) -> Table:
+    rows = [
+        [f"{s.number}", s.action.upper(), s.term, f"{s.r:.3f}", f"{s.r_squared:.3f}", f"{s.f:.1f}"]
+        for s in regression.log_
+    ]
+    note = "; the steps printed in the paper are those of its y (E-C1)" if target == "y" else ""
+    return Table(f"Fig. 2: steps in {target}{note}", ("STEP", "", "term", "R", "RSQUARE", "F"), rows)
+
+
+def figures(found: Learned) -> list[Figure]:
+    """Return Figs. 3 to 5 and 10 to 12: what was measured, and the fits."""
+    samples = found.samples
+    kinds = (("MRA", 3, found.models), ("net", 10, found.typical.models))
+    drawn = []
+    for kind, first, models in kinds:
+        for number, (target, model) in enumerate(models.items(), start=first):
+            curves = [
+                Curve("measured", *common.end_to_end(samples, common.measured(samples, target)), "points"),
+                Curve(kind, *common.end_to_end(samples, common.predicted(model, samples))),
+            ]
+            panel = Panel("", "time, five tests one after the other [h]", f"{target} [um]", curves)
+            caption = f"Fig. {number}: drift in {target} over the five tests, and the fit by the {kind}."
+            drawn.append(Figure(f"chen1996-fig{number}", caption, [panel]))
+    return drawn

@@ -1,0 +1,380 @@
+"""One table across the papers: every method on every experiment, judged on a test it has not seen (X-02, X-03)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from thermocomp.assessment.compare import Assessment, compare, n_pieces
+from thermocomp.assessment.replay import replay
+from thermocomp.assessment.splits import Protocol, Split, leave_one_cycle_out
+from thermocomp.datasets.virtual import record
+from thermocomp.models.methods import expand
+from thermocomp.papers.common import Errors
+from thermocomp.papers.study import Claim, Curve, Figure, Panel, Progress, Study, Table, silent
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+#: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
+FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")
+#: what the table calls a machine that is not compensated
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A paper's experiment as a task: some tests are learned, the last ones are unseen.
+
+    Parameters
+    ----------
+    name : str
+        Of the experiment of the virtual machine.
+    target : str or int
+        Displacement, by name or by its place.
+    unseen : int
+        How many tests at the end are unseen.
+    then : str
+        Another experiment whose tests follow; the same name: the experiment is repeated on another day.
+    """
+
+    name: str
+    target: str | int
+    unseen: int = 1
+    then: str = ""
+
+    def recordings(self, seed: int) -> list[Recording]:
+        """Run it; what follows is run with the next seed: another weather, other draws."""
+        return record(self.name, seed=seed) + (record(self.then, seed=seed + 1) if self.then else [])
+
+
+EXPERIMENTS = (
+    Experiment("chen1996", "z_um", unseen=2, then="chen1996-new"),
+    Experiment("wessel-fem", -1),
+    Experiment("wessel-tool", 0),
+    Experiment("wessel-milling", 0),
+    Experiment("hwang", "z_um", then="hwang"),
+    Experiment("precompensation", 0),
+    Experiment("stepwise2017", "x1_um", then="stepwise2017-online"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Rows to learn from and rows to judge on.
+
+    Parameters
+    ----------
+    name : str
+    samples : Samples
+        With one target.
+    protocol : Protocol
+    """
+
+    name: str
+    samples: Samples
+    protocol: Protocol
+
+
+@dataclass(frozen=True)
+class Row:
+    """How one method did on one task; nan where it could not be fitted.
+
+    Parameters
+    ----------
+    task, method : str
+    fit_rms : float
+        RMS in the rows it learned from, replayed; of several trainings pooled [um].
+    rms, max_abs, peak_to_peak : float
+        In the unseen rows [um].
+    noise_rms : float
+        RMS with noise of +-0.4 degC, uniform, on every temperature [um] (C-33).
+    lost_rms : float
+        RMS with the one input cut off that hurts most [um] (C-34).
+    lost : str
+        That input.
+    sensors : int
+        Inputs with an influence; of several trainings the most.
+    fit_s : float
+        The fits took [s].
+    failure : str
+        Why it could not be fitted; empty if it could.
+    """
+
+    task: str
+    method: str
+    fit_rms: float
+    rms: float
+    max_abs: float
+    peak_to_peak: float
+    noise_rms: float
+    lost_rms: float
+    lost: str
+    sensors: int
+    fit_s: float
+    failure: str = ""
+
+
+def virtual(experiment: Experiment, seed: int) -> Task:
+    """Run an experiment on the virtual machine: its last tests are unseen.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    seed : int
+
+    Returns
+    -------
+    Task
+    """
+    recordings = experiment.recordings(seed)
+    target = experiment.target
+    name = target if isinstance(target, str) else recordings[0].displacements[target].name
+    samples = stack(recordings, [name])
+    unseen = samples.test >= len(recordings) - experiment.unseen
+    split = Split("unseen tests", ~unseen, unseen)
+    return Task(f"{experiment.name}, {name}", samples, Protocol("whole tests left out", (split,)))
+
+
+def measured(recordings: Sequence[Recording], target: str) -> Task:
+    """Take the recordings of a machine: every thermal cycle is unseen once (X-02).
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        One or several tests.
+    target : str
+        Displacement.
+
+    Returns
+    -------
+    Task
+
+    Raises
+    ------
+    InputError
+        There is no such channel, or fewer than two thermal cycles.
+    """
+    samples = stack(recordings, [target])
+    name = f"{samples.test_names[0]}{' ...' if len(recordings) > 1 else ''}, {target}"
+    return Task(name, samples, leave_one_cycle_out(samples))
+
+
+def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progress = silent) -> list[Row]:
+    """Judge methods on a task, none first.
+
+    Parameters
+    ----------
+    task : Task
+    methods : sequence of str
+        ``all`` stands for all of them.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Told the share done after each piece of work.
+
+    Returns
+    -------
+    list of Row
+    """
+    pieces, done = n_pieces(task.samples, methods, task.protocol), 0
+
+    def tell(what: str) -> None:
+        nonlocal done
+        done += 1
+        progress(done / pieces, f"{task.name}: {what}")
+
+    found = compare(task.samples, methods, task.protocol, jobs=jobs, progress=tell)
+    rows = []
+    for overall in found.overall():
+        blocks = [a for a in found.assessments if a.model == overall.model and a.frozen is not None]
+        rows.append(_row(task, overall, blocks))
+    first = found.overall()[0]
+    return [_none(task, first), *rows]
+
+
+def run(
+    seed: int,
+    progress: Progress = silent,
+    recordings: Sequence[Recording] = (),
+    *,
+    methods: Sequence[str] = FAST,
+    experiments: Sequence[Experiment] = EXPERIMENTS,
+    targets: Sequence[str] | None = None,
+    jobs: int = 1,
+) -> Study:
+    """Judge the methods on all experiments, and on measured recordings.
+
+    Parameters
+    ----------
+    seed : int
+    progress : callable
+        Told the share done and what comes next.
+    recordings : sequence of Recording
+        Tests of one measured machine.
+    methods : sequence of str
+        ``all`` stands for all of `thermocomp.models.methods.METHODS`.
+    experiments : sequence of Experiment
+    targets : sequence of str, optional
+        Displacements of the measured machine; all of them if not given.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        A method or channel is unknown, or the recordings hold fewer than two thermal cycles.
+    """
+    names = expand(methods)
+    if targets is None:
+        targets = [c.name for c in recordings[0].displacements] if recordings else []
+    real = [measured(recordings, target) for target in targets]  # first of all: what cannot be used is told at once
+    n = len(experiments) + len(real)
+    rows: list[list[Row]] = []
+
+    def tell(share: float, what: str) -> None:
+        progress((len(rows) + share) / n, what)
+
+    for experiment in experiments:
+        tell(0.0, f"{experiment.name}: recording")
+        rows.append(judge(virtual(experiment, seed), names, jobs=jobs, progress=tell))
+    for task in real:
+        rows.append(judge(task, names, jobs=jobs, progress=tell))
+    progress(1.0, "done")
+    return Study(
+        name="cross",
+        title="All methods on all experiments",
+        claims=tuple(c for k, mine in enumerate(rows) for c in _claims(mine, real=k >= len(experiments))),
+        tables=(_table([r for mine in rows for r in mine]),),
+        figures=(_figure(rows),),
+        numbers={f"{r.task}, {r.method}: rms_um": r.rms for mine in rows for r in mine if not r.failure},
+    )
+
+
+def _row(task: Task, overall: Assessment, blocks: Sequence[Assessment]) -> Row:
+    stressed = overall.robustness
+    lost, lost_rms = stressed.worst_lost if stressed else ("", float("nan"))
+    if stressed and not overall.sensors:  # a constant: there is nothing to lose
+        lost_rms = overall.metric("rms")
+    return Row(
+        task=task.name,
+        method=overall.model,
+        fit_rms=_fit_rms(task, blocks) if not overall.failure else float("nan"),
+        rms=overall.metric("rms"),
+        max_abs=overall.metric("max_abs"),
+        peak_to_peak=overall.metric("peak_to_peak"),
+        noise_rms=stressed.noise_rms["uniform"][0] if stressed else float("nan"),
+        lost_rms=lost_rms,
+        lost=lost,
+        sensors=overall.n_sensors[1],
+        fit_s=overall.fit_s,
+        failure=overall.failure,
+    )
+
+
+def _none(task: Task, first: Assessment) -> Row:
+    learned = np.any([s.learn for s in task.protocol.splits], axis=0)
+    rms = first.none_metric("rms")
+    return Row(
+        task=task.name,
+        method=NONE,
+        fit_rms=Errors.of(task.samples.deviations[learned, 0]).rms,
+        rms=rms,
+        max_abs=first.none_metric("max_abs"),
+        peak_to_peak=first.none_metric("peak_to_peak"),
+        noise_rms=rms,
+        lost_rms=rms,
+        lost="",
+        sensors=0,
+        fit_s=0.0,
+    )
+
+
+def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
+    """Replay the models on what they learned from; in the order of the protocol's splits."""
+    splits = {s.block: s for s in task.protocol.splits}
+    residuals = []
+    for block in blocks:
+        if block.frozen is not None:
+            learned = splits[block.block].learn & np.isfinite(task.samples.deviations[:, 0])
+            residuals.append(task.samples.deviations[learned, 0] - replay(block.frozen, task.samples, learned)[0])
+    return Errors.of(np.concatenate(residuals)).rms
+
+
+def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
+    """Judge what every paper takes for granted: that its method helps in a test it has not seen."""
+    none, *judged = rows
+    fitted = [r for r in judged if not r.failure]
+    if not fitted:
+        return ()
+    best = min(fitted, key=lambda r: r.rms)
+    closest = min(fitted, key=lambda r: r.fit_rms)
+    harmful = [r for r in fitted if not r.rms < none.rms]
+    ratio = float(np.median([r.rms / r.fit_rms for r in fitted if r.fit_rms > 0]))
+    told = f"Unseen RMS over fit RMS: {ratio:.1f} in the median. "
+    if len(fitted) > 2:
+        rank = float(spearmanr([r.fit_rms for r in fitted], [r.rms for r in fitted]).statistic)
+        told += f"Rank correlation of the two: {rank:.2f}. "
+    told += f"The closest fit is that of {closest.method}: {closest.fit_rms:.2f} um, unseen {closest.rms:.2f} um."
+    if harmful:
+        told += " Worse than none: " + ", ".join(f"{r.method} {r.rms:.1f} um" for r in harmful) + "."
+    failed = [r.method for r in judged if r.failure]
+    if failed:
+        told += f" Not fitted: {', '.join(failed)}."
+    return (
+        Claim(
+            ("X-02", "X-03") if real else ("X-03",),
+            f"{none.task}: every method is better than no compensation where it was not trained",
+            "",
+            f"best {best.method} {best.rms:.2f} um of {none.rms:.2f} um; {len(harmful)} of {len(fitted)} do harm",
+            not harmful,
+            told,
+        ),
+    )
+
+
+def _table(rows: Sequence[Row]) -> Table:
+    header = (
+        "experiment",
+        "method",
+        "fit RMS [um]",
+        "unseen RMS [um]",
+        "max [um]",
+        "peak-to-peak [um]",
+        "RMS, noise 0.4 degC [um]",
+        "RMS, worst input cut off [um]",
+        "which",
+        "inputs used",
+        "fit [s]",
+    )
+    cells = []
+    for r in rows:
+        if r.failure:
+            cells.append([r.task, r.method, f"not fitted: {r.failure.partition(':')[0]}", *[""] * (len(header) - 3)])
+            continue
+        errors = (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)
+        cells.append([r.task, r.method, *(f"{e:.2f}" for e in errors), r.lost, str(r.sensors), f"{r.fit_s:.2f}"])
+    caption = (
+        "All methods on all experiments, in tests they have not seen (X-03). Every method is offered all temperatures "
+        "and the spindle speed, and takes what it can use."
+    )
+    return Table(caption, header, cells)
+
+
+def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
+    places = np.arange(1, len(rows) + 1, dtype=np.float64)
+    methods = [r.method for r in rows[0][1:]]
+    curves = [
+        Curve(m, places, np.array([mine[k + 1].rms / mine[0].rms for mine in rows]), "points")
+        for k, m in enumerate(methods)
+    ]
+    told = "; ".join(f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1))
+    return Figure(
+        "cross-unseen",
+        f"RMS in the unseen test as a share of that without compensation. Experiments: {told}.",
+        [Panel("", "experiment", "RMS / RMS without compensation", curves)],
+    )

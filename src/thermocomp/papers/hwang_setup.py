@@ -1,0 +1,263 @@
+"""What the study of Hwang, Lee and Yang computes; `thermocomp.papers.hwang` tells it.
+
+One test of six hours in three states drawn by lot, 14 sensors, drift Z. T14 (bed) is the reference: every variable is
+``T_i - T14``, temperatures as they are, not from the start of the test (H-08). The paper's threshold is not known
+(E-H1): the one taken gives as many groups as its Table 1, or next to as many; all others stand in the sweep. How the
+models fare on new tests, with other orders of the states and other weather, is told besides.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment.sensitivity import Sensitivity, sensitivity
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import TermTable, Variable
+from thermocomp.datasets.virtual import record
+from thermocomp.models.grouping import CorrelationGrouping
+from thermocomp.models.numerics.leastsquares import lstsq
+from thermocomp.models.selection.grouping import Groups, Interval, intervals
+from thermocomp.models.training import train
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, predicted, renamed
+from thermocomp.papers.study import Progress
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+
+#: channels of T1 .. T14 (H-08)
+PLACES = (
+    "x_bearing",
+    "x_nut",
+    "y_bearing",
+    "y_nut",
+    "z_bearing",
+    "z_nut",
+    "front_seat",
+    "rear_seat",
+    "column_front_right",
+    "column_front_left",
+    "column_rear_right",
+    "column_rear_left",
+    "bed_front",
+    "bed_rear",
+)
+NAMES = tuple(f"T{k}" for k in range(1, 15))
+REFERENCE = "T14"
+TARGET = "z_um"
+#: the paper's groups (Table 1, H-10), R2 and standard error [um] of its two models (Table 2, H-12, H-13)
+TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
+TABLE_2 = {"optimal": (0.9704, 6.39), "judgement": (0.9697, 6.72)}
+#: eigenvalues of its Table 3 (H-16): with grouping, and without
+TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
+#: Eq. 9 (H-17)
+EQUATION_9 = {"T7": 0.9599, "T8": 0.9526, "T2": 0.8064, "T6": 0.8066}
+#: the engineering judgement model takes these and their squares (H-13)
+JUDGEMENT = ("T6", "T7", "T13")
+#: sizes of the sensors' error [degC] and its laws (E-H8)
+NOISES = (0.1, 0.2, 0.4, 0.8)
+LAWS: tuple[Literal["uniform", "normal"], ...] = ("uniform", "normal")
+DRAWS = 100
+#: new tests the models have not seen
+NEW = 5
+#: names of the models
+OPTIMAL, JUDGED, SINGLE = "optimal selection", "engineering judgement", "without grouping"
+NONE = "no compensation"
+#: the models of Fig. 6, and what the quadratic one is without its squares
+LINEAR, QUADRATIC, PLAIN = "linear", "quadratic", "quadratic without its squares"
+#: "nearly the same" of Table 2, criterion: a standard error at most so many times the other's
+SAME = 1.1
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model with how well it fits.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    r_squared, error : float
+        R2 about the mean and standard error of estimate [um], in the rows it was fitted to.
+    """
+
+    model: ErrorModel
+    r_squared: float
+    error: float
+
+
+def samples_of(tests: Sequence[Recording]) -> Samples:
+    """Return tests with the paper's names, temperatures as they are."""
+    names = {f"t_{p}_C": n for p, n in zip(PLACES, NAMES, strict=True)} | {TARGET: TARGET}
+    return stack([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False)
+
+
+def nearest(found: Sequence[Interval], groups: int) -> Interval:
+    """Return the interval of thresholds that gives a number of groups, or next to it; of several the widest."""
+    return min(found, key=lambda i: (abs(len(i.groups) - groups), i.low - i.high))
+
+
+def polynomial(samples: Samples, names: Sequence[str], degree: int) -> Fit:
+    """Fit powers of differences from the reference: with degree 2 the engineering judgement model (H-13).
+
+    Parameters
+    ----------
+    samples : Samples
+    names : sequence of str
+        Of the temperatures.
+    degree : int
+        Highest power; there are no products.
+
+    Returns
+    -------
+    Fit
+    """
+    used = [n for n in NAMES if n in (*names, REFERENCE)]
+    variables = tuple(Variable.difference(used, n, REFERENCE) for n in names)
+    terms = tuple((k,) * power for power in range(1, degree + 1) for k in range(len(names)))
+    columns = [NAMES.index(n) for n in used]
+    X = TermTable(len(used), variables, terms).evaluate(samples.change()[:, columns])
+    y = samples.deviations[:, 0]
+    solved = lstsq(X, y)
+    model = Polynomial(
+        target=TARGET,
+        unit="um",
+        inputs=samples.model_inputs(columns, np.ones(len(y), dtype=np.bool_)),
+        support=PAPERS_SUPPORT,
+        provenance=None,
+        variables=variables,
+        terms=terms,
+        coefficients=tuple(solved.coefficients.tolist()),
+        intercept=solved.intercept,
+    )
+    total = float(np.sum((y - y.mean()) ** 2))
+    return Fit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
+
+
+def agreement(groups: Groups) -> float:
+    """Return the share of pairs of sensors that are together, or apart, as in Table 1."""
+    ours = {n: k for k, g in enumerate(groups) for n in g}
+    paper = {n - 1: k for k, g in enumerate(TABLE_1) for n in g}
+    pairs = [(a, b) for a in paper for b in paper if a < b]
+    return sum((ours[a] == ours[b]) == (paper[a] == paper[b]) for a, b in pairs) / len(pairs)
+
+
+@dataclass(frozen=True, eq=False)
+class Computed:
+    """Everything the study tells.
+
+    Parameters
+    ----------
+    fit, new : Samples
+        The test that is learned from, and new ones.
+    grouped, single : CorrelationGrouping
+        At the threshold taken, and without groups: every temperature a group of its own.
+    interval : Interval
+        Thresholds that give the same groups.
+    swept : list of (Interval, CorrelationGrouping)
+        At all thresholds.
+    fits : dict of str to Fit
+        The three models, by name.
+    shaken : dict of (str, float) to dict of str to Sensitivity
+        R2 under random sensor error, by its law and size [degC].
+    dynamic : ndarray of shape (n_new,)
+        What `dynamic` leaves of the new tests [um].
+    """
+
+    fit: Samples
+    new: Samples
+    grouped: CorrelationGrouping
+    single: CorrelationGrouping
+    interval: Interval
+    swept: list[tuple[Interval, CorrelationGrouping]]
+    fits: dict[str, Fit]
+    shaken: dict[tuple[str, float], dict[str, Sensitivity]]
+    dynamic: FloatArray
+
+    @cached_property
+    def change(self) -> FloatArray:
+        """Differences of T1 .. T13 from the reference, (n_rows, 13) [degC]."""
+        return self.fit.values[:, :-1] - self.fit.values[:, -1:]
+
+    def fitted(self, name: str) -> FloatArray:
+        """Return what a model says of the rows it was fitted to [um]."""
+        return predicted(self.fits[name].model, self.fit)
+
+    @cached_property
+    def residuals(self) -> dict[str, FloatArray]:
+        """What each model leaves of the new tests [um]."""
+        z = self.new.deviations[:, 0]
+        left = {name: z - predicted(f.model, self.new) for name, f in self.fits.items()}
+        return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
+
+
+def compute(seed: int, progress: Progress) -> Computed:
+    """Run the tests and do what the paper does.
+
+    Parameters
+    ----------
+    seed : int
+    progress : callable
+
+    Returns
+    -------
+    Computed
+    """
+    progress(0.0, "the test, and new ones")
+    tests = [record("hwang", seed=seed + k)[0] for k in range(1 + NEW)]
+    tests[1:] = [replace(r, name=f"new order {k}") for k, r in enumerate(tests[1:], start=1)]
+    fit, new = samples_of(tests[:1]), samples_of(tests[1:])
+    progress(0.3, "groups at every threshold")
+    found = intervals(_grouped(fit, 0.9).correlation_)
+    interval = nearest(found, len(TABLE_1))
+    grouped, single = _grouped(fit, interval.low), _grouped(fit, 1.0)
+    swept = [(i, _grouped(fit, i.low)) for i in found]
+    fits = {
+        OPTIMAL: _fit_of(grouped, fit),
+        JUDGED: polynomial(fit, JUDGEMENT, 2),
+        SINGLE: _fit_of(single, fit),
+    }
+    progress(0.6, "random sensor error")
+    shown = {LINEAR: fits[OPTIMAL].model, QUADRATIC: fits[JUDGED].model, PLAIN: polynomial(fit, JUDGEMENT, 1).model}
+    everything = np.ones(len(fit), dtype=np.bool_)
+    shaken: dict[tuple[str, float], dict[str, Sensitivity]] = {
+        (law, size): sensitivity(shown, fit, everything, size=size, law=law, draws=DRAWS, seed=seed)
+        for law in LAWS
+        for size in NOISES
+    }
+    progress(0.9, "new tests")
+    return Computed(fit, new, grouped, single, interval, swept, fits, shaken, _dynamic(tests))
+
+
+def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:
+    return CorrelationGrouping(threshold=threshold, reference=REFERENCE).fit(samples.frame(), samples.deviations[:, 0])
+
+
+def _fit_of(g: CorrelationGrouping, samples: Samples) -> Fit:
+    inputs = samples.model_inputs(range(len(NAMES)), np.ones(len(samples), dtype=np.bool_))
+    return Fit(
+        g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT), float(g.r_squared_), float(g.standard_error_)
+    )
+
+
+def _dynamic(tests: Sequence[Recording]) -> FloatArray:
+    """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
+    inputs = [*(f"t_{p}_C" for p in PLACES), "spindle_rpm"]
+    learned = stack(tests[:1], [TARGET], inputs)
+    model = train("dynamic", learned, 0, np.ones(len(learned), dtype=np.bool_)).model
+    new = stack(tests[1:], [TARGET], inputs)
+    return new.deviations[:, 0] - predicted(model, new)
+
+
+def named(columns: Sequence[int]) -> str:
+    """Write columns as the names of their sensors."""
+    return " ".join(NAMES[k] for k in columns) or "none"
+
+
+def rms(residual: FloatArray) -> float:
+    """Return the root of the mean square."""
+    return Errors.of(residual).rms

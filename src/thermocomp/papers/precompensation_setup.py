@@ -1,0 +1,260 @@
+"""What the study of pre-compensation computes; `thermocomp.papers.precompensation` tells it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Correction, Deviation
+from thermocomp.core.model import ErrorModel
+from thermocomp.datasets.virtual import find, record
+from thermocomp.models.arx import ARX
+from thermocomp.models.arx_net import NetARX
+from thermocomp.models.selection.orders import Order
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
+from thermocomp.papers.study import Progress
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+from thermocomp.simulation.climate import Climate
+from thermocomp.simulation.protocol import Experiment
+
+FloatArray = NDArray[np.float64]
+
+SPEED = "spindle_rpm"
+#: where the drift of Z is modelled (P-04) [mm]
+POSITIONS = (0, 200, 400, 600)
+#: the paper's orders (P-02), and the greatest ones tried
+PAPERS_ORDERS = (1, 0)
+GREATEST = 5
+#: "every 10 min" (P-06) [s], and other steps of time that are tried
+INTERVAL = 600.0
+INTERVALS = (60.0, 120.0, 300.0, 600.0, 1200.0)
+#: depth difference of the milled surfaces (P-07), without and with [um]
+PAPERS_DEPTHS = (7.0, 2.0)
+#: cutting tests
+CUTS = 8
+#: a surface is milled in the first, and in the last, so many minutes of a cutting test in which the spindle runs
+MILLING = 5.0
+#: names of what is compared
+NONE = "no compensation"
+NET, LEAST, CHOSEN = "net, k = 1, m = 0", "least squares, k = 1, m = 0", "least squares, orders by FPE"
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A cutting test: how much deeper the second surface is than the first [um], per position of Z.
+
+    Parameters
+    ----------
+    without, scheduled : ndarray of shape (n_positions,)
+        Without compensation, and with the program corrected every ten minutes.
+    """
+
+    without: FloatArray
+    scheduled: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Warm:
+    """A job that begins on a machine that is still warm (E-P5), at one position.
+
+    Parameters
+    ----------
+    hours, drift : ndarray of shape (n_rows,)
+        Since the job began [h], and the drift since then [um].
+    cold, carried : ndarray of shape (n_rows,)
+        What is left of it [um] if the model begins cold, and if it carries its state over.
+    """
+
+    hours: FloatArray
+    drift: FloatArray
+    cold: FloatArray
+    carried: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Computed:
+    """Everything the study tells.
+
+    Parameters
+    ----------
+    learn, judge : Samples
+        Identification, and verification under new conditions; a target per position.
+    models : dict of str to list of ErrorModel
+        One per position.
+    orders : list of tuple of Order
+        Table of final prediction errors per position.
+    hidden : list of int
+        Hidden nodes of the nets.
+    one_step : Errors
+        Of least squares with k = 1, m = 0, one step ahead, at all positions.
+    clocks : dict of float to (tuple of int, float, float)
+        By the interval [s], at the first position: orders by FPE, free-run RMS with them, and with k = 1, m = 0 [um].
+    cuts : list of Cut
+    warm : Warm
+    room : Errors
+        Of the drift of Z of a machine that stands still for a day: none of it follows from the speed (E-P6).
+    workshop : Errors
+        Of what the nets leave of the same verification in a workshop that follows the day.
+    """
+
+    learn: Samples
+    judge: Samples
+    models: dict[str, list[ErrorModel]]
+    orders: list[tuple[Order, ...]]
+    hidden: list[int]
+    one_step: Errors
+    clocks: dict[float, tuple[tuple[int, int], float, float]]
+    cuts: list[Cut]
+    warm: Warm
+    room: Errors
+    workshop: Errors
+
+    @cached_property
+    def free_run(self) -> dict[str, FloatArray]:
+        """What each model predicts of the verification, (n_rows, n_positions) [um]."""
+        return {name: at_positions(models, self.judge) for name, models in self.models.items()}
+
+    @cached_property
+    def left(self) -> dict[str, FloatArray]:
+        """What is left of the verification, (n_rows, n_positions) [um]."""
+        z = self.judge.deviations
+        return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
+
+    @property
+    def inner(self) -> tuple[int, ...]:
+        """Positions with a neighbour on either side, as indices."""
+        return tuple(range(1, len(POSITIONS) - 1))
+
+    def interpolated(self, k: int, name: str) -> FloatArray:
+        """Return what the models at all other positions say of the verification at position k, linearly between."""
+        others = [j for j in range(len(POSITIONS)) if j != k]
+        nodes = [float(POSITIONS[j]) for j in others]
+        return np.array([np.interp(POSITIONS[k], nodes, row) for row in self.free_run[name][:, others]])
+
+
+def compute(seed: int, progress: Progress) -> Computed:
+    """Run the tests and do what the paper does.
+
+    Parameters
+    ----------
+    seed : int
+    progress : callable
+
+    Returns
+    -------
+    Computed
+    """
+    progress(0.0, "identification and verification")
+    learn, judge = (samples_of(r) for r in record("precompensation", seed=seed))
+    targets = [c.name for c in learn.targets]
+    timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
+    models: dict[str, list[ErrorModel]] = {name: [] for name in (NET, LEAST, CHOSEN)}
+    tables, hidden, steps = [], [], []
+    k, m = PAPERS_ORDERS
+    for number, target in enumerate(targets):
+        progress(0.1 + 0.1 * number, f"models at z = {POSITIONS[number]} mm")
+        chosen = ARX(inputs=(SPEED,), interval=INTERVAL, k_max=GREATEST, m_max=GREATEST)
+        paper = ARX(inputs=(SPEED,), interval=INTERVAL, k=k, m=m)
+        net = NetARX(inputs=(SPEED,), interval=INTERVAL, k=k, m=m, random_state=seed)
+        for name, estimator in ((CHOSEN, chosen), (LEAST, paper), (NET, net)):
+            models[name].append(fitted(estimator, learn, [target], **timed)[target])
+        tables.append(chosen.orders_)
+        hidden.append(net.hidden_)
+        ahead = paper.one_step(judge.frame(), judge.deviations[:, number], dt=judge.dt())
+        steps.append(ahead[:, 0] - ahead[:, 1])
+    progress(0.5, "other steps of time")
+    clocks = {h: _clock(learn, judge, h, timed) for h in INTERVALS}
+    progress(0.6, "cutting tests")
+    cuts = [cut(record("precompensation-cut", seed=seed + n)[0], models[NET]) for n in range(CUTS)]
+    progress(0.9, "a warm machine, and another room")
+    still = record("etve", seed=seed)[0]
+    room = Errors.of(still.table["z_um"].to_numpy(dtype=np.float64))
+    workshop = samples_of(record(in_a_workshop(find("precompensation")), seed=seed)[-1])
+    left = workshop.deviations - at_positions(models[NET], workshop)
+    warm = warm_start(judge, models[NET][0])
+    return Computed(
+        learn,
+        judge,
+        models,
+        tables,
+        hidden,
+        Errors.of(np.concatenate(steps)),
+        clocks,
+        cuts,
+        warm,
+        room,
+        Errors.of(left),
+    )
+
+
+def samples_of(recording: Recording) -> Samples:
+    """Return the drift of Z at all positions, the spindle speed being the only input (P-01)."""
+    return stack([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED])
+
+
+def in_a_workshop(experiment: Experiment) -> Experiment:
+    """Return the same tests in a workshop that is not air-conditioned, in place of a measuring room."""
+    return replace(experiment, tests=tuple(replace(plan, climate=Climate()) for plan in experiment.tests))
+
+
+def at_positions(models: Sequence[ErrorModel], samples: Samples) -> FloatArray:
+    """Return what the model of each position predicts in free run, (n_rows, n_positions) [um]."""
+    return np.column_stack([predicted(m, samples) for m in models])
+
+
+def scheduled(time: FloatArray, predictions: FloatArray) -> FloatArray:
+    """Return what is added to the programmed Z: computed every ten minutes, and kept until the next time (P-06).
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the start of the program [s].
+    predictions : ndarray of shape (n_rows, n_positions)
+        Deviation, actual minus commanded [um].
+
+    Returns
+    -------
+    ndarray of shape (n_rows, n_positions)
+        [um]; minus the deviation (E-P4).
+    """
+    begins = np.searchsorted(time, np.floor(time / INTERVAL + 1e-9) * INTERVAL - 1e-6)
+    opposed = np.vectorize(lambda d: Correction.opposing(Deviation(d)).offset, otypes=[np.float64])
+    return np.asarray(opposed(predictions[begins]), dtype=np.float64)
+
+
+def cut(recording: Recording, models: Sequence[ErrorModel]) -> Cut:
+    """Mill a surface with the cold machine and another after an hour, without and with a corrected program (P-07)."""
+    samples = samples_of(recording)
+    running = np.flatnonzero(samples.values[:, 0] > 0)
+    minutes = samples.time / 60
+    first = (minutes >= minutes[running[0]]) & (minutes < minutes[running[0]] + MILLING)
+    last = (minutes > minutes[running[-1]] - MILLING) & (minutes <= minutes[running[-1]])
+    z = samples.deviations
+    corrected = z + scheduled(samples.time, at_positions(models, samples))
+    return Cut(*(values[last].mean(axis=0) - values[first].mean(axis=0) for values in (z, corrected)))
+
+
+def warm_start(judge: Samples, model: ErrorModel) -> Warm:
+    """Begin a job in the middle of the verification: the part is probed there, so the drift counts from there."""
+    late = np.arange(len(judge)) >= len(judge) // 2
+    job = judge.take(late)
+    job = replace(job, time=job.time - job.time[0])
+    drift = job.deviations[:, 0] - job.deviations[0, 0]
+    carried, cold = predicted(model, judge)[late], predicted(model, job)
+    return Warm(job.time / 3600, drift, drift - (cold - cold[0]), drift - (carried - carried[0]))
+
+
+def _clock(
+    learn: Samples, judge: Samples, interval: float, timed: Mapping[str, Any]
+) -> tuple[tuple[int, int], float, float]:
+    target, errors = learn.targets[0].name, []
+    k, m = PAPERS_ORDERS
+    chosen = ARX(inputs=(SPEED,), interval=interval, k_max=GREATEST, m_max=GREATEST)
+    for estimator in (chosen, ARX(inputs=(SPEED,), interval=interval, k=k, m=m)):
+        model = fitted(estimator, learn, [target], support=PAPERS_SUPPORT, **timed)[target]
+        errors.append(Errors.of(judge.deviations[:, 0] - predicted(model, judge)).rms)
+    return (chosen.k_, chosen.m_), errors[0], errors[1]

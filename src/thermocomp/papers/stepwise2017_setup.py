@@ -1,0 +1,220 @@
+"""What the study of stepwise2017 computes; `thermocomp.papers.stepwise2017` tells it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from thermocomp.assessment.robustness import Robustness, stress
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.datasets.virtual import record
+from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
+from thermocomp.models.numerics.stepwise import r_squared_of_f
+from thermocomp.models.partial_f import PartialF
+from thermocomp.models.training import train
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
+from thermocomp.papers.study import Progress
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+
+TARGET = "x1_um"
+#: F to enter and F to delete (T-03)
+F_ENTER, F_DELETE = 100.0, 50.0
+#: what the paper's model keeps of its 24 temperatures, by number (T-07), and its bound on the residual [um] (T-08)
+PAPERS_CHOICE = (3, 9, 11, 18, 23)
+PAPERS_RESIDUAL = 5.0
+#: methods by the name in the study: the paper's and those it compares with (T-08), its neighbours (T-10), and ours
+METHODS = {
+    "stepwise": "partial-f",
+    "least squares, all temperatures": "ols",
+    "projection pursuit": "ppr",
+    "principal components": "pcr",
+    "sliced inverse regression": "",
+    "dynamic (not of the paper)": "dynamic",
+}
+STEPWISE, LEAST, PURSUIT, COMPONENTS, SLICED, DYNAMIC = METHODS
+NONE = "no compensation"
+#: slices of the deviation, and directions that are kept: as many as the sensors that Zhang et al. keep
+SLICES, DIRECTIONS = 10, 5
+#: share of the largest variance below which a principal direction of the temperatures is noise
+NOISE_SHARE = 1e-4
+#: every so many rows, to see what the thresholds on F owe to the number of rows (E-T3)
+THINNED = (1, 2, 4, 8, 16)
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """The selection from some of the rows.
+
+    Parameters
+    ----------
+    rows : int
+    effective : float
+        How many independent rows the residual stands for.
+    first : float
+        R2 that a first variable needs to enter.
+    names : tuple of str
+        Temperatures chosen.
+    rms : float
+        On the on-line test [um].
+    """
+
+    rows: int
+    effective: float
+    first: float
+    names: tuple[str, ...]
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class Computed:
+    """Everything the study tells.
+
+    Parameters
+    ----------
+    fit, online : Samples
+        The test that is learned from, and the one on another day.
+    selection : PartialF
+    models : dict of str to ErrorModel
+        By the names of `METHODS`.
+    thinned : tuple of Thinned
+    absolute : Errors
+        Of the stepwise model of temperatures as they are, not from the start of the test, on the on-line test.
+    shaken : dict of str to Robustness
+        Stepwise and the two it is compared with, on the on-line test with noise and lost sensors.
+    """
+
+    fit: Samples
+    online: Samples
+    selection: PartialF
+    models: dict[str, ErrorModel]
+    thinned: tuple[Thinned, ...]
+    absolute: Errors
+    shaken: dict[str, Robustness]
+
+    @cached_property
+    def left_in_fit(self) -> dict[str, FloatArray]:
+        """What each model leaves of the test it was fitted to [um]."""
+        return _left(self.models, self.fit)
+
+    @cached_property
+    def left(self) -> dict[str, FloatArray]:
+        """What each model leaves of the on-line test [um]."""
+        return _left(self.models, self.online)
+
+    @cached_property
+    def chosen(self) -> tuple[str, ...]:
+        """Temperatures in the stepwise model."""
+        return self.selection.terms_
+
+
+def compute(seed: int, progress: Progress) -> Computed:
+    """Run the tests and do what the paper does.
+
+    Parameters
+    ----------
+    seed : int
+    progress : callable
+
+    Returns
+    -------
+    Computed
+    """
+    progress(0.0, "the two tests")
+    test, online = record("stepwise2017", seed=seed)[0], record("stepwise2017-online", seed=seed)[0]
+    learn, judge = stack([test], [TARGET]), stack([online], [TARGET])
+    heat = [c.name for c in test.temperatures]
+    warm, now = learn.only(heat), judge.only(heat)
+    progress(0.1, "stepwise regression")
+    selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
+    models = fitted(selection, warm, [TARGET])
+    found = {STEPWISE: models[TARGET]}
+    every = np.ones(len(learn), dtype=np.bool_)
+    for k, (name, method) in enumerate(METHODS.items()):
+        progress(0.2 + 0.1 * k, name)
+        if method and name not in found:
+            found[name] = train(method, learn, 0, every, support=PAPERS_SUPPORT).model
+    found[SLICED] = sliced_inverse(warm)
+    progress(0.8, "noise and lost sensors")
+    measured, rows = judge.deviations[:, 0], np.ones(len(judge), dtype=np.bool_)
+    shaken = {m: stress(found[m], judge, measured, rows).robustness for m in (STEPWISE, LEAST, PURSUIT)}
+    progress(0.95, "fewer rows")
+    thinned = tuple(_thinned(warm, now, every_so_many) for every_so_many in THINNED)
+    raw, new = (stack([r], [TARGET], heat, rezero=False) for r in (test, online))
+    absolute = fitted(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
+    return Computed(
+        learn,
+        judge,
+        selection,
+        {name: found[name] for name in METHODS},
+        thinned,
+        Errors.of(measured - predicted(absolute, new)),
+        shaken,
+    )
+
+
+def sliced_inverse(samples: Samples) -> ErrorModel:
+    """Fit least squares on the first directions of sliced inverse regression (Li 1991), the method of Zhang (T-10).
+
+    The rows are sorted by their deviation and cut into slices; the directions in which the slices' mean temperatures,
+    whitened, differ most are those the deviation depends on. Principal directions that are noise are left out first:
+    whitening would raise them to the size of the others.
+
+    Parameters
+    ----------
+    samples : Samples
+        With temperatures as inputs.
+
+    Returns
+    -------
+    ErrorModel
+        Linear.
+    """
+    X, y = samples.change(), samples.deviations[:, 0]
+    centred = X - X.mean(axis=0)
+    _, size, axes = linalg.svd(centred, full_matrices=False)
+    kept = size**2 > NOISE_SHARE * size[0] ** 2
+    whitening = axes[kept].T / size[kept] * np.sqrt(len(y))
+    white = centred @ whitening
+    slices = np.array_split(np.argsort(y, kind="stable"), SLICES)
+    between = sum(len(s) / len(y) * np.outer(white[s].mean(axis=0), white[s].mean(axis=0)) for s in slices)
+    _, directions = linalg.eigh(between)
+    onto = whitening @ directions[:, ::-1][:, :DIRECTIONS]
+    solved = lstsq(X @ onto, y)
+    names = [c.name for c in samples.inputs]
+    return Polynomial(
+        target=TARGET,
+        unit="um",
+        inputs=samples.model_inputs(range(len(names)), np.ones(len(y), dtype=np.bool_)),
+        support=PAPERS_SUPPORT,
+        provenance=None,
+        variables=tuple(Variable.single(n, i) for i, n in enumerate(names)),
+        terms=tuple((i,) for i in range(len(names))),
+        coefficients=tuple((onto @ solved.coefficients).tolist()),
+        intercept=solved.intercept,
+    )
+
+
+def _thinned(warm: Samples, online: Samples, every: int) -> Thinned:
+    some = warm.take(np.arange(0, len(warm), every))
+    selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
+    model = fitted(selection, some, [TARGET])[TARGET]
+    residual = some.deviations[:, 0] - selection.predict(some.frame())
+    error = online.deviations[:, 0] - predicted(model, online)
+    return Thinned(
+        len(some),
+        effective_sample_size(residual),
+        r_squared_of_f(F_ENTER, len(some) - 2),
+        selection.terms_,
+        Errors.of(error).rms,
+    )
+
+
+def _left(models: dict[str, ErrorModel], samples: Samples) -> dict[str, FloatArray]:
+    x = samples.deviations[:, 0]
+    return {NONE: x} | {name: x - predicted(model, samples) for name, model in models.items()}

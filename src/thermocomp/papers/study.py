@@ -1,0 +1,147 @@
+"""A paper's study redone: its claims, its numbers beside ours, and its figures as plain numbers."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+#: told after each part of a study: how much of it is done (0..1), and what comes next
+Progress = Callable[[float, str], None]
+
+
+def silent(_: float, __: str) -> None:
+    """Tell nobody."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement or number of a paper, and what came out here.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Of the requirements it covers, such as ``C-34``.
+    text : str
+        What the paper says, as a sentence that can be true or false.
+    paper : str
+        The paper's number, with its unit; "" where it prints none.
+    ours : str
+        Ours.
+    holds : bool or None
+        Whether the statement is true here; None: a number to look at, nothing that could be false.
+    finding : str
+        Why it does not hold, or what limits it. Every claim that does not hold needs one.
+    """
+
+    ids: tuple[str, ...]
+    text: str
+    paper: str
+    ours: str
+    holds: bool | None
+    finding: str = ""
+
+    def __post_init__(self) -> None:
+        if self.holds is False and not self.finding:
+            raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One curve of a panel.
+
+    Parameters
+    ----------
+    label : str
+        "" for none.
+    x, y : ndarray of shape (n,)
+        NaN breaks the line.
+    style : {'line', 'dashed', 'points'}
+    """
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+    style: Literal["line", "dashed", "points"] = "line"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Axes with curves.
+
+    Parameters
+    ----------
+    title, xlabel, ylabel : str
+        With the unit in brackets.
+    curves : sequence of Curve
+    """
+
+    title: str
+    xlabel: str
+    ylabel: str
+    curves: Sequence[Curve]
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """One figure like the paper's.
+
+    Parameters
+    ----------
+    key : str
+        For a file name, such as ``chen1996-fig14``.
+    caption : str
+        What one sees in it: a sentence or two; begins with the paper's figure number.
+    panels : sequence of Panel
+    columns : int
+        Panels side by side.
+    """
+
+    key: str
+    caption: str
+    panels: Sequence[Panel]
+    columns: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of a study.
+
+    Parameters
+    ----------
+    caption : str
+    header : sequence of str
+    rows : sequence of sequence of str
+    """
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A paper's study, run.
+
+    Parameters
+    ----------
+    name : str
+        Key of `thermocomp.papers.studies.STUDIES`.
+    title : str
+        Of the paper, with authors and year.
+    claims : tuple of Claim
+    tables : tuple of Table
+    figures : tuple of Figure
+    numbers : mapping of str to float
+        Figures that the gallery page asserts, by a name that says the unit (``mae_ann_x_um``).
+    """
+
+    name: str
+    title: str
+    claims: tuple[Claim, ...]
+    tables: tuple[Table, ...]
+    figures: tuple[Figure, ...]
+    numbers: dict[str, float]

@@ -1,0 +1,59 @@
+"""Wessel et al. 2004 redone: optimal transformations of temperatures and displacements (W-01 to W-13).
+
+Four experiments: a spindle of finite elements (`thermocomp.papers.wessel2004_spindle`), the choice of temperatures on
+23 data sets (`thermocomp.papers.wessel2004_sets`), a resting tool that is heated and a tool of a working milling
+machine (`thermocomp.papers.wessel2004_tools`). What a claim is judged by stands at the top of these modules; it was set
+down before the first run.
+"""
+
+from collections.abc import Callable
+
+from thermocomp.papers.study import Progress, Study
+from thermocomp.papers.wessel2004_sets import appendix_b
+from thermocomp.papers.wessel2004_spindle import spindle
+from thermocomp.papers.wessel2004_tools import milling_machine, resting_tool
+
+TITLE = "Wessel et al. 2004: Predicting thermal displacements in modular tool systems"
+
+
+def run(seed: int, progress: Progress) -> Study:
+    """Redo the study on the virtual machines.
+
+    Parameters
+    ----------
+    seed : int
+        Of weather and noise.
+    progress : callable
+        Told the share done and what comes next.
+
+    Returns
+    -------
+    Study
+    """
+    within = _share_of(progress)
+    fem = spindle(seed, within(0.0, 0.15))
+    selection = appendix_b(seed, within(0.15, 0.7))
+    tool = resting_tool(seed, within(0.7, 0.9), selection)
+    milling = milling_machine(seed, within(0.9, 1.0))
+    progress(1.0, "done")
+    parts = (fem, selection.part, tool, milling)
+    numbers: dict[str, float] = {}
+    for part in parts:
+        numbers |= part.numbers
+    return Study(
+        name="wessel2004",
+        title=TITLE,
+        claims=tuple(c for p in parts for c in p.claims),
+        tables=tuple(t for p in parts for t in p.tables),
+        figures=tuple(f for p in parts for f in p.figures),
+        numbers=numbers,
+    )
+
+
+def _share_of(progress: Progress) -> Callable[[float, float], Progress]:
+    """Return a maker of progress that fills part of the whole."""
+
+    def within(begin: float, end: float) -> Progress:
+        return lambda done, what: progress(begin + done * (end - begin), what)
+
+    return within

@@ -1,0 +1,253 @@
+"""Wessel's two steps: transformations are learned on some tests, displacements estimated in another (W-05)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment.replay import replay
+from thermocomp.core.model import Support
+from thermocomp.models.ace import ACE
+from thermocomp.models.ace_monotone import MonotoneACE
+from thermocomp.models.dynamic import DynamicRidge
+from thermocomp.models.ols import LeastSquares
+from thermocomp.papers.common import Errors, errors_table, fitted, predicted
+from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+ACE_NAME = "ACE"
+MLR_NAME = "multiple linear regression"
+NONE_NAME = "no compensation"
+#: what such a method is called with temperatures counted from the start of each test
+FROM_START = "{}, from each start"
+#: sweeps of the paper's rule: they end when the error fails to decrease, which may take long
+SWEEPS = 20_000
+#: a difference is slight up to this share of the displacement's span: what the eye sees in a figure
+SLIGHT = 0.01
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one experiment adds to the study."""
+
+    claims: tuple[Claim, ...]
+    tables: tuple[Table, ...]
+    figures: tuple[Figure, ...]
+    numbers: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One displacement learned on some tests and estimated in another.
+
+    Parameters
+    ----------
+    learned, unseen : Samples
+        Temperatures as read [degC].
+    ace : ACE
+        The paper's: boxcar of N = 10, k = 2.
+    estimates : dict of str to ndarray of shape (n_unseen,)
+        By method, in the unseen test [um].
+    fits : dict of str to ndarray of shape (n_learned,)
+        The same in the tests that were learned.
+    flagged : ndarray of bool of shape (n_unseen,)
+        A temperature lies outside what was learned: the guard of the frozen model.
+    """
+
+    learned: Samples
+    unseen: Samples
+    ace: ACE
+    estimates: dict[str, FloatArray]
+    fits: dict[str, FloatArray]
+    flagged: BoolArray
+
+    @property
+    def target(self) -> str:
+        """Name of the displacement."""
+        return self.unseen.targets[0].name
+
+    @property
+    def measured(self) -> FloatArray:
+        """What was measured in the unseen test [um]."""
+        return self.unseen.deviations[:, 0]
+
+    @property
+    def beyond(self) -> BoolArray:
+        """Rows of the unseen test whose displacement lies outside what was learned, by more than `SLIGHT` of it."""
+        seen = self.learned.deviations[:, 0]
+        margin = SLIGHT * np.ptp(seen)
+        return np.asarray((self.measured < seen.min() - margin) | (self.measured > seen.max() + margin))
+
+    def residual(self, method: str) -> FloatArray:
+        """Return measured minus estimated in the unseen test [um]."""
+        return self.measured - self.estimates[method]
+
+    def rms(self, method: str) -> float:
+        """Return the root mean square of the residual in the unseen test [um]."""
+        return Errors.of(self.residual(method)).rms
+
+    def fit_rms(self, method: str) -> float:
+        """Return the same in what was learned [um]."""
+        return Errors.of(self.learned.deviations[:, 0] - self.fits[method]).rms
+
+    def table(self, caption: str) -> Table:
+        """Lay out the errors of all methods in the unseen test."""
+        name = f"{self.target}, {self.unseen.test_names[0]}"
+        residuals = {(name, m): self.residual(m) for m in self.estimates}
+        return errors_table(caption, {(name, NONE_NAME): self.measured} | residuals)
+
+    def straight(self) -> str:
+        """Say how close to straight lines the transformations are: linear regression is enough if they are (W-01)."""
+        curves = {f"theta({place(self.target)})": self.ace.theta_}
+        curves |= {f"phi({place(c.name)})": phi for c, phi in zip(self.learned.inputs, self.ace.phi_, strict=True)}
+        told = []
+        for name, curve in curves.items():
+            varies = np.ptp(curve.x) > 0 and np.ptp(curve.y) > 0
+            told.append(f"{name} {np.corrcoef(curve.x, curve.y)[0, 1] ** 2 if varies else 1.0:.3f}")
+        return f"A straight line explains of the variance of {', of '.join(told)}."
+
+    def reasons(self) -> str:
+        """Say in numbers what limits the estimate by ACE, and what linear regression and a memory make of the same."""
+        error, out, seen = self.residual(ACE_NAME), self.flagged, self.learned.deviations[:, 0]
+        linear = float(np.corrcoef(seen, self.fits[MLR_NAME])[0, 1])
+        text = (
+            f"Learned: Psi {self.ace.psi_:.4f} and fit RMS {self.fit_rms(ACE_NAME):.2f} um; multiple linear regression "
+            f"has a correlation of {linear:.4f} and {self.fit_rms(MLR_NAME):.2f} um. At equal temperature the "
+            f"displacement differs by {loop_width(self.learned):.0%} of its span, which no function of one temperature "
+            f"can tell; theta falls over {self.ace.falling_theta_:.0%} of its steps. {self.straight()} Unseen: "
+        )
+        if out.any():
+            inside = f", {Errors.of(error[~out]).rms:.2f} um in the others" if not out.all() else ""
+            text += (
+                f"{out.mean():.0%} of the rows have a temperature outside what was learned, the RMS of ACE is "
+                f"{Errors.of(error[out]).rms:.2f} um in them{inside}"
+            )
+        else:
+            text += "no temperature lies outside what was learned"
+        if "dynamic" in self.estimates:
+            text += f"; with a memory ('dynamic', same temperatures) the RMS is {self.rms('dynamic'):.2f} um"
+        return text + "."
+
+
+def stacked(
+    recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
+) -> Samples:
+    """Stack recordings with one displacement and some temperatures, told by their place among the channels."""
+    first = recordings[0]
+    inputs = [first.temperatures[j].name for j in temperatures]
+    return stack(recordings, [first.displacements[displacement].name], inputs, rezero=rezero)
+
+
+def trial(
+    recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, beside: bool = True
+) -> Trial:
+    """Learn on all recordings but the last and estimate the last.
+
+    Temperatures are taken as read, as the paper does: its laptop is told temperatures. Where the tests do not begin
+    at equal ones, both methods are repeated with temperatures counted from each start, as the displacements are.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least two.
+    displacement : int
+        Place among the displacements.
+    temperatures : sequence of int
+        Places among the temperatures.
+    beside : bool
+        Also our own methods, on the same temperatures.
+
+    Returns
+    -------
+    Trial
+    """
+    learned, unseen = (stacked(r, displacement, temperatures) for r in (recordings[:-1], recordings[-1:]))
+    ace = ACE(max_sweeps=SWEEPS)
+    (model,) = fitted(ace, learned, [learned.targets[0].name], support=Support(margin=0.0)).values()
+    estimate, flagged = replay(model, unseen, np.ones(len(unseen), dtype=np.bool_))
+    estimates, fits = {ACE_NAME: estimate}, {ACE_NAME: predicted(model, learned)}
+
+    def also(name: str, estimator: ACE | LeastSquares | MonotoneACE, samples: tuple[Samples, Samples]) -> None:
+        (found,) = fitted(estimator, samples[0], [samples[0].targets[0].name]).values()
+        fits[name], estimates[name] = predicted(found, samples[0]), predicted(found, samples[1])
+
+    also(MLR_NAME, LeastSquares(), (learned, unseen))
+    if beside:
+        start = [stacked(r, displacement, temperatures, rezero=True) for r in (recordings[:-1], recordings[-1:])]
+        zeroed = (start[0], start[1])
+        begins = np.vstack([s.reference() for s in zeroed])
+        if np.ptp(begins, axis=0).max() > 0.01 * np.ptp(learned.values, axis=0).max():
+            also(FROM_START.format(ACE_NAME), ACE(max_sweeps=SWEEPS), zeroed)
+            also(FROM_START.format(MLR_NAME), LeastSquares(), zeroed)
+        also("ace-monotone", MonotoneACE(), zeroed)
+        fits["dynamic"], estimates["dynamic"] = _dynamic(recordings, zeroed)
+    return Trial(learned, unseen, ace, estimates, fits, flagged)
+
+
+def _dynamic(recordings: Sequence[Recording], zeroed: tuple[Samples, Samples]) -> tuple[FloatArray, FloatArray]:
+    """Fit `dynamic` to the same temperatures, and the spindle speed where there is one."""
+    speeds = [c.name for c in recordings[0].of_quantity("spindle_speed")]
+    names = [*(c.name for c in zeroed[0].inputs), *speeds]
+    target = zeroed[0].targets[0].name
+    learned, unseen = (stack(r, [target], names) for r in (recordings[:-1], recordings[-1:]))
+    (model,) = fitted(
+        DynamicRidge(speed=speeds), learned, [target], support=Support(), dt=learned.dt(), cycle=learned.cycle
+    ).values()
+    return predicted(model, learned), predicted(model, unseen)
+
+
+def loop_width(samples: Samples, steps: int = 20) -> float:
+    """Return how far the displacement differs at equal temperature, as a share of its span: the hysteresis loop.
+
+    The span of each temperature is cut into equal steps; the width is the greatest range of the displacement in a
+    step, after what a straight line explains there. Of several temperatures that of the narrowest loop counts.
+
+    Parameters
+    ----------
+    samples : Samples
+    steps : int
+
+    Returns
+    -------
+    float
+    """
+    y = samples.deviations[:, 0]
+    widths = []
+    for x in samples.values.T:
+        place = np.minimum((steps * (x - x.min()) / max(np.ptp(x), 1e-12)).astype(np.intp), steps - 1)
+        level = y - np.polyval(np.polyfit(x, y, 1), x) if np.ptp(x) > 0 else y
+        widths.append(max(float(np.ptp(level[place == k])) for k in np.unique(place)))
+    return min(widths) / float(np.ptp(y))
+
+
+def series(samples: Samples, values: FloatArray, labels: Sequence[str], *, points: bool = False) -> list[Curve]:
+    """Return columns of values over the hours of a test, or over the number of the measuring point."""
+    x = np.arange(1, len(samples) + 1, dtype=np.float64) if points else samples.time / 3600
+    return [Curve(label, x, column) for label, column in zip(labels, values.T, strict=True)]
+
+
+def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> list[Panel]:
+    """Return what was measured, as the paper shows it: temperatures above, displacements below, by measuring point."""
+    first = recordings[0]
+    chosen = [first.temperatures[j] for j in temperatures]
+    everything = stack(recordings, [c.name for c in first.displacements], [c.name for c in chosen], rezero=False)
+    names = [place(c.name) for c in chosen], [place(c.name) for c in first.displacements]
+    return [
+        Panel(
+            "", "measuring point", "temperature [degC]", series(everything, everything.values, names[0], points=True)
+        ),
+        Panel(
+            "", "measuring point", "displacement [um]", series(everything, everything.deviations, names[1], points=True)
+        ),
+    ]
+
+
+def place(channel: str) -> str:
+    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1."""
+    short = channel.removeprefix("t_").rpartition("_")[0]
+    return short.upper() if short[:1] in "ts" and short[1:].isdigit() else short

@@ -1,0 +1,161 @@
+"""The bed as a sheet in plane stress on levelling mounts: warmer on top, it crowns and lets the column lean."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skfem import MeshQuad
+
+from thermocomp.simulation.fem.conduction import capacity, conduction, edge, faces, together
+from thermocomp.simulation.fem.elasticity import Elastic, Tie
+from thermocomp.simulation.fem.materials import Material
+from thermocomp.simulation.fem.part import Part
+from thermocomp.simulation.fem.space import Space
+
+FloatArray = NDArray[np.float64]
+
+#: radius of the spot of a sensor, a mount or a carriage [m]
+_SPOT = 0.12
+#: half of the table's guides along Z [m]
+_GUIDE = 0.20
+
+
+@dataclass(frozen=True)
+class Bed:
+    """A box bed, in the plane z-y; z from its middle (front is -z), y from its underside.
+
+    Parameters
+    ----------
+    length, height, width : float
+        Along z, mounts to top, right to left [m].
+    base : float
+        Of the underside above the floor [m].
+    web, top, bottom : float
+        Thickness of side walls and ribs together; of the top plate; of the bottom plate [m].
+    mount : float
+        Mounts in front of the middle and behind it [m].
+    bearing : float
+        Bearing of the Z screw behind the middle [m].
+    hydraulics : float
+        Middle of the hydraulic unit on the rear face, above the middle of the height [m].
+    table, foot, shoe : float
+        z of the table's middle and of the column's; carriages of the column in front of it and behind it [m].
+    cells : tuple of int
+        Elements along, and up between the plates.
+    """
+
+    length: float
+    height: float
+    width: float
+    base: float
+    web: float
+    top: float
+    bottom: float
+    mount: float
+    bearing: float
+    hydraulics: float
+    table: float
+    foot: float
+    shoe: float
+    cells: tuple[int, int] = (28, 5)
+
+    def part(self, name: str, material: Material) -> Part:
+        """Cut the bed into finite elements.
+
+        Parameters
+        ----------
+        name : str
+        material : Material
+
+        Returns
+        -------
+        Part
+            Surfaces: ``outside`` (sides, front, rear, and the top from the column on, to the room), ``work`` (top before
+            the column, to the work space), ``bottom`` (to the floor). Patches: ``front rear`` (top under table and
+            column), ``table shoe_front shoe_rear`` (guides), ``bearing`` (of Z), ``mount_front mount_rear``,
+            ``hydraulics``. Observables against the mounts [um, urad]: ``z`` (bearing of Z away from the table), ``y``
+            (column's carriages above the table's guides), ``a_foot a_table`` (tilt about X there), ``foot`` (growth from
+            the column's front carriage to its rear one).
+        """
+        z = np.linspace(-self.length / 2.0, self.length / 2.0, self.cells[0] + 1)
+        # A node where the work space ends: in front of the column.
+        front = self.foot - 2.0 * self.shoe
+        z[np.abs(z - front).argmin()] = front
+        y = np.linspace(self.bottom, self.height - self.top, self.cells[1] + 1)
+        mesh = MeshQuad.init_tensor(z, np.concatenate([[0.0], y, [self.height]]))
+        middle = mesh.p[1, mesh.t].mean(axis=0)
+        web = (middle > self.bottom) & (middle < self.height - self.top)
+        space = Space(mesh, np.where(web, self.web, self.width))
+
+        def up(x: FloatArray) -> FloatArray:
+            return self.base + x[1]
+
+        def surface(where: Callable[[FloatArray], NDArray[np.bool_]]) -> Any:
+            return edge(space, where, height=up, width=self.width)
+
+        def top(at: float, radius: float = _SPOT, on: Space = space) -> FloatArray:
+            return on.edge_mean(lambda x: x[1] > self.height - 1e-9, _hat(0, at, radius))
+
+        def under(at: float, on: Space = space) -> FloatArray:
+            return on.edge_mean(lambda x: x[1] < 1e-9, _hat(0, at, _SPOT))
+
+        body = Elastic(space, modulus=material.modulus, poisson=material.poisson, expansion=material.expansion)
+        sheet = body.space
+
+        def tilt(at: float, half: float) -> FloatArray:
+            """Tilt about X between two points of the top: a rise towards the rear is negative."""
+            return body.row((top(at - half, on=sheet) - top(at + half, on=sheet)) / (2.0 * half), 1)
+
+        def lift(at: float, half: float) -> FloatArray:
+            return body.row((top(at - half, on=sheet) + top(at + half, on=sheet)) / 2.0, 1)
+
+        return Part(
+            name,
+            capacity(space, material.heat_capacity),
+            conduction(space, material.conductivity),
+            {
+                "outside": together(
+                    faces(space, 2.0, height=up),
+                    surface(lambda x: np.abs(x[0]) > self.length / 2.0 - 1e-9),
+                    surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] > front)),
+                ),
+                "work": surface(lambda x: (x[1] > self.height - 1e-9) & (x[0] < front)),
+                "bottom": surface(lambda x: x[1] < 1e-9),
+            },
+            {
+                "front": top(self.table),
+                "rear": top(self.foot),
+                "table": top(self.table, 2.0 * _GUIDE),
+                "shoe_front": top(self.foot - self.shoe),
+                "shoe_rear": top(self.foot + self.shoe),
+                "bearing": top(self.bearing),
+                "mount_front": under(-self.mount),
+                "mount_rear": under(self.mount),
+                "hydraulics": space.edge_mean(
+                    lambda x: x[0] > self.length / 2.0 - 1e-9, _hat(1, self.height / 2.0 + self.hydraulics, 0.2)
+                ),
+            },
+            body.observables(
+                {
+                    "z": body.row(top(self.bearing, on=sheet) - top(self.table, on=sheet), 0),
+                    "y": lift(self.foot, self.shoe) - lift(self.table, _GUIDE),
+                    "a_foot": tilt(self.foot, self.shoe),
+                    "a_table": tilt(self.table, _GUIDE),
+                    "foot": body.row(
+                        top(self.foot + self.shoe, on=sheet) - top(self.foot - self.shoe, on=sheet), 0
+                    ),
+                },
+                [
+                    Tie(body.row(under(-self.mount, sheet), 1)),
+                    Tie(body.row(under(self.mount, sheet), 1)),
+                    Tie(body.row(under(0.0, sheet), 0)),
+                ],
+            ),
+        )
+
+
+def _hat(axis: int, at: float, radius: float) -> Callable[[FloatArray], FloatArray]:
+    """Return a weight that falls from 1 at a coordinate to 0 at the radius."""
+    return lambda x: np.maximum(0.0, 1.0 - np.abs(x[axis] - at) / radius)

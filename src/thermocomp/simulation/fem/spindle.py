@@ -1,0 +1,16 @@
+"""The spindle: shaft with rotor, bearings, housing, stator and test bar, as bodies of revolution."""
+
+from thermocomp.simulation.fem.materials import data
+from thermocomp.simulation.fem.part import Part
+from thermocomp.simulation.fem.revolution import Revolution, Table
+
+
+def spindle(table: Table | None = None) -> Part:
+    """Return the spindle as a part, z = 0 at the flange, z towards the tool.
+
+    Parameters
+    ----------
+    table : mapping, optional
+        As ``data/spindle.toml``, which is used without it; see `thermocomp.simulation.fem.revolution.Revolution`.
+    """
+    return Revolution(data("spindle.toml") if table is None else table).part("spindle")

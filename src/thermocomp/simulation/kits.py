@@ -1,0 +1,364 @@
+"""What can be mounted on the virtual machines, and done to them: places, probes, lasers, loads."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import TypeVar
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.simulation.heat import TRAVEL, HeatSources
+from thermocomp.simulation.machine import AXES, Air
+
+T = TypeVar("T")
+
+#: Chen 1996, Table 1 (C-11): dT1..dT4, dT6..dT9; dT5 is the mean of the last four
+CHEN_PLACES = (
+    "air",
+    "housing",
+    "y_nut",
+    "y_bearing",
+    "column_front_right",
+    "column_front_left",
+    "column_rear_right",
+    "column_rear_left",
+)
+#: Hwang (H-08): T1..T14
+HWANG_PLACES = (
+    "x_bearing",
+    "x_nut",
+    "y_bearing",
+    "y_nut",
+    "z_bearing",
+    "z_nut",
+    "front_seat",
+    "rear_seat",
+    "column_front_right",
+    "column_front_left",
+    "column_rear_right",
+    "column_rear_left",
+    "bed_front",
+    "bed_rear",
+)
+#: a usual outfit: what a user would mount on a machine
+USUAL_PLACES = (
+    "front_seat",
+    "motor",
+    "housing",
+    "column_front_right",
+    "column_front_left",
+    "column_rear_right",
+    "column_rear_left",
+    "bed_front",
+    "bed_rear",
+    "table",
+    "x_bearing",
+    "y_bearing",
+    "z_bearing",
+    "coolant",
+    "enclosure",
+    "air",
+)
+
+#: distance of the two probes of X, and of Y, along the test bar [m]
+PROBE_DISTANCE = 0.1
+#: where the deviations x, y, z of the tool point hold; the axes' own positioning comes on top elsewhere [mm]
+TEST_POSITION = {"x": 300.0, "y": 250.0, "z": 250.0}
+#: at which the machine tells the positioning of each axis [mm]
+STATIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": tuple(range(0, 601, 100))}
+#: cold positioning error of Y in mm, for y in mm: Chen 1996, Eq. 6 (C-22), constant first; X and Z have none
+CHEN_COLD_PROFILE = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
+
+
+def cold_profile(position: float) -> float:
+    """Return the geometric positioning error of Y [um] at a position [mm]."""
+    return 1e3 * sum(c * position**k for k, c in enumerate(CHEN_COLD_PROFILE))
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A displacement probe, a line of a laser, or a touch probe on an artefact.
+
+    Parameters
+    ----------
+    place : str
+        In words.
+    reads : mapping of str to float
+        Weights of the machine's observables in its value; the value is 1 um per um, 1 um per urad and m.
+    cold : float
+        Its value in the state in which the test begins [um].
+    """
+
+    place: str
+    reads: Mapping[str, float]
+    cold: float = 0.0
+
+
+def positioning(axis: str, position: float) -> dict[str, float]:
+    """Return the weights of the observables in the positioning of an axis [um], linear between two stations.
+
+    Parameters
+    ----------
+    axis : {'x', 'y', 'z'}
+    position : float
+        [mm]
+
+    Raises
+    ------
+    SettingError
+        The position is beyond the travel.
+    """
+    if not 0.0 <= position <= TRAVEL[axis]:
+        raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
+    stations = STATIONS[axis]
+    below = max(k for k in range(len(stations) - 1) if stations[k] <= position)
+    low, high = stations[below : below + 2]
+    share = (position - low) / (high - low)
+    return {name: w for name, w in ((_at(axis, low), 1.0 - share), (_at(axis, high), share)) if w}
+
+
+def _at(axis: str, station: int) -> str:
+    return f"{axis}{axis}@{station}"
+
+
+def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
+    """Return the sum of weights, each with its factor."""
+    total: dict[str, float] = {}
+    for factor, weights in parts:
+        for name, w in weights.items():
+            total[name] = total.get(name, 0.0) + factor * w
+    return {name: w for name, w in total.items() if w}
+
+
+def _laser(axis: str, position: float) -> Probe:
+    # A laser measures each profile from its first position: the shift of the origin is not in it.
+    reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
+    cold = cold_profile(position) if axis == "y" else 0.0
+    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, cold)
+
+
+def touched(axis: str, position: float) -> dict[str, float]:
+    """Return the weights of the observables in the tool point's deviation along an axis that stands at a position.
+
+    Parameters
+    ----------
+    axis : {'x', 'y', 'z'}
+    position : float
+        [mm]
+    """
+    own = (1.0, positioning(axis, position)), (-1.0, positioning(axis, TEST_POSITION[axis]))
+    return _summed((1.0, {axis: 1.0}), *own)
+
+
+def _at_position(axis: str, position: float) -> Probe:
+    where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
+    return Probe(where, touched(axis, position))
+
+
+#: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L
+_NEST = {
+    "x1": Probe("X at the tip of the test bar", {"x": 1.0}),
+    "x2": Probe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
+    "y1": Probe("Y at the tip of the test bar", {"y": 1.0}),
+    "y2": Probe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
+    "z": Probe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
+}
+#: measured where nothing moves the spindle: in a calculation, or on the spindle itself
+_SPINDLE = {
+    "nose": Probe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
+    "tip": Probe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),
+}
+
+
+@dataclass(frozen=True)
+class Kit:
+    """What can be mounted on one of the virtual machines, and done to it.
+
+    Parameters
+    ----------
+    places : mapping of str to str
+        Place of a temperature sensor -> where it is, in words.
+    air : mapping of str to float
+        Height above the floor of those `places` that are in the air [m].
+    inner : mapping of str to str
+        Places that only a calculation can read: they turn.
+    probes : mapping of str to Probe
+    observables : tuple of str
+        What probes can be made of.
+    outfits, nests : mapping of str to tuple of str
+        Names that stand for several places, or several probes.
+    loads : mapping of str to str
+        Where further heat can be put in.
+    top_speed : float
+        Of the spindle [1/min]; 0: there is none.
+    """
+
+    places: Mapping[str, str]
+    air: Mapping[str, float]
+    probes: Mapping[str, Probe]
+    observables: tuple[str, ...]
+    outfits: Mapping[str, tuple[str, ...]]
+    nests: Mapping[str, tuple[str, ...]]
+    loads: Mapping[str, str]
+    inner: Mapping[str, str] = field(default_factory=dict)
+    top_speed: float = 0.0
+
+    def place(self, name: str, *, perfect: bool) -> str:
+        """Return where a temperature is, in words.
+
+        Parameters
+        ----------
+        name : str
+        perfect : bool
+            It is calculated, not measured.
+
+        Raises
+        ------
+        SettingError
+            There is no such place, or nobody can measure there.
+        """
+        if name in self.inner and not perfect:
+            raise SettingError(f"{name!r} turns: it can only be calculated, with perfect = true")
+        known = {**self.places, **self.inner} if perfect else self.places
+        if name not in known:
+            raise unknown("place", name, [*known, *self.outfits])
+        return known[name]
+
+    def probe(self, name: str | Mapping[str, float]) -> Probe:
+        """Return a probe by its name, such as ``z``, ``y_laser_250`` or ``z_at_400``, or by its weights.
+
+        Raises
+        ------
+        SettingError
+            There is no such probe or observable, or its position is beyond the travel.
+        """
+        if not isinstance(name, str):
+            for observable in name:
+                if observable not in self.observables:
+                    raise unknown("observable", observable, self.observables)
+            return Probe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
+        if name in self.probes:
+            return self.probes[name]
+        found = re.fullmatch(r"([xyz])_(laser|at)_(\d+)", name) if self.top_speed else None
+        if not found:
+            raise unknown("probe", name, [*self.probes, *self.nests])
+        axis, kind, position = found.groups()
+        return (_laser if kind == "laser" else _at_position)(axis, float(position))
+
+
+def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
+    """Return what is mounted by the label that it gets in its channel's name.
+
+    Parameters
+    ----------
+    names : sequence of str, or mapping of str to str
+        Without labels a name is its own label.
+    sets : mapping of str to tuple of str
+        Names that stand for several.
+    """
+    if not isinstance(names, Mapping):
+        return {n: n for given in names for n in sets.get(given, (given,))}
+    check_labels(names)
+    return dict(names)
+
+
+def check_labels(labels: Iterable[str]) -> None:
+    """Raise `SettingError` if a label cannot be part of a channel's name."""
+    for label in labels:
+        if not re.fullmatch(r"[A-Za-z0-9_]+", label):
+            raise SettingError(f"{label!r} cannot name a channel: use letters, digits and underscores")
+
+
+def unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
+    """Return the error of a name that nobody knows; it tells the nearest ones."""
+    known = list(known)
+    near = get_close_matches(name, known, n=3, cutoff=0.4)
+    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
+    return SettingError(f"there is no {what} {name!r}; {hint}", path)
+
+
+_COLUMN = {
+    "column_front_right": "column, upper front right",
+    "column_front_left": "column, upper front left",
+    "column_rear_right": "column, upper rear right",
+    "column_rear_left": "column, upper rear left",
+}
+#: the usual places of the machining centre; shaft and screws turn: nobody measures them
+PLACES: dict[str, str] = {
+    "front_seat": "spindle housing round the front bearing",
+    "rear_seat": "spindle housing round the rear bearing",
+    "motor": "spindle motor, stator",
+    "housing": "spindle housing, flange",
+    "headstock_front": "headstock, front wall",
+    "headstock_rear": "headstock, at the column's guide",
+    **_COLUMN,
+    "bed_front": "bed under the table",
+    "bed_rear": "bed under the column",
+    "table": "table",
+    "x_nut": "nut of the X screw",
+    "x_bearing": "bearing of the X screw",
+    "y_nut": "nut of the Y screw",
+    "y_bearing": "bearing of the Y screw",
+    "z_nut": "nut of the Z screw",
+    "z_bearing": "bearing of the Z screw",
+    "coolant": "coolant of the spindle, in the tank",
+    "enclosure": "work space",
+    "air": "environment, at the height of the machine's middle",
+    "air_top": "environment, above the machine",
+    "air_floor": "environment, at the floor",
+}
+
+CENTRE = Kit(
+    places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
+    air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
+    probes=_NEST | _SPINDLE,
+    observables=("x", "y", "z", "a", "b", "nose", "tip", "slide", *(_at(a, p) for a in AXES for p in STATIONS[a])),
+    outfits={"all": tuple(PLACES), "usual": USUAL_PLACES, "chen": CHEN_PLACES, "hwang": HWANG_PLACES},
+    nests={"nest": tuple(_NEST), **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES}},
+    loads={
+        "tool_tip": "cutting edge: what of the cutting power goes into the tool",
+        "coolant": "coolant tank; negative: taken from it",
+        "cabinet": "electric cabinet, on the column's rear",
+        "hydraulics": "hydraulic unit, at the bed's rear",
+        **{f"{a}_bearing": f"motor and bearing of the {a.upper()} screw" for a in AXES},
+    },
+    inner={
+        "tool": "tool, or test bar",
+        "shaft": "spindle shaft",
+        "front_bearing": "front bearing, rings",
+        "rear_bearing": "rear bearing, rings",
+        **{f"{a}_screw": f"screw of {a.upper()}, mean over its travel" for a in AXES},
+    },
+    top_speed=HeatSources().top_speed,
+)
+
+#: Wessel's resting tool (W-08), from the tool down to the fit of the bearing; T9 is the room
+_TOOL_PLACES = {
+    "t1": "tool shank",
+    "t2": "chuck, front",
+    "t3": "chuck, middle",
+    "t4": "flange of the chuck",
+    "t5": "shaft, nose",
+    "t6": "shaft, between nose and bearing fit",
+    "t7": "shaft, foot",
+    "t8": "shaft, bearing fit",
+    "t9": "room",
+}
+_AXIAL = {
+    "s1": Probe("axial, tip of the tool", {"s1": 1.0}),
+    "s2": Probe("axial, front of the chuck", {"s2": 1.0}),
+    "s3": Probe("axial, flange of the chuck", {"s3": 1.0}),
+}
+
+TOOL = Kit(
+    places=_TOOL_PLACES,
+    air={"t9": Air.REFERENCE_HEIGHT},
+    probes=_AXIAL,
+    observables=tuple(_AXIAL),
+    outfits={"all": tuple(_TOOL_PLACES)},
+    nests={"nest": tuple(_AXIAL)},
+    loads={"heater": "heating elements at the bearing's fit of the shaft", "tip": "hot air at the tip"},
+)
+
+#: by the names that protocols use
+KITS: dict[str, Kit] = {"centre": CENTRE, "tool": TOOL}

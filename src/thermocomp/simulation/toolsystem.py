@@ -1,0 +1,123 @@
+"""A heated tool that rests in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.simulation.joints import play
+from thermocomp.simulation.machine import Air, Drive, Truth, stretches
+from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ToolState:
+    """All that the tool remembers.
+
+    Parameters
+    ----------
+    field : ndarray of shape (n_states,)
+        Of the reduced model.
+    slipped : float
+        How far the shank has slipped in the chuck [um].
+    """
+
+    field: FloatArray
+    slipped: float
+
+
+@dataclass(frozen=True, eq=False)
+class RestingTool:
+    """A chuck with its tool on a fixed shaft; fills `thermocomp.simulation.machine.VirtualMachine`.
+
+    Heaters at the bearing's fit warm it from behind, hot air from the tip. Its heat loss grows faster than its
+    temperature (natural convection, radiation), and the shank slips in the chuck only when friction gives way.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    stiction : float
+        How far the shank may want to slip in the chuck before it does [um]; an engineering value.
+    loss, loss_exponent : float
+        Heat given to the room beyond the linear part is ``loss rise |rise|^loss_exponent``, of the surface's mean
+        rise [W, K]; free convection has an exponent of 1/4 (laminar, vertical or cylindrical surfaces).
+    longest_step : float
+        The loss is looked at this often [s].
+    """
+
+    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool"))
+    stiction: float = 0.8
+    loss: float = 0.02
+    loss_exponent: float = 0.25
+    longest_step: float = 20.0
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of the places whose temperatures are known."""
+        return self.model.places
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of the displacements."""
+        return self.model.observables
+
+    def init(self, air: Air) -> ToolState:
+        """Return the state of a tool that has long been at the temperature of the room."""
+        state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, ())
+        return ToolState(state, self._wish(self._linear(state[None])).item())
+
+    def run(self, state: ToolState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
+        """Advance by one step of `dt` per drive, see `thermocomp.simulation.machine.VirtualMachine.run`.
+
+        Raises
+        ------
+        InputError
+            `dt` is not positive, the tool is asked to turn, or a load is put in where there is no place for it.
+        """
+        if not (dt > 0 and math.isfinite(dt)):
+            raise InputError(f"step of {dt} s: must be positive")
+        parts = math.ceil(dt / self.longest_step)
+        fields = np.empty((len(drives) * parts, len(self.model.one)))
+        operators = self.model.operators((), dt / parts, ("surface",))
+        surface = self.model.inputs.index("surface")
+        now, watched = state.field, float((self.model.rows(("surface",)) @ state.field).item())
+        for first, last in stretches(drives):
+            given = self._given(drives[first])
+            for k in range(first * parts, last * parts):
+                rise = watched - air[k // parts, 0]
+                given[surface] = -self.loss * rise * abs(rise) ** self.loss_exponent
+                after = operators.state @ now + operators.heat @ given + operators.air @ air[k // parts]
+                fields[k] = now = after[:-1]
+                watched = float(after[-1])
+        observables = self._linear(fields)
+        wish = self._wish(observables)
+        slipped = play(state.slipped, wish, self.stiction)
+        observables[:, self.observables.index("s1")] += slipped - wish
+        ends = slice(parts - 1, None, parts)
+        truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])
+        return ToolState(now, float(slipped[-1])), truth
+
+    def _linear(self, fields: FloatArray) -> FloatArray:
+        result: FloatArray = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
+        return result
+
+    def _wish(self, observables: FloatArray) -> FloatArray:
+        """Growth of the clamped shank [um], from the chuck's front to the tip: what friction holds back."""
+        s1, s2 = (self.observables.index(n) for n in ("s1", "s2"))
+        result: FloatArray = observables[:, s1] - observables[:, s2]
+        return result
+
+    def _given(self, drive: Drive) -> FloatArray:
+        if drive.speed or any(drive.feed):
+            raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
+        given = np.zeros(len(self.model.inputs))
+        for place, load in drive.loads.items():
+            if place not in self.model.inputs:
+                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(self.model.inputs)}")
+            given[self.model.inputs.index(place)] = load if drive.powered else 0.0
+        return given

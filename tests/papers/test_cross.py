@@ -1,0 +1,172 @@
+"""The table across the papers: what is learned, what is judged, and what each figure in it means."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.assessment.robustness import stress
+from thermocomp.core.exceptions import InputError
+from thermocomp.files import recordings as files
+from thermocomp.models.methods import METHODS
+from thermocomp.models.training import train
+from thermocomp.papers import cross
+from thermocomp.papers.cross import Experiment, Row
+from thermocomp.recording.cycles import find_cycles, whole
+from thermocomp.recording.recording import Recording
+
+METHODS_HERE = ("ols", "dynamic", "arx")
+
+
+def three_tests(name: str, seed: int) -> list[Recording]:
+    """Return an experiment of three tests; without a spindle speed if it is the resting one."""
+    speeds = ((1000.0, 2500.0), (3000.0, 1800.0), (2200.0,))
+    found = [replace(small_machine(s, seed=10 * seed + k), name=f"{name}-{k}") for k, s in enumerate(speeds)]
+    if name != "resting":
+        return found
+    still = []
+    for r in found:
+        kept = tuple(c for c in r.channels if c.quantity != "spindle_speed")
+        still.append(replace(r, table=r.table[[c.name for c in kept]], channels=kept, cycles=whole(len(r))))
+    return still
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
+    """The small machine in place of the virtual one; what was asked of it."""
+    asked: list[tuple[str, int]] = []
+
+    def record(name: str, *, seed: int) -> list[Recording]:
+        asked.append((name, seed))
+        return three_tests(name, seed)
+
+    monkeypatch.setattr(cross, "record", record)
+    return asked
+
+
+def row(rows: Sequence[Row], method: str) -> Row:
+    (found,) = [r for r in rows if r.method == method]
+    return found
+
+
+def test_the_last_tests_are_unseen(machine: list[tuple[str, int]]) -> None:
+    task = cross.virtual(Experiment("moving", "z_um", unseen=2), seed=3)
+    (split,) = task.protocol.splits
+    np.testing.assert_array_equal(split.learn, task.samples.test == 0)
+    np.testing.assert_array_equal(split.judge, task.samples.test > 0)
+    assert machine == [("moving", 3)]
+    assert task.name == "moving, z_um"
+
+
+def test_what_follows_has_another_seed(machine: list[tuple[str, int]]) -> None:
+    task = cross.virtual(Experiment("moving", -1, then="later"), seed=3)
+    assert machine == [("moving", 3), ("later", 4)]
+    assert task.samples.targets[0].name == "x_um"
+    np.testing.assert_array_equal(task.protocol.splits[0].judge, task.samples.test == 5)
+
+
+@pytest.mark.usefixtures("machine")
+def test_figures_of_a_row() -> None:
+    task = cross.virtual(Experiment("moving", "z_um"), seed=0)
+    rows = cross.judge(task, METHODS_HERE)
+    assert [r.method for r in rows] == [cross.NONE, *METHODS_HERE]
+    split, y = task.protocol.splits[0], task.samples.deviations[:, 0]
+    none = row(rows, cross.NONE)
+    assert none.rms == pytest.approx(np.sqrt(np.mean(y[split.judge] ** 2)))
+    assert none.fit_rms == pytest.approx(np.sqrt(np.mean(y[split.learn] ** 2)))
+    assert (none.sensors, none.noise_rms, none.lost_rms) == (0, none.rms, none.rms)
+
+    trained = train("ols", task.samples, 0, split.learn)
+    X = task.samples.only([i.name for i in trained.model.inputs]).frame()
+    residual = y - trained.estimator.predict(X)
+    ols = row(rows, "ols")
+    assert ols.fit_rms == pytest.approx(np.sqrt(np.mean(residual[split.learn] ** 2)))
+    assert ols.rms == pytest.approx(np.sqrt(np.mean(residual[split.judge] ** 2)))
+    assert ols.max_abs == pytest.approx(np.abs(residual[split.judge]).max())
+    assert ols.peak_to_peak == pytest.approx(np.ptp(residual[split.judge]))
+    stressed = stress(trained.model, task.samples, y[split.judge], split.judge).robustness
+    assert ols.noise_rms == stressed.noise_rms["uniform"][0] > ols.rms
+    assert (ols.lost, ols.lost_rms) == stressed.worst_lost
+    assert ols.sensors == 3
+    assert row(rows, "arx").noise_rms == pytest.approx(row(rows, "arx").rms)  # it knows no temperature
+
+
+def test_of_a_measured_machine_every_cycle_is_unseen_once(recording: Recording) -> None:
+    task = cross.measured([recording], "x_um")
+    assert len(task.protocol.splits) == 4
+    assert np.sum([s.judge for s in task.protocol.splits], axis=0).tolist() == [1] * len(recording)
+    (none, ols) = cross.judge(task, ["ols"])
+    y, squares, n = task.samples.deviations[:, 0], 0.0, 0
+    for s in task.protocol.splits:
+        trained = train("ols", task.samples, 0, s.learn)
+        fitted = trained.estimator.predict(task.samples.only([i.name for i in trained.model.inputs]).frame())
+        squares, n = squares + float(((y - fitted)[s.learn] ** 2).sum()), n + int(s.learn.sum())
+    assert ols.fit_rms == pytest.approx(np.sqrt(squares / n))
+    assert none.rms == pytest.approx(np.sqrt(np.mean(y**2)))
+
+
+@pytest.mark.usefixtures("machine")
+def test_a_method_that_cannot_be_fitted_is_told(recording: Recording) -> None:
+    study = cross.run(0, methods=METHODS_HERE, experiments=[Experiment("resting", "z_um")])
+    (claim,) = study.claims
+    assert claim.finding.endswith("Not fitted: arx.")
+    cells = next(r for r in study.tables[0].rows if r[1] == "arx")
+    assert cells[2].startswith("not fitted: there is no spindle speed")
+    assert "resting, z_um, arx: rms_um" not in study.numbers
+
+
+@pytest.mark.usefixtures("machine")
+def test_one_table_of_all(recording: Recording) -> None:
+    told: list[float] = []
+    study = cross.run(
+        0,
+        lambda share, _: told.append(share),
+        [recording],
+        methods=("ols", "dynamic"),
+        experiments=[Experiment("moving", "z_um"), Experiment("resting", "x_um")],
+    )
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    (table,) = study.tables
+    assert all(len(r) == len(table.header) for r in table.rows)
+    tasks = ["moving, z_um", "resting, x_um", "small, z_um", "small, x_um"]
+    assert [r[:2] for r in table.rows] == [[t, m] for t in tasks for m in (cross.NONE, "ols", "dynamic")]
+    assert [c.ids for c in study.claims] == [("X-03",), ("X-03",), ("X-02", "X-03"), ("X-02", "X-03")]
+    ratio = study.numbers["moving, z_um, ols: rms_um"] / study.numbers["moving, z_um, none: rms_um"]
+    (panel,) = study.figures[0].panels
+    assert panel.curves[0].label == "ols"
+    assert panel.curves[0].y[0] == pytest.approx(ratio)
+
+
+def test_a_method_that_does_harm_is_a_finding() -> None:
+    def made(method: str, rms: float) -> Row:
+        return Row("a task", method, 1.0, rms, 0.0, 0.0, 0.0, 0.0, "", 1, 0.0)
+
+    (good,) = cross._claims([made("none", 5.0), made("ols", 4.0), made("mlp", 2.0)], real=False)
+    assert good.holds
+    assert good.ours == "best mlp 2.00 um of 5.00 um; 0 of 2 do harm"
+    (bad,) = cross._claims([made("none", 5.0), made("ols", 6.0), made("mlp", 2.0)], real=True)
+    assert bad.holds is False
+    assert "Worse than none: ols 6.0 um." in bad.finding
+
+
+def test_methods_are_known_and_unknown_ones_refused() -> None:
+    assert set(cross.FAST) <= set(METHODS)
+    with pytest.raises(InputError, match="unknown model 'olss'"):
+        cross.run(0, methods=["olss"], experiments=[])
+
+
+def test_a_measured_machine(shared_data: Path) -> None:
+    """fl_thermal, every fifth row: least squares fits four times better than it keeps, a memory keeps what it fits."""
+    every = files.read(shared_data / "fl_thermal" / "recording.csv")
+    table, time = every.table.iloc[::5].reset_index(drop=True), every.time[::5]
+    recording = replace(every, table=table, time=time, cycles=find_cycles(time, table["spindle_rpm"].to_numpy()))
+    study = cross.run(0, recordings=[recording], methods=("ols", "dynamic"), experiments=[], targets=["ch1_um"])
+    rms = {m: study.numbers[f"recording, ch1_um, {m}: rms_um"] for m in (cross.NONE, "ols", "dynamic")}
+    assert rms["dynamic"] < 2.0
+    assert 3 * rms["dynamic"] < rms["ols"] < rms[cross.NONE]
+    (ols,) = [r for r in study.tables[0].rows if r[1] == "ols"]
+    assert float(ols[3]) > 4 * float(ols[2])

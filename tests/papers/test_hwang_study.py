@@ -1,0 +1,119 @@
+"""Hwang's study: its procedure on the virtual machine, and that its claims can fail."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from thermocomp.datasets.virtual import record
+from thermocomp.models.selection.grouping import Interval
+from thermocomp.papers import hwang, hwang_setup
+from thermocomp.papers.common import predicted
+from thermocomp.papers.study import Claim, Study, silent
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+IDS = {"H-01", *(f"H-{k:02d}" for k in range(3, 19)), "E-H1", "E-H2", "E-H7", "E-H8", "E-H10", "E-C12"}
+
+
+def claim(study: Study, *ids: str) -> Claim:
+    return next(c for c in study.claims if set(ids) <= set(c.ids))
+
+
+@pytest.fixture(scope="module")
+def told() -> list[float]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def study(told: list[float]) -> Study:
+    return hwang.run(0, lambda share, _: told.append(share))
+
+
+def test_it_covers_its_requirements(study: Study, told: list[float]) -> None:
+    assert {i for c in study.claims for i in c.ids} == IDS
+    assert told == sorted(told)
+    assert told[0] == 0
+    assert told[-1] < 1
+    assert {f.key for f in study.figures} == {"hwang-fig4", "hwang-fig5", "hwang-fig6", "hwang-thresholds"}
+    assert all(np.isfinite(v) for v in study.numbers.values())
+
+
+def test_numbers_of_models(study: Study) -> None:
+    # H-07
+    n = study.numbers
+    assert n["rows"] == 37
+    assert n["models_tried_without_grouping"] == 2**13 - 1
+    assert n["models_tried"] >= 2 ** n["groups"]
+    assert 1 <= n["variables"] <= n["groups"]
+    assert claim(study, "H-07").holds is (n["models_tried"] < 2**13 - 1)
+
+
+def test_the_verdicts_are_those_of_the_numbers(study: Study) -> None:
+    n = study.numbers
+    same = n["standard_error_um"] <= 1.1 * n["standard_error_judgement_um"]
+    assert claim(study, "H-12", "H-13").holds is same
+    assert claim(study, "H-18").holds is not None
+    assert claim(study, "H-16").holds is not None
+    larger = n["smallest_eigenvalue_degC2"] > n["smallest_eigenvalue_without_grouping_degC2"]
+    assert larger or not claim(study, "H-16").holds
+    assert claim(study, "H-15").holds is (n["variables_without_grouping"] > n["variables"])
+
+
+def test_a_seed_is_a_study(study: Study) -> None:
+    assert hwang.run(0, silent).numbers == study.numbers
+    assert hwang.run(1, silent).numbers != study.numbers
+
+
+def test_a_drift_of_squares_refutes_the_linear_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """H-12 and H-13 can fail: here the drift is what the engineering judgement model is made of."""
+
+    def made(experiment: str, *, seed: int) -> list[Recording]:
+        (test,) = record(experiment, seed=seed)
+        change = {p: (test.table[f"t_{p}_C"] - test.table["t_bed_rear_C"]).to_numpy() for p in ("z_nut", "front_seat")}
+        noise = 0.5 * np.random.default_rng(seed).normal(size=len(test))
+        z = 3 * (change["front_seat"] - change["front_seat"].mean()) ** 2 + 20 * change["z_nut"] ** 2 + noise
+        return [replace(test, table=test.table.assign(z_um=z))]
+
+    monkeypatch.setattr(hwang_setup, "record", made)
+    study = hwang.run(0, silent)
+    refuted = claim(study, "H-12", "H-13")
+    assert refuted.holds is False
+    assert "times the error of the engineering judgement model" in refuted.finding
+    assert study.numbers["r_squared_judgement"] > 0.999
+
+
+def test_agreement_with_table_1() -> None:
+    paper = tuple(tuple(k - 1 for k in g) for g in hwang_setup.TABLE_1)
+    assert hwang_setup.agreement(paper) == 1
+    assert hwang_setup.agreement((tuple(range(13)),)) == pytest.approx(8 / 78)  # pairs in one group: 6 + 1 + 1
+    assert hwang_setup.agreement(tuple((k,) for k in range(13))) == pytest.approx(70 / 78)
+
+
+def test_the_threshold_taken_is_the_widest_of_the_nearest() -> None:
+    one, two, three = ((0, 1, 2),), ((0, 1), (2,)), ((0,), (1,), (2,))
+    found = [
+        Interval(-1, 0.1, one),
+        Interval(0.1, 0.3, two),
+        Interval(0.3, 0.8, two),
+        Interval(0.8, 1, three),
+    ]
+    assert hwang_setup.nearest(found, 2).low == 0.3
+    assert hwang_setup.nearest(found, 8).low == 0.8
+
+
+def test_the_engineering_judgement_model_is_least_squares() -> None:
+    # H-13
+    samples = hwang_setup.samples_of(record("hwang", seed=3))
+    fit = hwang_setup.polynomial(samples, ("T6", "T7", "T13"), 2)
+    columns = {name: samples.values[:, k] - samples.values[:, 13] for k, name in enumerate(hwang_setup.NAMES)}
+    three = np.column_stack([columns[n] for n in ("T6", "T7", "T13")])
+    X = np.column_stack([np.ones(len(three)), three, three**2])
+    z = samples.deviations[:, 0]
+    weights, *_ = np.linalg.lstsq(X, z, rcond=None)
+    residual = z - X @ weights
+    assert fit.error == pytest.approx(np.sqrt(residual @ residual / (len(z) - 7)))
+    assert fit.r_squared == pytest.approx(1 - residual @ residual / np.sum((z - z.mean()) ** 2))
+    assert predicted(fit.model, samples) == pytest.approx(X @ weights, abs=1e-6)

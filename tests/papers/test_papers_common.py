@@ -1,0 +1,151 @@
+"""What the studies share."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.models.dynamic import DynamicRidge
+from thermocomp.models.mlp import SigmoidNet
+from thermocomp.models.ols import LeastSquares
+from thermocomp.papers import common
+from thermocomp.papers.common import Errors
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+
+@pytest.fixture(scope="module")
+def tests() -> Samples:
+    """Two tests one after the other."""
+    return stack([small_machine(), small_machine(seed=1)], ["z_um", "x_um"])
+
+
+def test_channels_get_the_names_of_the_paper(recording: Recording) -> None:
+    first = recording.temperatures[0].name
+
+    named = common.renamed(recording, {"z_um": "z", first: "T1"})
+
+    assert [c.name for c in named.channels] == ["z", "T1"]
+    assert named.channel("T1").quantity == "temperature"
+    pd.testing.assert_series_equal(named.table["T1"], recording.table[first], check_names=False)
+    with pytest.raises(InputError, match="T99"):
+        common.renamed(recording, {"T99": "T1"})
+
+
+def test_a_derived_channel_is_a_weighted_sum(recording: Recording) -> None:
+    a, b = (c.name for c in recording.temperatures[:2])
+
+    more = common.derived(recording, Channel("d", "temperature", "degC"), {a: 1.0, b: -1.0})
+
+    assert len(more.channels) == len(recording.channels) + 1
+    np.testing.assert_allclose(more.table["d"], recording.table[a] - recording.table[b])
+
+
+@pytest.mark.parametrize(("law", "largest", "std"), [("uniform", 0.4, 0.4 / 3**0.5), ("normal", 4.0, 0.4)])
+def test_noise_is_on_the_temperatures_alone(law: str, largest: float, std: float, tests: Samples) -> None:
+    noisy = common.with_noise(tests, 0.4, "uniform" if law == "uniform" else "normal", seed=1)
+
+    error = noisy.values - tests.values
+    warm = np.array([c.quantity == "temperature" for c in tests.inputs])
+    assert not error[:, ~warm].any()
+    assert np.abs(error[:, warm]).max() <= largest
+    assert error[:, warm].std() == pytest.approx(std, rel=0.05)
+    np.testing.assert_array_equal(noisy.deviations, tests.deviations)
+    assert not np.array_equal(noisy.values, common.with_noise(tests, 0.4, "uniform", seed=2).values)
+
+
+def test_a_sensor_that_is_cut_off_stays_at_its_zero(tests: Samples) -> None:
+    name = tests.inputs[1].name
+
+    cut = common.cut_off(tests, name)
+
+    assert not cut.change()[:, 1].any()
+    rest = [j for j in range(len(tests.inputs)) if j != 1]
+    np.testing.assert_array_equal(cut.values[:, rest], tests.values[:, rest])
+    with pytest.raises(InputError, match="T99"):
+        common.cut_off(tests, "T99")
+
+
+def test_the_replay_gives_what_the_estimator_predicts(tests: Samples) -> None:
+    estimator = LeastSquares()
+
+    models = common.fitted(estimator, tests, ["x_um"])
+
+    np.testing.assert_allclose(
+        common.predicted(models["x_um"], tests), estimator.predict(tests.frame()), rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        common.residual(models["x_um"], tests), tests.deviations[:, 1] - estimator.predict(tests.frame()), atol=1e-9
+    )
+
+
+def test_a_net_learns_several_targets_at_once(tests: Samples) -> None:
+    net = SigmoidNet(hidden=3, n_epochs=20)
+
+    models = common.fitted(net, tests, ["x_um", "z_um"])
+
+    both = np.column_stack([common.predicted(m, tests) for m in models.values()])
+    assert list(models) == ["x_um", "z_um"]
+    assert [m.target for m in models.values()] == ["x_um", "z_um"]
+    np.testing.assert_allclose(both, net.predict(tests.frame()), rtol=0, atol=1e-9)
+
+
+def test_a_method_with_a_memory_gets_its_clock(tests: Samples) -> None:
+    speeds = [c.name for c in tests.inputs if c.quantity == "spindle_speed"]
+    estimator = DynamicRidge(speed=speeds)
+
+    model = common.fitted(estimator, tests, ["z_um"], dt=tests.dt(), cycle=tests.cycle)["z_um"]
+
+    np.testing.assert_allclose(
+        common.predicted(model, tests), estimator.predict(tests.frame(), dt=tests.dt()), rtol=0, atol=1e-9
+    )
+
+
+def test_a_paper_s_model_does_not_stop_at_its_trained_range(tests: Samples) -> None:
+    only = tests.only([tests.inputs[0].name])
+    estimator = LeastSquares()
+    model = common.fitted(estimator, only, ["z_um"])["z_um"]
+
+    far = 50.0 * float(np.abs(only.change()).max())
+    state, _ = model.step(model.init(), np.zeros(1), 0.0)
+    state, deviation = model.step(state, np.array([far]), 60.0)
+
+    assert float(deviation) == pytest.approx(
+        float(estimator.predict(pd.DataFrame([[far]], columns=[only.inputs[0].name]))[0])
+    )
+    assert not state.outside.any()
+
+
+def test_errors_by_hand() -> None:
+    errors = Errors.of(np.array([[3.0, np.nan], [-4.0, 0.0]]))
+
+    assert errors.rms == pytest.approx((25 / 3) ** 0.5)
+    assert errors.mae == pytest.approx(7 / 3)
+    assert (errors.max_abs, errors.peak_to_peak) == (4.0, 7.0)
+
+
+def test_the_table_of_errors_has_a_row_per_residual() -> None:
+    table = common.errors_table("errors", {("z", "none"): np.array([1.0, -1.0]), ("z", "net"): np.zeros(2)}, "urad")
+
+    assert table.header[2] == "RMS [urad]"
+    assert table.rows[0] == ["z", "none", "1.00", "1.00", "1.00", "2.00"]
+    assert table.rows[1][2:] == ["0.00"] * 4
+
+
+def test_tests_are_put_end_to_end(tests: Samples) -> None:
+    hours, values = common.end_to_end(tests, tests.deviations[:, 0])
+
+    n = int((tests.test == 0).sum())
+    assert len(hours) == len(values) == len(tests) + 1
+    assert np.isnan(values[n])
+    assert np.isnan(values).sum() == 1
+    assert (np.diff(hours) >= 0).all()
+    assert hours[-1] == pytest.approx((tests.time[n - 1] + tests.time[-1]) / 3600)
+
+
+def test_a_finding_is_told_only_where_a_claim_fails() -> None:
+    assert common.judged(["C-34"], "text", "", "", True, "why").finding == ""
+    assert common.judged(["C-34"], "text", "", "", False, "why").finding == "why"
+    assert common.shown(["C-34"], "text", "", "").holds is None

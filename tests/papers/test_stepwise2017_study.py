@@ -1,0 +1,90 @@
+"""The study of stepwise2017: its procedure, and that its claims can fail."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from smallmachine import small_machine
+from thermocomp.datasets.virtual import record
+from thermocomp.papers import stepwise2017, stepwise2017_setup
+from thermocomp.papers.study import Claim, Study, silent
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
+
+FloatArray = NDArray[np.float64]
+
+IDS = {"T-01", *(f"T-{k:02d}" for k in range(3, 11)), "E-T3", "E-T5", "E-C12"}
+
+
+def claim(study: Study, *ids: str) -> Claim:
+    return next(c for c in study.claims if set(ids) <= set(c.ids))
+
+
+def test_the_virtual_machine() -> None:
+    told: list[float] = []
+    study = stepwise2017.run(0, lambda share, _: told.append(share))
+    assert {i for c in study.claims for i in c.ids} == IDS
+    assert told == sorted(told)
+    assert all(np.isfinite(v) for v in study.numbers.values())
+    n = study.numbers
+    assert n["temperatures"] == 24
+    assert claim(study, "T-07").holds is (1 <= n["chosen"] <= 5)
+    least, pursuit, bound = (c for c in study.claims if {"T-08", "T-09"} <= set(c.ids))
+    assert least.holds is (n["rms_online_um"] < n["rms_online_least_squares_um"])
+    assert pursuit.holds is (n["rms_online_um"] < n["rms_online_projection_pursuit_um"])
+    assert bound.holds is (n["max_online_um"] < 5)
+    assert len(study.tables[0].rows) >= n["chosen"]
+
+
+def _of(experiment: str, seed: int, few: bool) -> list[Recording]:
+    """A drift made of two temperatures of the virtual machine, or of 24 that have nothing to do with each other."""
+    (test,) = record("stepwise2017", seed=seed + (experiment != "stepwise2017"))
+    rng = np.random.default_rng([seed, *experiment.encode()])
+    names = [c.name for c in test.temperatures]
+    heat = test.values(test.temperatures)
+    weights = np.zeros(24)
+    weights[[0, 12]] = 3.0, -8.0
+    if not few:
+        heat = 20 + np.cumsum(0.2 * rng.normal(size=heat.shape), axis=0)
+        weights[:] = 1.0
+    x = (heat - heat[0]) @ weights + 0.2 * rng.normal(size=len(test))
+    return [replace(test, name=experiment, table=test.table.assign(**dict(zip(names, heat.T, strict=True)), x1_um=x))]
+
+
+def test_a_drift_of_two_temperatures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stepwise2017_setup, "record", lambda e, *, seed: _of(e, seed, few=True))
+    study = stepwise2017.run(0, silent)
+    assert claim(study, "T-07").holds
+    assert claim(study, "T-07").ours == "2: front_seat, table"
+    assert study.numbers["rms_online_um"] < 0.1 * study.numbers["rms_online_none_um"]
+    # a fixed F asks for more where there are fewer rows (E-T3)
+    needed = [float(row[2]) for row in study.tables[2].rows]
+    assert needed == sorted(needed)
+    assert needed[-1] == pytest.approx(100 / (100 + float(study.tables[2].rows[-1][0]) - 2), abs=0.005)
+
+
+def test_a_drift_of_all_temperatures_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """T-07 and T-08 can fail: here every temperature counts."""
+    monkeypatch.setattr(stepwise2017_setup, "record", lambda e, *, seed: _of(e, seed, few=False))
+    study = stepwise2017.run(0, silent)
+    many = claim(study, "T-07")
+    assert many.holds is False
+    assert "F grows with the number of rows" in many.finding
+    assert claim(study, "T-08", "T-09").holds is False
+
+
+def test_sliced_inverse_regression_finds_the_direction() -> None:
+    # T-10: y depends on one direction of many, not linearly
+    rng = np.random.default_rng(0)
+    test = small_machine()
+    names = [c.name for c in test.temperatures]
+    X = rng.normal(size=(len(test), len(names))) @ rng.normal(size=(len(names), len(names)))
+    w = rng.normal(size=len(names))
+    y = np.tanh(X @ w / np.std(X @ w)) * 10
+    table = test.table.assign(**dict(zip(names, X.T, strict=True)), x_um=y)
+    samples = stack([replace(test, table=table)], ["x_um"], names)
+    model = stepwise2017_setup.sliced_inverse(samples)
+    found = np.array([model.coefficients_by_name().get(n, 0.0) for n in names])
+    assert np.corrcoef(X @ found, X @ w)[0, 1] > 0.995

@@ -1,0 +1,305 @@
+"""Wessel et al. 2004 redone: each judgement on data whose answer is known, and the whole study on a heated rod."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from thermocomp.core.machine import Channel
+from thermocomp.models.selection.equivalents import equivalents
+from thermocomp.papers import wessel2004, wessel2004_sets, wessel2004_spindle, wessel2004_tools
+from thermocomp.papers.study import Claim, Study
+from thermocomp.papers.wessel2004_trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
+from thermocomp.recording.cycles import whole
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+
+def table(name: str, temperatures: FloatArray, displacements: FloatArray, dt: float = 100.0) -> Recording:
+    """Return a recording with the names of the paper."""
+    names = [f"t_t{k + 1}_C" for k in range(temperatures.shape[1])]
+    names += [f"s{k + 1}_um" for k in range(displacements.shape[1])]
+    kinds = {"t": ("temperature", "degC"), "s": ("displacement", "um")}
+    channels = tuple(Channel(n, *kinds[n[0]]) for n in names)
+    values = pd.DataFrame(np.hstack([temperatures, displacements]), columns=names)
+    return Recording(name, dt * np.arange(len(values), dtype=np.float64), values, channels, whole(len(values)))
+
+
+def heated_rod(name: str, heat: FloatArray, *, room: float = 20.0, n_t: int = 9, n_s: int = 3) -> Recording:
+    """Return a test of a rod of 12 cells, heated at both ends; its thermometers lag, the last hangs in the room."""
+    rng = np.random.default_rng([*name.encode()])
+    cells, felt = np.full(12, room), np.full(12, room)
+    rows, inner = [], []
+    for ends in heat:
+        for _ in range(6):
+            flow = np.zeros(12)
+            flow[:-1] += np.diff(cells)
+            flow[1:] -= np.diff(cells)
+            flow[[0, -1]] += ends
+            cells = cells + 0.15 * (flow - 0.03 * (cells - room))
+            felt = felt + 0.1 * (cells - felt)
+        rows.append(np.append(felt[[0, 1, 3, 4, 6, 7, 9, 11][: n_t - 1]], room))
+        inner.append([(cells - room)[:k].sum() for k in (12, 8, 4)[:n_s]])
+    temperatures, displacements = np.array(rows), np.array(inner)
+    return table(
+        name,
+        temperatures + 0.03 * rng.normal(size=temperatures.shape),
+        displacements - displacements[0] + 0.1 * rng.normal(size=displacements.shape),
+    )
+
+
+def schedule(name: str, rows: int, pieces: int) -> FloatArray:
+    """Return heat at both ends, drawn anew for every piece of a test."""
+    drawn = np.random.default_rng([*name.encode()]).choice([0.0, 0.5, 1.0, 2.0], (pieces, 2))
+    return drawn[np.arange(rows) * pieces // rows]
+
+
+def stand_in(experiment: str, *, seed: int = 0) -> list[Recording]:
+    """Return the experiments of the study on the rod."""
+
+    def rod(name: str, rows: int, pieces: int, n_t: int = 9, n_s: int = 3, room: float = 20.0) -> Recording:
+        return heated_rod(name, schedule(f"{seed} {name}", rows, pieces), n_t=n_t, n_s=n_s, room=room)
+
+    if experiment == "wessel-fem":
+        return [rod(n, 199, 6, 3, 2) for n in ("reference", "test")]
+    if experiment == "wessel-tool":
+        return [rod(n, 240, 5) for n in ("training", "test")]
+    if experiment == "wessel-milling":
+        return [rod(f"day{k}", 80, 5, 3, 1, room=19.0 + k) for k in range(1, 6)]
+    return [rod(f"set{k}", 100, 4) for k in range(23)]
+
+
+@pytest.fixture
+def experiments(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (wessel2004_spindle, wessel2004_sets, wessel2004_tools):
+        monkeypatch.setattr(module, "record", stand_in)
+
+
+@pytest.fixture(scope="module")
+def study() -> Iterator[tuple[Study, list[float]]]:
+    told: list[float] = []
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (wessel2004_spindle, wessel2004_sets, wessel2004_tools):
+            patch.setattr(module, "record", stand_in)
+        yield wessel2004.run(0, lambda share, _: told.append(share)), told
+
+
+def claim(claims: tuple[Claim, ...], words: str) -> Claim:
+    (found,) = [c for c in claims if words in c.text]
+    return found
+
+
+# -- the whole study -----------------------------------------------------------------------------------------------
+
+
+def test_every_requirement_of_the_study_is_covered(study: tuple[Study, list[float]]) -> None:
+    ids = {i for c in study[0].claims for i in c.ids}
+    assert ids >= {f"W-{k:02d}" for k in range(1, 14)}
+    assert ids >= {"E-W1", "E-W2", "E-W3", "E-W5", "E-W6", "E-W8"}
+
+
+def test_figures_are_those_of_the_paper(study: tuple[Study, list[float]]) -> None:
+    keys = {f.key.removeprefix("wessel2004-") for f in study[0].figures}
+    assert keys == {"fig2a", "fig2b", "fig3", "fig5", "fig6", "fig7", "fig8", "fig9", "loops", "tool-loops"}
+    (fig2b,) = [f for f in study[0].figures if f.key.endswith("fig2b")]
+    assert [p.title.partition(")")[0].strip("(") for p in fig2b.panels] == ["i", "ii", "iii", "iv", "v", "vi"]
+    for figure in study[0].figures:
+        for curve in (c for p in figure.panels for c in p.curves):
+            assert curve.x.shape == curve.y.shape
+
+
+def test_progress_rises_and_numbers_are_finite(study: tuple[Study, list[float]]) -> None:
+    found, told = study
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.0, 1.0)
+    assert all(np.isfinite(v) for v in found.numbers.values())
+    for t in found.tables:
+        assert all(len(row) == len(t.header) for row in t.rows)
+
+
+def test_claims_agree_with_the_numbers(study: tuple[Study, list[float]]) -> None:
+    found, n = study[0], study[0].numbers
+    assert n["sets_models"] == 511 * 23 * 3
+    assert n["sets_small"] == 129
+    assert claim(found.claims, "more models than").holds is None
+    for words, key in (
+        ("the paper's set", "tool_paper_set"),
+        ("our own Appendix", "tool_own_set"),
+        ("fifth", "milling"),
+    ):
+        c = claim(found.claims, words)
+        assert c.holds == (n[f"{key}_ace_rms_um"] < n[f"{key}_mlr_rms_um"])
+        assert f"ACE {n[f'{key}_ace_rms_um']:.2f} um" in c.ours
+    assert claim(found.claims, "Linear regression is not").holds == (n["fem_ace_rms_um"] < n["fem_mlr_rms_um"])
+    assert claim(found.claims, "best triples").holds == (n["sets_best_psi"] > 0.99)
+    assert claim(found.claims, "Several sets").holds == (n["sets_common"] > 0)
+
+
+def test_days_of_other_temperature_are_also_counted_from_their_start(study: tuple[Study, list[float]]) -> None:
+    (milling,) = [t for t in study[0].tables if t.caption.startswith("Milling")]
+    (fem,) = [t for t in study[0].tables if t.caption.startswith("Finite")]
+    assert FROM_START.format(ACE_NAME) in [row[1] for row in milling.rows]
+    assert FROM_START.format(ACE_NAME) not in [row[1] for row in fem.rows]
+
+
+@pytest.mark.usefixtures("experiments")
+def test_same_seed_same_numbers() -> None:
+    once, again, other = (wessel2004_spindle.spindle(seed, lambda *_: None).numbers for seed in (1, 1, 2))
+    assert once == again
+    assert once != other
+
+
+# -- one experiment ------------------------------------------------------------------------------------------------
+
+
+def curved(rows: int, top: float, seed: int = 0) -> Recording:
+    """Return a test in which s1 = t1^2 - t2 / 2, of t1 from -top to top."""
+    rng = np.random.default_rng(seed)
+    warm = np.column_stack([np.linspace(-top, top, rows), np.sin(np.linspace(0.0, 9.0 + seed, rows))])
+    s = warm[:, :1] ** 2 - 0.5 * warm[:, 1:]
+    return table(f"curved {seed}", 20.0 + warm + 1e-6 * rng.normal(size=warm.shape), s)
+
+
+def test_linear_regression_is_least_squares_on_temperatures_as_read() -> None:
+    learned, unseen = curved(199, 10.0), curved(150, 9.0, seed=1)
+    found = trial([learned, unseen], 0, (0, 1), beside=False)
+    A = np.column_stack([learned.values(learned.temperatures), np.ones(199)])
+    weights = np.linalg.lstsq(A, learned.values(learned.displacements)[:, 0], rcond=None)[0]
+    expected = np.column_stack([unseen.values(unseen.temperatures), np.ones(150)]) @ weights
+    np.testing.assert_allclose(found.estimates[MLR_NAME], expected, atol=1e-9)
+    assert set(found.estimates) == {ACE_NAME, MLR_NAME}
+
+
+def test_ace_beats_linear_regression_where_the_truth_is_curved_and_not_where_it_is_straight() -> None:
+    bent = trial([curved(199, 10.0), curved(150, 9.0, seed=1)], 0, (0, 1), beside=False)
+    assert bent.rms(ACE_NAME) < 0.5 * bent.rms(MLR_NAME)
+    straight = [
+        table("a", 20.0 + x, 4.0 * x[:, :1])
+        for x in (np.linspace(0, 9, n)[:, None] * np.array([[1.0, 0.5]]) for n in (199, 150))
+    ]
+    lines = trial(straight, 0, (0, 1), beside=False)
+    assert lines.rms(MLR_NAME) < 1e-6 < lines.rms(ACE_NAME)
+
+
+def test_a_row_is_beyond_only_if_one_can_see_it() -> None:
+    slightly, clearly = (trial([curved(199, 10.0), curved(150, top, seed=1)], 0, (0, 1)) for top in (10.01, 12.0))
+    assert not slightly.beyond.any()
+    learned = clearly.learned.deviations[:, 0]
+    assert clearly.beyond.sum() == (clearly.measured > learned.max() + 0.01 * np.ptp(learned)).sum() > 0
+
+
+def peaks(learned: Recording, unseen: Recording) -> tuple[Claim, Claim]:
+    return wessel2004_spindle._peak_claims(trial([learned, unseen], 0, (0, 1), beside=False))
+
+
+def test_peaks_are_cropped_and_flagged() -> None:
+    cropped, guarded = peaks(curved(199, 10.0), curved(150, 12.0, seed=1))
+    assert cropped.holds
+    assert guarded.holds
+    assert "2 of 2 peaks" in guarded.ours
+
+
+def test_without_a_peak_nothing_is_claimed() -> None:
+    cropped, guarded = peaks(curved(199, 10.0), curved(150, 9.0, seed=1))
+    assert cropped.holds is False
+    assert "stays within" in cropped.finding
+    assert guarded.holds is None
+
+
+def test_a_peak_without_its_temperature_is_not_flagged() -> None:
+    unseen = curved(150, 9.0, seed=1)
+    higher = unseen.table.copy()
+    higher["s1_um"] += np.where(np.arange(150) > 140, 50.0, 0.0)
+    cropped, guarded = peaks(curved(199, 10.0), Recording("up", unseen.time, higher, unseen.channels, unseen.cycles))
+    assert cropped.holds
+    assert guarded.holds is False
+    assert "0 of 1 peaks" in guarded.ours
+
+
+def test_runs_of_rows() -> None:
+    rows = np.array([True, False, True, True, False, True])
+    assert wessel2004_spindle.runs(rows) == [slice(0, 1), slice(2, 4), slice(5, 6)]
+    assert wessel2004_spindle.runs(~rows[:1]) == []
+
+
+@pytest.mark.parametrize(("shift", "low", "high"), [(0.0, 0.0, 0.03), (np.pi / 2, 0.95, 1.0)])
+def test_width_of_a_loop(shift: float, low: float, high: float) -> None:
+    t = np.linspace(0.0, 2 * np.pi, 500)
+    test = table("loop", 20 + np.sin(t)[:, None], np.sin(t + shift)[:, None])
+    assert low <= loop_width(stacked([test], 0, [0])) <= high
+
+
+def test_names_of_places() -> None:
+    assert [place(n) for n in ("t_t8_C", "s1_um", "t_front_seat_C", "z_um")] == ["T8", "S1", "front_seat", "z"]
+
+
+# -- claims on residuals that are set --------------------------------------------------------------------------------
+
+
+def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> Trial:
+    """Return a trial of 100 points with the residuals of (linear regression, ACE) given."""
+    found = trial([curved(199, 10.0), curved(100, 9.0, seed=1)], 0, (0, 1), beside=False)
+    linear, ace = residual(np.arange(1.0, 101.0))
+    found.estimates[MLR_NAME] = found.measured - linear
+    found.estimates[ACE_NAME] = found.measured - ace
+    return found
+
+
+def test_the_local_gain_is_the_greatest_of_ten_stretches() -> None:
+    warm = judged(lambda x: (np.where(x <= 10, 12.0, 1.0), np.ones(100)))
+    c = wessel2004_tools._locally(warm)
+    assert c.holds
+    assert c.ours.startswith("up to 12.0x, in rows 1-10 of 100")
+    assert not wessel2004_tools._locally(judged(lambda _: (np.full(100, 9.0), np.ones(100)))).holds
+
+
+def test_the_worst_episode_is_left_out() -> None:
+    spike = judged(lambda x: (np.ones(100), np.where(np.abs(x - 17) <= 5, 9.0 - np.abs(x - 17), 1.5)))
+    c = wessel2004_tools._without_episode(spike)
+    assert c.holds
+    assert "1.50 um without points 12-22" in c.ours
+    assert not wessel2004_tools._without_episode(judged(lambda _: (np.ones(100), np.full(100, 2.5)))).holds
+
+
+def test_over_and_under_estimates_go_by_the_drift() -> None:
+    found = judged(lambda x: (np.where(x <= 40, -1.0, 1.0), np.ones(100)))
+    towards = float(np.sign(found.measured.mean()))
+    found.estimates[MLR_NAME] = found.measured + towards * np.where(np.arange(1, 101) <= 40, 1.0, -1.0)
+    c = wessel2004_tools._systematic(found)
+    assert c.holds
+    assert c.ours.startswith("mean excess +1.00 um between them, -1.00 um")
+
+
+# -- choice of temperatures ----------------------------------------------------------------------------------------
+
+
+def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
+    sets = [(0,), (1,), (0, 1)]
+    rng = np.random.default_rng(0)
+    noise = 1e-4 * rng.normal(size=(2, 3, 23))
+    psi = np.array([0.5, 0.9, 0.9])[None, :, None] + noise
+    psi[:, 2] += 1e-6
+    small = equivalents(list(psi), sets)
+    assert small.common == ((1,), (0, 1))
+    best = max(((1,), (0, 1)), key=lambda s: psi[:, sets.index(s)].sum())
+    assert wessel2004_sets._choice(small) == best
+    with_all, shared = wessel2004_sets._equal_claims(small, small)
+    assert with_all.holds
+    assert shared.holds is False  # T2 is in both, and by itself as good as the best
+    assert "{T2} by itself is as good" in shared.finding
+
+
+def test_no_common_set_is_told() -> None:
+    rng = np.random.default_rng(1)
+    psi = np.array([[0.9, 0.5], [0.5, 0.9]])[:, :, None] + 1e-4 * rng.normal(size=(2, 2, 23))
+    several, shared = wessel2004_sets._equal_claims(*[equivalents(list(psi), [(0,), (1,)])] * 2)
+    assert several.holds is False
+    assert shared.holds is False
+    assert several.ours.endswith("0 common: none")
+
+
+def test_sets_are_written_like_the_papers() -> None:
+    assert wessel2004_sets.called((0, 1, 7)) == "{T1, T2, T8}"
