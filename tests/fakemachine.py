@@ -21,7 +21,7 @@ class FakeMachine:
         self.steps: list[int] = []
 
     def init(self, air: Air) -> float:
-        return 0.0
+        return 0.0 * air.temperature
 
     def run(self, state: float, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[float, Truth]:
         self.steps.append(len(drives))

@@ -118,9 +118,9 @@ draw("fig10", "fig11", "fig12")
 #
 # A laser measures the positioning error of Y along its travel, 51 times in a warm-up and cool-down. The cold profile is
 # geometry; what comes on top of it is nearly a straight line whose slope drifts. So one number, the slope, is modelled
-# in place of twelve. Fig. 6: some of the profiles.
+# in place of twelve. Fig. 6: some of the profiles. Fig. 1: its pitch, measured at the same time.
 
-draw("fig6")
+draw("fig6", "fig1")
 tell("C-22", "C-05", "C-23", "C-24", "C-27")
 show(6, 7, 8)
 assert numbers["slope_sets"] == 51

@@ -24,7 +24,7 @@ numbers = study.numbers
 figures = {f.key: f for f in study.figures}
 
 
-def draw(key):
+def draw(key: str) -> None:
     """Draw a figure of the study."""
     page.paint(figures[key], plt.figure(figsize=page.size(figures[key]), layout="constrained"))
     plt.show()

@@ -59,18 +59,18 @@ def test_all_five_for_people(
     monkeypatch.setenv("COLUMNS", "120")
     page = tmp_path / "papers.html"
     assert run(["papers", "-o", str(page), "--seed", "3"]) == 0
-    assert asked == [(name, 3) for name in studies.STUDIES]
+    assert asked == [(name, seed) for name in studies.STUDIES for seed in (3, 4, 5)]
     said = capsys.readouterr().out
     for name in studies.STUDIES:
         assert f"Title of {name}" in said
         assert f"Title of {name}" in page.read_text(encoding="utf-8")
     assert said.count("H-18 It does not: [noise].") == 5
-    assert said.count("1 of 2 claims hold on the virtual machine; 0 s") == 5
+    assert said.count("1 of 2 claims hold on the virtual machine in each of 3 runs; 0 s") == 5
     assert "Grouping raises [it]" in said
     assert str(page.name) in said
     assert run(["papers", "-o", str(page)]) == 2  # not overwritten without being asked
     assert "exists already" in capsys.readouterr().err
-    assert len(asked) == 5  # and that before any work
+    assert len(asked) == 15  # and that before any work
     assert run(["papers", "hwang", "-o", str(page), "--overwrite"]) == 0
 
 
@@ -86,10 +86,35 @@ def test_some_for_programs(asked: list[tuple[str, int]], capsys: pytest.CaptureF
         "ours": "2.5",
         "holds": True,
         "finding": "",
+        "again": [True, True],
     }
     assert second["holds"] is False
     assert numbers == {"rms_um": 1.25, "unknown_um": None}
     assert content["studies"][0]["tables"][0]["rows"] == [["a", "1.25"]]
+
+
+def test_runs_that_do_not_agree_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def made(name: str, *, seed: int, progress: Progress) -> Study:
+        progress(1.0, "all of it")
+        finding = "" if seed == 1 else f"not with {seed}"
+        claims = (
+            Claim(("H-15",), "More without", "7", f"{seed}", seed == 1, finding),
+            Claim(("P-03",), "n", "", "1", None),
+        )
+        return Study(name, name, claims, (), (), {})
+
+    monkeypatch.setattr(studies, "run", made)
+    assert run(["papers", "hwang"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 of 3" in said
+    assert "0 of 1 claims hold on the virtual machine in each of 3 runs, 1 in some of them; 1 more number" in said
+    assert "not with 0" in said
+    assert run(["papers", "hwang", "--seed", "1"]) == 0
+    assert "H-15 Seed 2: not with 2" in capsys.readouterr().out
+    assert run(["papers", "hwang", "--repeats", "1", "--seed", "1"]) == 0
+    assert "1 of 1 claims hold on the virtual machine; 1 more" in capsys.readouterr().out
+    assert run(["papers", "hwang", "--repeats", "0"]) == 2
+    assert "--repeats 0: must be at least 1" in capsys.readouterr().err
 
 
 def test_cross_judges_on_measured_recordings_too(

@@ -282,7 +282,7 @@ def test_unseen_tests_of_the_virtual_machine() -> None:
     first, second = record("wessel-fem")
     names = [c.name for c in first.temperatures]
     T, unseen = (r.table[names] - r.table[names].iloc[0] for r in (first, second))
-    y, truth = first.table["z_um"].to_numpy(), second.table["z_um"].to_numpy()
+    y, truth = first.table["s4_um"].to_numpy(), second.table["s4_um"].to_numpy()
     assert T.shape == (199, 3)
 
     def rms(m: Any) -> float:

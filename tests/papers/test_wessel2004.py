@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
+from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.papers import wessel2004, wessel2004_sets, wessel2004_spindle, wessel2004_tools
 from thermocomp.papers.study import Claim, Study
@@ -138,6 +139,12 @@ def test_claims_agree_with_the_numbers(study: tuple[Study, list[float]]) -> None
     assert claim(found.claims, "Several sets").holds == (n["sets_common"] > 0)
 
 
+@pytest.mark.usefixtures("experiments")
+def test_claims_are_the_same_ones_in_every_run(study: tuple[Study, list[float]]) -> None:
+    other = wessel2004.run(1, lambda *_: None)
+    assert [(c.ids, c.text) for c in other.claims] == [(c.ids, c.text) for c in study[0].claims]
+
+
 def test_days_of_other_temperature_are_also_counted_from_their_start(study: tuple[Study, list[float]]) -> None:
     (milling,) = [t for t in study[0].tables if t.caption.startswith("Milling")]
     (fem,) = [t for t in study[0].tables if t.caption.startswith("Finite")]
@@ -150,6 +157,33 @@ def test_same_seed_same_numbers() -> None:
     once, again, other = (wessel2004_spindle.spindle(seed, lambda *_: None).numbers for seed in (1, 1, 2))
     assert once == again
     assert once != other
+
+
+# -- the virtual machines ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("experiment", "tests", "temperatures", "displacements"),
+    [("wessel-fem", 2, 3, 2), ("wessel-tool", 2, 9, 3), ("wessel-milling", 5, 3, 1), ("wessel-sets", 23, 9, 3)],
+)
+def test_experiments_are_those_of_the_paper(experiment: str, tests: int, temperatures: int, displacements: int) -> None:
+    recordings = record(experiment)
+    assert len(recordings) == tests
+    assert {len(r.temperatures) for r in recordings} == {temperatures}
+    assert {len(r.displacements) for r in recordings} == {displacements}
+    if experiment == "wessel-milling":
+        assert all(70 <= len(r) <= 90 for r in recordings)
+    if experiment == "wessel-tool":
+        assert [place(c.name) for c in recordings[0].temperatures] == [f"T{k}" for k in range(1, 10)]
+
+
+def test_the_finite_element_spindle() -> None:
+    part = wessel2004_spindle.spindle(0, lambda *_: None)
+    assert claim(part.claims, "Two series").holds
+    assert part.numbers["fem_psi"] > 0.99
+    assert part.numbers["fem_ace_rms_um"] < 0.5 * part.numbers["fem_none_rms_um"]
+    assert claim(part.claims, "cropped, and worse").ours != "no row beyond"
+    assert part.numbers["fem_loop_width"] > 0.05  # hysteresis is there to be seen
 
 
 # -- one experiment ------------------------------------------------------------------------------------------------
@@ -199,13 +233,13 @@ def test_peaks_are_cropped_and_flagged() -> None:
     cropped, guarded = peaks(curved(199, 10.0), curved(150, 12.0, seed=1))
     assert cropped.holds
     assert guarded.holds
-    assert "2 of 2 peaks" in guarded.ours
+    assert "2 of 2 peak(s)" in guarded.ours
 
 
 def test_without_a_peak_nothing_is_claimed() -> None:
     cropped, guarded = peaks(curved(199, 10.0), curved(150, 9.0, seed=1))
     assert cropped.holds is False
-    assert "stays within" in cropped.finding
+    assert "stay within" in cropped.finding
     assert guarded.holds is None
 
 
@@ -216,7 +250,20 @@ def test_a_peak_without_its_temperature_is_not_flagged() -> None:
     cropped, guarded = peaks(curved(199, 10.0), Recording("up", unseen.time, higher, unseen.channels, unseen.cycles))
     assert cropped.holds
     assert guarded.holds is False
-    assert "0 of 1 peaks" in guarded.ours
+    assert "0 of 1 peak(s)" in guarded.ours
+
+
+@pytest.mark.parametrize(("tops", "exchanged"), [((10.0, 12.0), False), ((12.0, 10.0), True)])
+def test_the_wider_series_is_the_one_with_peaks(
+    tops: tuple[float, float], exchanged: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    both = [curved(199, top, seed=k) for k, top in enumerate(tops)]
+    monkeypatch.setattr(wessel2004_spindle, "record", lambda *_, **__: both)
+    found = wessel2004_spindle.spindle(0, lambda *_: None)
+    for words in ("are cropped", "support guard"):
+        c = claim(found.claims, words)
+        assert c.holds
+        assert c.ours.startswith("the two series exchanged: ") == exchanged
 
 
 def test_runs_of_rows() -> None:
@@ -286,7 +333,7 @@ def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
     assert small.common == ((1,), (0, 1))
     best = max(((1,), (0, 1)), key=lambda s: psi[:, sets.index(s)].sum())
     assert wessel2004_sets._choice(small) == best
-    with_all, shared = wessel2004_sets._equal_claims(small, small)
+    with_all, shared = wessel2004_sets._equal_claims(small, small, small)
     assert with_all.holds
     assert shared.holds is False  # T2 is in both, and by itself as good as the best
     assert "{T2} by itself is as good" in shared.finding
@@ -295,7 +342,7 @@ def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
 def test_no_common_set_is_told() -> None:
     rng = np.random.default_rng(1)
     psi = np.array([[0.9, 0.5], [0.5, 0.9]])[:, :, None] + 1e-4 * rng.normal(size=(2, 2, 23))
-    several, shared = wessel2004_sets._equal_claims(*[equivalents(list(psi), [(0,), (1,)])] * 2)
+    several, shared = wessel2004_sets._equal_claims(*[equivalents(list(psi), [(0,), (1,)])] * 3)
     assert several.holds is False
     assert shared.holds is False
     assert several.ours.endswith("0 common: none")

@@ -75,6 +75,14 @@ def test_plain_text(study: Study) -> None:
 def test_columns_of_numbers_stand_on_the_right() -> None:
     rows = [["a", "1", "12 %", "-1.5e-07", "nan", "1 2", "", "1,024"], ["b", "2", "", "3", "-", "3", "–", "7"]]
     assert papers.words(Table("", "abcdefgh", rows)) == [0, 5]
+    assert papers.words(Table("", "ab", [["1", ""], ["2", ""], ["not fitted", ""]])) == []
+
+
+def test_words_of_the_first_column_are_said_once() -> None:
+    table = Table("", ("a", "b"), [["x", "1"], ["x", "2"], ["y", "3"], ["x", "4"]])
+    assert papers.rows(table) == [["x", "1"], ["", "2"], ["y", "3"], ["x", "4"]]
+    numbers = Table("", ("a", "b"), [["1", "1"], ["1", "2"]])
+    assert papers.rows(numbers) == [["1", "1"], ["1", "2"]]
 
 
 def test_panels_and_curves_are_drawn(study: Study) -> None:

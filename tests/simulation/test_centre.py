@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.simulation.axes import N_HATS
 from thermocomp.simulation.centre import CentreState, MachiningCentre
-from thermocomp.simulation.heat import N_HATS, BearingFriction, HeatSources, swept
+from thermocomp.simulation.heat import BearingFriction, HeatSources, swept
 from thermocomp.simulation.joints import Joints, play
 from thermocomp.simulation.machine import Air, Drive, Truth, VirtualMachine
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE

@@ -20,12 +20,18 @@ from thermocomp.simulation.segments import Segment
 from thermocomp.simulation.sensors import Fault
 
 FloatArray = NDArray[np.float64]
-GOLDEN = [[22.22, 22.1, 22.28, 0.15]]
+GOLDEN = [[22.22, 22.1, 22.28, 0.15], [48.76, 49.92, 22.74, 59.94], [75.82, 78.14, 23.1, 119.75]]
 RUN = (Segment(40.0), Segment(60.0, Drive(3000.0, (300.0, 400.0, 0.0))), Segment(40.0))
 
 
 def programme(**more: Any) -> Programme:
-    given = {"name": "t", "sampling": 20.0, "segments": RUN, "climate": STILL, "soak": (Segment(3600.0),)}
+    given: dict[str, Any] = {
+        "name": "t",
+        "sampling": 20.0,
+        "segments": RUN,
+        "climate": STILL,
+        "soak": (Segment(3600.0),),
+    }
     return Programme(**(given | {"places": ("housing",), "probes": ("x1", "z"), "perfect": True} | more))
 
 

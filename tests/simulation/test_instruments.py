@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.simulation.axes import TEST_POSITION
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.instruments import Touch, displacement, mounting, thermometer
 from thermocomp.simulation.kits import (
@@ -11,7 +12,6 @@ from thermocomp.simulation.kits import (
     CHEN_PLACES,
     HWANG_PLACES,
     KITS,
-    TEST_POSITION,
     Kit,
     cold_profile,
     labelled,
@@ -75,7 +75,7 @@ def test_cold_profile_is_that_of_the_paper() -> None:
 
 def test_the_deviation_at_a_position_counts_from_the_test_position() -> None:
     line = {f"zz@{p}": 0.01 * p for p in range(0, 601, 100)} | {"z": 5.0}
-    assert read(CENTRE, f"z_at_{TEST_POSITION['z']:.0f}", **line) == pytest.approx(5.0)
+    assert read(CENTRE, f"z_at_{TEST_POSITION['z']}", **line) == pytest.approx(5.0)
     assert read(CENTRE, "z_at_600", **line) == pytest.approx(5.0 + 0.01 * (600.0 - TEST_POSITION["z"]))
 
 
@@ -96,6 +96,13 @@ def test_only_a_calculation_looks_into_a_shaft() -> None:
     assert thermometer(CENTRE, "t3", "shaft", perfect=True, noise=None).reads == {"shaft": 1.0}
     with pytest.raises(InputError, match="'shaft' turns"):
         thermometer(CENTRE, "t3", "shaft", perfect=False, noise=None)
+
+
+def test_the_pitch_of_y_is_an_angle() -> None:
+    pitch = displacement("p", CENTRE.probe("y_pitch_220"), perfect=False)
+    assert (pitch.sensor.channel.name, pitch.sensor.channel.quantity) == ("p_urad", "angle")
+    assert read(CENTRE, "y_pitch_220", **{"ay@0": 1.0, "ay@220": 5.0}) == 4.0
+    assert CENTRE.probe("y_pitch_0").reads == {}
 
 
 def test_a_perfect_probe_has_no_errors() -> None:
@@ -121,7 +128,7 @@ def test_what_is_not_there_is_refused_and_the_nearest_told() -> None:
 
 
 def test_the_points_of_an_artefact() -> None:
-    touch = Touch(1800.0, {"p": (400.0, 250.0, 250.0)})
+    touch = Touch(1800.0, {"p": (400.0, 250.0, 300.0)})
     x, y, z = touch.instruments(perfect=False)
     assert [i.sensor.channel.name for i in (x, y, z)] == ["x_p_um", "y_p_um", "z_p_um"]
     assert x.reads == {"x": 1.0, "xx@400": 1.0, "xx@300": -1.0}
@@ -138,7 +145,7 @@ def test_the_points_of_an_artefact() -> None:
 
 def test_a_probing_cycle_waits_until_the_spindle_stands() -> None:
     touch = Touch(300.0, {"p": (0.0, 0.0, 0.0)})
-    time = 60.0 * np.arange(20)
+    time = np.arange(0.0, 1200.0, 60.0)
     always = touch.rows(time, np.ones(20, dtype=np.bool_))
     assert np.flatnonzero(always).tolist() == [0, 5, 10, 15]
     still = np.ones(20, dtype=np.bool_)

@@ -30,7 +30,7 @@ def test_a_lot_knows_all_that_can_be_drawn() -> None:
         {"between": (1.0, 2.0), "step": 1.0, "one_of": (1.0,)},
     ):
         with pytest.raises(InputError):
-            Lot(**wrong)  # type: ignore[arg-type]
+            Lot(**wrong)
 
 
 def test_a_stretch_becomes_segments() -> None:

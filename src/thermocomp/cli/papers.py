@@ -25,8 +25,8 @@ from thermocomp.cli.options import (
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
+    from thermocomp.papers.study import Claim, Study
     from thermocomp.papers.study import Progress as Told
-    from thermocomp.papers.study import Study
     from thermocomp.papers.study import Table as StudyTable
     from thermocomp.recording.recording import Recording
 
@@ -50,6 +50,7 @@ def papers(
     target: OptionalNames = None,
     models: OptionalNames = None,
     seed: int = 0,
+    repeats: int = 3,
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -72,6 +73,9 @@ def papers(
         Methods of cross, or all; without it those that take seconds.
     seed : int
         Of the weather, the sensors' noise and what is drawn by lot.
+    repeats : int
+        Runs of each paper's study, each with the next seed: what holds in one weather only is told. Numbers and figures
+        are those of the first.
     output : Path
         Page with claims, figures and tables to write (.html).
     overwrite : bool
@@ -86,6 +90,8 @@ def papers(
     """
     if seed < 0:
         raise InputError(f"--seed {seed}: must not be negative")
+    if repeats < 1:
+        raise InputError(f"--repeats {repeats}: must be at least 1")
     with needs("study"):
         from thermocomp.cli.output import print_json
         from thermocomp.papers.studies import STUDIES
@@ -104,7 +110,9 @@ def papers(
     for number, name in enumerate(chosen, start=1):
         begin = time.perf_counter()
         with _progress(f"{number}/{len(chosen)} {name}", json) as progress:
-            study = _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, progress)
+            study = (
+                _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, repeats, progress)
+            )
         done.append((study, time.perf_counter() - begin))
         if not json:
             _show(*done[-1])
@@ -115,14 +123,14 @@ def papers(
         if not json:
             _console.print(f"Page: {output}")
     if json:
-        print_json({"seed": seed, "studies": [_content(*d) for d in done]}, _console)
+        print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]}, _console)
     return 0
 
 
-def _run(name: str, seed: int, progress: "Told") -> "Study":
+def _run(name: str, seed: int, repeats: int, progress: "Told") -> "Study":
     with needs("study"):
         from thermocomp.papers import studies
-    return studies.run(name, seed=seed, progress=progress)
+    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress)
 
 
 def _cross(
@@ -135,7 +143,7 @@ def _cross(
 
 def _show(study: "Study", seconds: float) -> None:
     with needs("study"):
-        from thermocomp.report.papers import headline, verdict
+        from thermocomp.report.papers import headline
     _console.print(f"\n[bold]{escape(study.title)}[/]")
     if study.claims:
         table = Table()
@@ -143,14 +151,12 @@ def _show(study: "Study", seconds: float) -> None:
             table.add_column(heading, overflow="fold")
         table.add_column("holds", no_wrap=True)
         for c in study.claims:
-            word = verdict(c)
             cells = (", ".join(c.ids), c.text, c.paper or "-", c.ours or "-")
-            table.add_row(*map(escape, cells), f"[{_STYLES[word]}]{word}[/]")
+            table.add_row(*map(escape, cells), f"[{_style(c)}]{c.verdict}[/]")
         _console.print(table)
         for c in study.claims:
             if c.finding:
-                style = _STYLES[verdict(c)]
-                _console.print(f"[{style}]{escape(', '.join(c.ids))}[/] {escape(c.finding)}")
+                _console.print(f"[{_style(c)}]{escape(', '.join(c.ids))}[/] {escape(c.finding)}")
     if study.name == CROSS:
         for t in study.tables:
             _console.print(_table(t))
@@ -158,14 +164,20 @@ def _show(study: "Study", seconds: float) -> None:
     _console.print(f"{escape(said)}{seconds:.0f} s")
 
 
+def _style(claim: "Claim") -> str:
+    return _STYLES.get(claim.verdict, "yellow")
+
+
 def _table(t: "StudyTable") -> Table:
     with needs("study"):
-        from thermocomp.report.papers import words
+        from thermocomp.report.papers import rows, words
     left = words(t)
     table = Table(caption=escape(t.caption))
     for k, heading in enumerate(t.header):
         table.add_column(escape(heading), justify="left" if k in left else "right", overflow="fold")
-    for row in t.rows:
+    for number, row in enumerate(rows(t)):
+        if row[0] and number and 0 in left:
+            table.add_section()
         table.add_row(*map(escape, row))
     return table
 
@@ -182,6 +194,7 @@ def _content(study: "Study", seconds: float) -> dict[str, Any]:
                 "paper": c.paper,
                 "ours": c.ours,
                 "holds": c.holds,
+                "again": c.again,
                 "finding": c.finding,
             }
             for c in study.claims

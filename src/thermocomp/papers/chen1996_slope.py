@@ -335,14 +335,14 @@ def tables(found: Slopes) -> list[Table]:
 
 
 def figures(found: Slopes) -> list[Figure]:
-    """Return Figs. 1 (if the machine's yaw was measured), 6, 7 and 13."""
+    """Return Figs. 1, 6, 7 and 13."""
     learned = found.learned
     hours = learned.recording.time / 3600.0
     peak = int(np.abs(learned.slope).argmax())
     states = [*np.linspace(0, peak, 5).round().astype(int).tolist(), len(hours) - 1]
     drawn = []
     for number, quantity, text, label in (
-        (1, "angle", "angular errors of Y", "angular error of Y [urad]"),
+        (1, "angle", "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
         (6, "displacement", "positioning errors of Y", "positioning error of Y [um]"),
     ):
         positions, values = profiles(learned.recording, quantity)

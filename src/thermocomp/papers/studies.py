@@ -1,9 +1,10 @@
 """The studies by name; each is imported when it is asked for."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 
-from thermocomp.papers.study import Progress, Study, silent
+from thermocomp.papers.study import Claim, Progress, Study, silent
 
 
 @dataclass(frozen=True)
@@ -58,3 +59,41 @@ def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
     """
     study: Study = import_module(STUDIES[name].module).run(seed, progress)
     return study
+
+
+def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = silent) -> Study:
+    """Redo a study several times, each with a weather, a noise and lots of its own.
+
+    Parameters
+    ----------
+    name : str
+        Key of `STUDIES`.
+    seed : int
+        Of the first run; the others take the next ones.
+    repeats : int
+        Number of runs.
+    progress : callable
+        Told the share done and what comes next.
+
+    Returns
+    -------
+    Study
+        That of the first run; its claims know whether they hold in the others.
+    """
+    found = []
+    for k in range(repeats):
+        word = f"run {k + 1} of {repeats}, " if repeats > 1 else ""
+        found.append(
+            run(name, seed=seed + k, progress=lambda done, text: progress((k + done) / repeats, word + text))  # noqa: B023
+        )
+    return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
+
+
+def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
+    """Return a claim that knows its other runs, and what was found where it does not hold."""
+    same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
+    finding = claim.finding
+    if claim.holds and not finding:
+        failed = [(k, c) for k, c in enumerate(same, start=seed + 1) if c.holds is False]
+        finding = f"Seed {failed[0][0]}: {failed[0][1].finding}" if failed else ""
+    return replace(claim, finding=finding, again=tuple(c.holds for c in same if c.holds is not None))

@@ -35,6 +35,8 @@ class Claim:
         Whether the statement is true here; None: a number to look at, nothing that could be false.
     finding : str
         Why it does not hold, or what limits it. Every claim that does not hold needs one.
+    again : tuple of bool
+        Whether it holds in further runs with other seeds, where the study was repeated.
     """
 
     ids: tuple[str, ...]
@@ -43,6 +45,15 @@ class Claim:
     ours: str
     holds: bool | None
     finding: str = ""
+    again: tuple[bool, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """``yes`` or ``no``; ``2 of 3`` where runs do not agree; ``-`` for a number that is only to be looked at."""
+        if self.holds is None:
+            return "-"
+        held = (self.holds, *self.again)
+        return ("yes" if self.holds else "no") if len(set(held)) == 1 else f"{sum(held)} of {len(held)}"
 
     def __post_init__(self) -> None:
         if self.holds is False and not self.finding:

@@ -31,10 +31,10 @@ def run(seed: int, progress: Progress) -> Study:
     Study
     """
     within = _share_of(progress)
-    fem = spindle(seed, within(0.0, 0.15))
-    selection = appendix_b(seed, within(0.15, 0.7))
-    tool = resting_tool(seed, within(0.7, 0.9), selection)
-    milling = milling_machine(seed, within(0.9, 1.0))
+    fem = spindle(seed, within(0.0, 0.03))
+    selection = appendix_b(seed, within(0.03, 0.5))
+    tool = resting_tool(seed, within(0.5, 0.93), selection)
+    milling = milling_machine(seed, within(0.93, 1.0))
     progress(1.0, "done")
     parts = (fem, selection.part, tool, milling)
     numbers: dict[str, float] = {}

@@ -33,7 +33,16 @@ SLIGHT = 0.01
 
 @dataclass(frozen=True)
 class Part:
-    """What one experiment adds to the study."""
+    """What one experiment adds to the study.
+
+    Parameters
+    ----------
+    claims : tuple of Claim
+    tables : tuple of Table
+    figures : tuple of Figure
+    numbers : dict of str to float
+        See `thermocomp.papers.study.Study`.
+    """
 
     claims: tuple[Claim, ...]
     tables: tuple[Table, ...]
@@ -84,22 +93,56 @@ class Trial:
         return np.asarray((self.measured < seen.min() - margin) | (self.measured > seen.max() + margin))
 
     def residual(self, method: str) -> FloatArray:
-        """Return measured minus estimated in the unseen test [um]."""
+        """Return measured minus estimated in the unseen test [um].
+
+        Parameters
+        ----------
+        method : str
+            Key of `estimates`.
+
+        Returns
+        -------
+        ndarray of shape (n_unseen,)
+        """
         return self.measured - self.estimates[method]
 
     def rms(self, method: str) -> float:
-        """Return the root mean square of the residual in the unseen test [um]."""
+        """Return the root mean square of the residual in the unseen test [um].
+
+        Parameters
+        ----------
+        method : str
+            Key of `estimates`.
+        """
         return Errors.of(self.residual(method)).rms
 
     def fit_rms(self, method: str) -> float:
-        """Return the same in what was learned [um]."""
+        """Return the root mean square of the residual in the tests that were learned [um].
+
+        Parameters
+        ----------
+        method : str
+            Key of `fits`.
+        """
         return Errors.of(self.learned.deviations[:, 0] - self.fits[method]).rms
 
     def table(self, caption: str) -> Table:
-        """Lay out the errors of all methods in the unseen test."""
+        """Lay out the errors of all methods in the unseen test.
+
+        Parameters
+        ----------
+        caption : str
+        """
         name = f"{self.target}, {self.unseen.test_names[0]}"
         residuals = {(name, m): self.residual(m) for m in self.estimates}
         return errors_table(caption, {(name, NONE_NAME): self.measured} | residuals)
+
+    def reach(self) -> FloatArray:
+        """Return how far the boxcar reaches to one side, at the displacement of each row of the unseen test [um]."""
+        known, n = np.sort(self.learned.deviations[:, 0]), self.ace.half_window_
+        rank = np.searchsorted(known, self.measured).clip(max=len(known) - 1)
+        above = known[(rank + n).clip(max=len(known) - 1)] - known[rank]
+        return np.asarray(np.maximum(above, known[rank] - known[(rank - n).clip(min=0)]))
 
     def straight(self) -> str:
         """Say how close to straight lines the transformations are: linear regression is enough if they are (W-01)."""
@@ -109,7 +152,7 @@ class Trial:
         for name, curve in curves.items():
             varies = np.ptp(curve.x) > 0 and np.ptp(curve.y) > 0
             told.append(f"{name} {np.corrcoef(curve.x, curve.y)[0, 1] ** 2 if varies else 1.0:.3f}")
-        return f"A straight line explains of the variance of {', of '.join(told)}."
+        return f"Share of the variance of each curve that a straight line explains: {', '.join(told)}."
 
     def reasons(self) -> str:
         """Say in numbers what limits the estimate by ACE, and what linear regression and a memory make of the same."""
@@ -124,11 +167,18 @@ class Trial:
         if out.any():
             inside = f", {Errors.of(error[~out]).rms:.2f} um in the others" if not out.all() else ""
             text += (
-                f"{out.mean():.0%} of the rows have a temperature outside what was learned, the RMS of ACE is "
+                f"{out.sum()} of {len(out)} rows have a temperature outside what was learned, the RMS of ACE is "
                 f"{Errors.of(error[out]).rms:.2f} um in them{inside}"
             )
         else:
             text += "no temperature lies outside what was learned"
+        reach = self.reach()
+        wide = reach >= np.quantile(reach, 0.9)
+        text += (
+            f"; the boxcar of {2 * self.ace.half_window_ + 1} ranks reaches up to {reach.max():.1f} um to one side "
+            f"where rows are few, and the tenth of the rows where it reaches furthest have "
+            f"{np.sum(error[wide] ** 2) / np.sum(error**2):.0%} of the squared error of ACE"
+        )
         if "dynamic" in self.estimates:
             text += f"; with a memory ('dynamic', same temperatures) the RMS is {self.rms('dynamic'):.2f} um"
         return text + "."
@@ -137,7 +187,22 @@ class Trial:
 def stacked(
     recordings: Sequence[Recording], displacement: int, temperatures: Sequence[int], *, rezero: bool = False
 ) -> Samples:
-    """Stack recordings with one displacement and some temperatures, told by their place among the channels."""
+    """Stack recordings with one displacement and some temperatures, told by their place among the channels.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    displacement : int
+        Place among the displacements.
+    temperatures : sequence of int
+        Places among the temperatures.
+    rezero : bool
+        True: temperatures are counted from the start of each test; False: as read.
+
+    Returns
+    -------
+    Samples
+    """
     first = recordings[0]
     inputs = [first.temperatures[j].name for j in temperatures]
     return stack(recordings, [first.displacements[displacement].name], inputs, rezero=rezero)
@@ -226,13 +291,39 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
 
 
 def series(samples: Samples, values: FloatArray, labels: Sequence[str], *, points: bool = False) -> list[Curve]:
-    """Return columns of values over the hours of a test, or over the number of the measuring point."""
+    """Return columns of values over the hours of a test, or over the number of the measuring point.
+
+    Parameters
+    ----------
+    samples : Samples
+    values : ndarray of shape (n_rows, n_columns)
+    labels : sequence of str
+        One per column.
+    points : bool
+        True: over the number of the measuring point.
+
+    Returns
+    -------
+    list of Curve
+    """
     x = np.arange(1, len(samples) + 1, dtype=np.float64) if points else samples.time / 3600
     return [Curve(label, x, column) for label, column in zip(labels, values.T, strict=True)]
 
 
 def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> list[Panel]:
-    """Return what was measured, as the paper shows it: temperatures above, displacements below, by measuring point."""
+    """Return what was measured, as the paper shows it: temperatures above, displacements below, by measuring point.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        One after the other.
+    temperatures : sequence of int
+        Places of those that are shown; displacements are all shown.
+
+    Returns
+    -------
+    list of Panel
+    """
     first = recordings[0]
     chosen = [first.temperatures[j] for j in temperatures]
     everything = stack(recordings, [c.name for c in first.displacements], [c.name for c in chosen], rezero=False)
@@ -248,6 +339,16 @@ def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> li
 
 
 def place(channel: str) -> str:
-    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1."""
+    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1.
+
+    Parameters
+    ----------
+    channel : str
+        Name of a channel.
+
+    Returns
+    -------
+    str
+    """
     short = channel.removeprefix("t_").rpartition("_")[0]
     return short.upper() if short[:1] in "ts" and short[1:].isdigit() else short

@@ -10,36 +10,34 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from thermocomp import __version__
-from thermocomp.papers.study import Claim, Curve, Figure, Study, Table
+from thermocomp.papers.study import Curve, Figure, Study, Table
 from thermocomp.report.figures import COLOURS, POINTS, drawing, svg, thinned
 from thermocomp.report.html import environment
 
-#: what a claim's `holds` is called
-VERDICTS = {True: "yes", False: "no", None: "-"}
 #: a cell that is a number, alone or with what stands for none
-_NUMBER = re.compile(r"[-+]?[\d.,]+(e[-+]?\d+)?( ?%)?|nan|inf|[-–]?")
+_NUMBER = re.compile(r"[-+]?[\d.,]+(e[-+]?\d+)?( ?%)?|nan|inf|[-–]")
 WIDTH = 9.6
 PANEL_HEIGHT = 2.7
 #: of plain text
 COLUMNS, INDENT = 100, "    "
 
 
-def verdict(claim: Claim) -> str:
-    """Return ``yes`` or ``no``, or ``-`` for a number that is only to be looked at."""
-    return VERDICTS[claim.holds]
-
-
-def counted(study: Study) -> tuple[int, int, int]:
-    """Return how many claims hold, do not hold, and are numbers only to be looked at."""
-    held = [c.holds for c in study.claims]
-    return held.count(True), held.count(False), held.count(None)
+def counted(study: Study) -> dict[str, int]:
+    """Return how many claims there are by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
+    words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
+    return {word: words.count(word) for word in ("yes", "no", "some", "-")}
 
 
 def headline(study: Study) -> str:
     """Return one line about a study: how many of its claims hold."""
-    yes, no, seen = counted(study)
-    line = f"{yes} of {yes + no} claims hold on the virtual machine"
-    return f"{line}; {seen} more number{'s' if seen > 1 else ''} beside the paper's" if seen else line
+    n = counted(study)
+    runs = max((1 + len(c.again) for c in study.claims), default=1)
+    line = f"{n['yes']} of {n['yes'] + n['no'] + n['some']} claims hold on the virtual machine"
+    if runs > 1:
+        line += f" in each of {runs} runs"
+    if n["some"]:
+        line += f", {n['some']} in some of them"
+    return f"{line}; {n['-']} more number{'s' if n['-'] > 1 else ''} beside the paper's" if n["-"] else line
 
 
 def text(study: Study, *ids: str) -> str:
@@ -59,7 +57,7 @@ def text(study: Study, *ids: str) -> str:
     lines = [] if ids else [study.title, f"{headline(study)}.", ""]
     for c in told:
         lines.append(textwrap.fill(f"{', '.join(c.ids)}: {c.text}", COLUMNS, subsequent_indent=INDENT))
-        judged = ("note", c.finding) if c.holds is None else ("holds", f"{verdict(c)}. {c.finding}".removesuffix(". "))
+        judged = ("note", c.finding) if c.holds is None else ("holds", f"{c.verdict}. {c.finding}".removesuffix(". "))
         said = (("paper", c.paper), ("ours", c.ours), judged)
         for name, value in said:
             if value:
@@ -69,21 +67,26 @@ def text(study: Study, *ids: str) -> str:
 
 def laid_out(table: Table) -> str:
     """Return a table as plain text: its caption, then columns side by side, numbers on the right."""
-    left = words(table)
-    rows = [list(table.header), *(list(r) for r in table.rows)]
-    widths = [max(len(r[k]) for r in rows) for k in range(len(table.header))]
-    lines = [
-        "  ".join(
-            cell.ljust(w) if k in left else cell.rjust(w) for k, (cell, w) in enumerate(zip(r, widths, strict=True))
-        )
-        for r in rows
-    ]
-    return "\n".join([table.caption, *(line.rstrip() for line in lines)])
+    left, lines = words(table), [list(table.header), *rows(table)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(table.header))]
+
+    def placed(k: int, cell: str) -> str:
+        return cell.ljust(widths[k]) if k in left else cell.rjust(widths[k])
+
+    said = ("  ".join(placed(k, cell) for k, cell in enumerate(line)).rstrip() for line in lines)
+    return "\n".join([table.caption, *said])
 
 
 def words(table: Table) -> list[int]:
-    """Return which columns of a table hold words: all others are numbers, and stand on the right."""
-    return [k for k in range(len(table.header)) if not all(_NUMBER.fullmatch(row[k]) for row in table.rows)]
+    """Return which columns of a table hold words: in the others most cells are numbers, and stand on the right."""
+    cells = [[row[k] for row in table.rows if row[k]] for k in range(len(table.header))]
+    return [k for k, column in enumerate(cells) if column and 2 * sum(map(_is_number, column)) <= len(column)]
+
+
+def rows(table: Table) -> list[list[str]]:
+    """Return the rows of a table; words of the first column are said once, not in every row beneath."""
+    above = ["", *(row[0] for row in table.rows)] if 0 in words(table) else [""] * len(table.rows)
+    return [["" if row[0] == said else row[0], *row[1:]] for row, said in zip(table.rows, above, strict=False)]
 
 
 def paint(figure: Figure, canvas: Canvas) -> None:
@@ -142,7 +145,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
     ----------
     studies : sequence of Study
     seed : int
-        They were run with.
+        Of the (first) run.
 
     Returns
     -------
@@ -157,8 +160,8 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
             studies=studies,
             headlines=[headline(s) for s in studies],
             figures=[[draw(f) for f in s.figures] for s in studies],
-            verdict=verdict,
             words=words,
+            rows=rows,
         )
     )
 
@@ -166,6 +169,10 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
 def write(studies: Sequence[Study], path: Path, *, seed: int) -> None:
     """Write studies as a page; an existing file is replaced."""
     path.write_text(render(studies, seed=seed), encoding="utf-8")
+
+
+def _is_number(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None
 
 
 def _draw(ax: Axes, curve: Curve, colour: str) -> None:

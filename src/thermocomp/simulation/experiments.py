@@ -25,6 +25,8 @@ S = TypeVar("S")
 LONGEST_TICK = 20.0
 #: ticks that are worked on at once: what is between machine and recording takes no more memory than these
 BLOCK = 4096
+#: quantities that count from the first row
+MOVEMENTS = ("displacement", "angle")
 #: by the names that protocols use
 MACHINES: dict[str, Callable[[], VirtualMachine[Any]]] = {"centre": MachiningCentre, "tool": RestingTool}
 
@@ -55,8 +57,8 @@ class SimulatedTest:
 
     @property
     def displacements(self) -> tuple[Channel, ...]:
-        """Channels that `truth` belongs to."""
-        return tuple(c for c in self.channels if c.quantity == "displacement")
+        """Channels that `truth` belongs to: displacements, and angles."""
+        return tuple(c for c in self.channels if c.quantity in MOVEMENTS)
 
 
 def simulate(
@@ -136,7 +138,7 @@ def run(
     instruments = programme.instruments(kit, sensor_noise)
     sensors = [i.sensor for i in instruments]
     weights = _weights(machine, instruments)
-    moves = np.array([s.channel.quantity == "displacement" for s in sensors])
+    moves = np.array([s.channel.quantity in MOVEMENTS for s in sensors])
     lags = np.array([s.lag for s in sensors])
     channels, driven = _driven(programme, kit)
     time: FloatArray = programme.sampling * np.arange(len(driven), dtype=np.float64)

@@ -5,12 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermocomp.simulation.machine import AXES, Drive
-
-#: travel of the axes, from 0 [mm]
-TRAVEL = {"x": 600.0, "y": 550.0, "z": 600.0}
-#: hat functions along each screw that take the heat of its nut
-N_HATS = 7
+from thermocomp.simulation.axes import AXES, N_HATS, TRAVEL
+from thermocomp.simulation.machine import Drive
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Channel
-from thermocomp.simulation.heat import TRAVEL
+from thermocomp.simulation.axes import AXES, TRAVEL
 from thermocomp.simulation.kits import Kit, Probe, check_labels, touched
-from thermocomp.simulation.machine import AXES, Air
+from thermocomp.simulation.machine import Air
 from thermocomp.simulation.sensors import Sensor
 
 FloatArray = NDArray[np.float64]
@@ -103,7 +103,7 @@ def thermometer(kit: Kit, label: str, place: str, *, perfect: bool, noise: float
 
 
 def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
-    """Return a displacement probe, or a line of a laser; its channel is ``LABEL_um``.
+    """Return a displacement probe, or a line of a laser; its channel is ``LABEL_um``, that of an angle ``LABEL_urad``.
 
     Parameters
     ----------
@@ -112,7 +112,8 @@ def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
     perfect : bool
         Without noise, drift and steps.
     """
-    channel = Channel(f"{label}_um", "displacement", "um", probe.place)
+    quantity = "angle" if probe.unit == "urad" else "displacement"
+    channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
     drift = float(np.random.default_rng([*label.encode()]).uniform(-0.15, 0.15))
     sensor = Sensor(channel) if perfect else Sensor(channel, noise=0.15, resolution=0.01, drift=drift)
     return Instrument(sensor, probe.reads, cold=probe.cold)

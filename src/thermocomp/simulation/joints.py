@@ -24,11 +24,11 @@ class Joints:
         How far the column's foot may want to slide on the bed before it does [um].
     """
 
-    preload: float = 0.12
+    preload: float = 0.06
     gib: float = 0.3
     centrifugal: float = 4.0
     lift: float = -1.5
-    stiction: float = 2.5
+    stiction: float = 1.0
 
     def shaft(self, tightening: FloatArray, ratio: FloatArray) -> FloatArray:
         """Shift of the shaft towards the workpiece [um].

@@ -7,8 +7,9 @@ from difflib import get_close_matches
 from typing import TypeVar
 
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.heat import TRAVEL, HeatSources
-from thermocomp.simulation.machine import AXES, Air
+from thermocomp.simulation.axes import AXES, GUIDE_STATIONS, STATIONS, TEST_POSITION, TRAVEL
+from thermocomp.simulation.heat import HeatSources
+from thermocomp.simulation.machine import Air
 
 T = TypeVar("T")
 
@@ -62,10 +63,6 @@ USUAL_PLACES = (
 
 #: distance of the two probes of X, and of Y, along the test bar [m]
 PROBE_DISTANCE = 0.1
-#: where the deviations x, y, z of the tool point hold; the axes' own positioning comes on top elsewhere [mm]
-TEST_POSITION = {"x": 300.0, "y": 250.0, "z": 250.0}
-#: at which the machine tells the positioning of each axis [mm]
-STATIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": tuple(range(0, 601, 100))}
 #: cold positioning error of Y in mm, for y in mm: Chen 1996, Eq. 6 (C-22), constant first; X and Z have none
 CHEN_COLD_PROFILE = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
 
@@ -86,12 +83,14 @@ class Probe:
     reads : mapping of str to float
         Weights of the machine's observables in its value; the value is 1 um per um, 1 um per urad and m.
     cold : float
-        Its value in the state in which the test begins [um].
+        Its value in the state in which the test begins, in its unit.
+    unit : {'um', 'urad'}
     """
 
     place: str
     reads: Mapping[str, float]
     cold: float = 0.0
+    unit: str = "um"
 
 
 def positioning(axis: str, position: float) -> dict[str, float]:
@@ -137,6 +136,11 @@ def _laser(axis: str, position: float) -> Probe:
     return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, cold)
 
 
+def _pitch(position: int) -> Probe:
+    words = f"pitch of Y at {position} mm: turn of the headstock about X, laser"
+    return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
+
+
 def touched(axis: str, position: float) -> dict[str, float]:
     """Return the weights of the observables in the tool point's deviation along an axis that stands at a position.
 
@@ -180,8 +184,6 @@ class Kit:
         Place of a temperature sensor -> where it is, in words.
     air : mapping of str to float
         Height above the floor of those `places` that are in the air [m].
-    inner : mapping of str to str
-        Places that only a calculation can read: they turn.
     probes : mapping of str to Probe
     observables : tuple of str
         What probes can be made of.
@@ -189,6 +191,8 @@ class Kit:
         Names that stand for several places, or several probes.
     loads : mapping of str to str
         Where further heat can be put in.
+    inner : mapping of str to str
+        Places that only a calculation can read: they turn.
     top_speed : float
         Of the spindle [1/min]; 0: there is none.
     """
@@ -209,6 +213,7 @@ class Kit:
         Parameters
         ----------
         name : str
+            Of the place.
         perfect : bool
             It is calculated, not measured.
 
@@ -270,7 +275,19 @@ def check_labels(labels: Iterable[str]) -> None:
 
 
 def unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
-    """Return the error of a name that nobody knows; it tells the nearest ones."""
+    """Return the error of a name that nobody knows; it tells the nearest ones.
+
+    Parameters
+    ----------
+    what : str
+        What kind of thing was asked for.
+    name : str
+        What was found.
+    known : iterable of str
+        What there is.
+    path : tuple of str or int
+        Where it stands, see `SettingError`.
+    """
     known = list(known)
     near = get_close_matches(name, known, n=3, cutoff=0.4)
     hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
@@ -311,10 +328,18 @@ PLACES: dict[str, str] = {
 CENTRE = Kit(
     places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
     air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
-    probes=_NEST | _SPINDLE,
-    observables=("x", "y", "z", "a", "b", "nose", "tip", "slide", *(_at(a, p) for a in AXES for p in STATIONS[a])),
+    probes=_NEST | _SPINDLE | {f"y_pitch_{p}": _pitch(p) for p in GUIDE_STATIONS},
+    observables=(
+        *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
+        *(_at(a, p) for a in AXES for p in STATIONS[a]),
+        *(f"{what}@{p}" for what in ("zy", "ay") for p in GUIDE_STATIONS),
+    ),
     outfits={"all": tuple(PLACES), "usual": USUAL_PLACES, "chen": CHEN_PLACES, "hwang": HWANG_PLACES},
-    nests={"nest": tuple(_NEST), **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES}},
+    nests={
+        "nest": tuple(_NEST),
+        **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES},
+        "y_pitch": tuple(f"y_pitch_{p}" for p in GUIDE_STATIONS),
+    },
     loads={
         "tool_tip": "cutting edge: what of the cutting power goes into the tool",
         "coolant": "coolant tank; negative: taken from it",

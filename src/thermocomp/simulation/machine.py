@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 S = TypeVar("S")
 
-#: names of the linear axes, in the order of `Drive.feed`
-AXES = ("x", "y", "z")
-
 
 @dataclass(frozen=True)
 class Air:

@@ -94,7 +94,7 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True)
 class Programme(Setup):
-    """One test that is ready to run.
+    """One test that is ready to run; beside what `Setup` says of it.
 
     Parameters
     ----------
@@ -103,8 +103,6 @@ class Programme(Setup):
         Each lasts a whole number of samplings.
     soak : tuple of Segment
         What was done before, from a machine that was off for long; the test begins in the state it leads to.
-    sampling, climate, places, probes, perfect, touch, faults
-        See `Setup`.
     """
 
     name: str
@@ -119,7 +117,7 @@ class Programme(Setup):
 
 @dataclass(frozen=True, kw_only=True)
 class Plan(Setup, Stretch):
-    """One test as it is written, or several alike.
+    """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
 
     Parameters
     ----------
@@ -130,10 +128,6 @@ class Plan(Setup, Stretch):
     soak : Stretch
         What was done before, from a machine that was off for long; the test begins in the state it leads to. What the
         test says of speed, coolant ... does not hold in it.
-    sampling, climate, places, probes, perfect, touch, faults
-        See `Setup`.
-    duration, speed, feed, stroke, loads, cooled, powered, segments, repeat, order, weight
-        See `Stretch`.
     """
 
     name: str = ""
@@ -186,11 +180,11 @@ class Experiment:
     Parameters
     ----------
     name : str
+    tests : tuple of Plan
     description : str
         One line.
     machine : str
         A key of `thermocomp.simulation.kits.KITS`: the machining ``centre``, or the resting ``tool``.
-    tests : tuple of Plan
     """
 
     name: str

@@ -7,12 +7,12 @@ from typing import Any, Literal
 import numpy as np
 
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.heat import TRAVEL
-from thermocomp.simulation.machine import AXES, Drive
+from thermocomp.simulation.axes import AXES, TRAVEL
+from thermocomp.simulation.machine import Drive
 
-#: keys and positions that lead to something inside a protocol
+# Keys and positions that lead to something inside a protocol
 Path = tuple[str | int, ...]
-#: a segment and what holds in it, with where it stands
+# A segment and what holds in it, with where it stands
 Leaf = tuple[Path, dict[str, Any]]
 
 

@@ -72,7 +72,22 @@ class RestingTool:
         return ToolState(state, self._wish(self._linear(state[None])).item())
 
     def run(self, state: ToolState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
-        """Advance by one step of `dt` per drive, see `thermocomp.simulation.machine.VirtualMachine.run`.
+        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
+
+        Parameters
+        ----------
+        state : ToolState
+        drives : sequence of Drive
+            Only their loads count.
+        air : ndarray of shape (n_steps, 3)
+            `Air.values` of each step.
+        dt : float
+            [s]
+
+        Returns
+        -------
+        state : ToolState
+        truth : Truth
 
         Raises
         ------

@@ -223,8 +223,8 @@ class Assembly:
                 if j not in conduction:
                     raise InputError(f"part {part.name}: switch {j!r} is not one of {', '.join(thetas) or 'none'}")
                 conduction[j] = conduction[j] + self._block(part.name, matrix)
-        for item in (*films, *links):
-            value = item.coefficient if isinstance(item, Film) else item.conductance
+        values = [(f, f.coefficient) for f in films] + [(k, k.conductance) for k in links]
+        for item, value in values:
             if item.theta not in conduction or not value >= 0:
                 raise InputError(f"{item}: must not be negative, and its theta one of {', '.join(thetas) or 'none'}")
         for film in films:
@@ -238,7 +238,7 @@ class Assembly:
             sparse.block_diag([p.capacity for p in self.parts.values()], format="csr"),
             conduction[None],
             {j: conduction[j] for j in thetas},
-            np.column_stack([self.place(p) for p in inputs.values()]),
+            np.array([self.place(p) for p in inputs.values()]).reshape(-1, self.size).T,
             air[None],
             {j: air[j] for j in thetas},
             tuple(inputs),

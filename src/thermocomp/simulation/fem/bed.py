@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +10,8 @@ from skfem import MeshQuad
 from thermocomp.simulation.fem.conduction import capacity, conduction, edge, faces, together
 from thermocomp.simulation.fem.elasticity import Elastic, Tie
 from thermocomp.simulation.fem.materials import Material
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.space import Space
+from thermocomp.simulation.fem.part import Part, Surface
+from thermocomp.simulation.fem.space import Space, spot
 
 FloatArray = NDArray[np.float64]
 
@@ -72,34 +71,27 @@ class Bed:
         Returns
         -------
         Part
-            Surfaces: ``outside`` (sides, front, rear, and the top from the column on, to the room), ``work`` (top before
-            the column, to the work space), ``bottom`` (to the floor). Patches: ``front rear`` (top under table and
-            column), ``table shoe_front shoe_rear`` (guides), ``bearing`` (of Z), ``mount_front mount_rear``,
+            Surfaces: ``outside`` (sides, front, rear, and the top from the column on, to the room), ``work`` (top in
+            front of the column, to the work space), ``bottom`` (to the floor). Patches: ``front rear`` (top under table
+            and column), ``table shoe_front shoe_rear`` (guides), ``bearing`` (of Z), ``mount_front mount_rear``,
             ``hydraulics``. Observables against the mounts [um, urad]: ``z`` (bearing of Z away from the table), ``y``
-            (column's carriages above the table's guides), ``a_foot a_table`` (tilt about X there), ``foot`` (growth from
-            the column's front carriage to its rear one).
+            (column's carriages above the table's guides), ``a_foot a_table`` (tilt about X there), ``foot`` (growth
+            from the column's front carriage to its rear one).
         """
-        z = np.linspace(-self.length / 2.0, self.length / 2.0, self.cells[0] + 1)
-        # A node where the work space ends: in front of the column.
-        front = self.foot - 2.0 * self.shoe
-        z[np.abs(z - front).argmin()] = front
-        y = np.linspace(self.bottom, self.height - self.top, self.cells[1] + 1)
-        mesh = MeshQuad.init_tensor(z, np.concatenate([[0.0], y, [self.height]]))
-        middle = mesh.p[1, mesh.t].mean(axis=0)
-        web = (middle > self.bottom) & (middle < self.height - self.top)
-        space = Space(mesh, np.where(web, self.web, self.width))
+        space = self.space()
+        front = self._front()
 
         def up(x: FloatArray) -> FloatArray:
-            return self.base + x[1]
+            return np.asarray(self.base + x[1])
 
-        def surface(where: Callable[[FloatArray], NDArray[np.bool_]]) -> Any:
+        def surface(where: Callable[[FloatArray], NDArray[np.bool_]]) -> Surface:
             return edge(space, where, height=up, width=self.width)
 
         def top(at: float, radius: float = _SPOT, on: Space = space) -> FloatArray:
-            return on.edge_mean(lambda x: x[1] > self.height - 1e-9, _hat(0, at, radius))
+            return on.edge_mean(lambda x: x[1] > self.height - 1e-9, spot(0, at, radius))
 
         def under(at: float, on: Space = space) -> FloatArray:
-            return on.edge_mean(lambda x: x[1] < 1e-9, _hat(0, at, _SPOT))
+            return on.edge_mean(lambda x: x[1] < 1e-9, spot(0, at, _SPOT))
 
         body = Elastic(space, modulus=material.modulus, poisson=material.poisson, expansion=material.expansion)
         sheet = body.space
@@ -134,7 +126,7 @@ class Bed:
                 "mount_front": under(-self.mount),
                 "mount_rear": under(self.mount),
                 "hydraulics": space.edge_mean(
-                    lambda x: x[0] > self.length / 2.0 - 1e-9, _hat(1, self.height / 2.0 + self.hydraulics, 0.2)
+                    lambda x: x[0] > self.length / 2.0 - 1e-9, spot(1, self.height / 2.0 + self.hydraulics, 0.2)
                 ),
             },
             body.observables(
@@ -143,9 +135,7 @@ class Bed:
                     "y": lift(self.foot, self.shoe) - lift(self.table, _GUIDE),
                     "a_foot": tilt(self.foot, self.shoe),
                     "a_table": tilt(self.table, _GUIDE),
-                    "foot": body.row(
-                        top(self.foot + self.shoe, on=sheet) - top(self.foot - self.shoe, on=sheet), 0
-                    ),
+                    "foot": body.row(top(self.foot + self.shoe, on=sheet) - top(self.foot - self.shoe, on=sheet), 0),
                 },
                 [
                     Tie(body.row(under(-self.mount, sheet), 1)),
@@ -155,7 +145,17 @@ class Bed:
             ),
         )
 
+    def space(self) -> Space:
+        """Return the elements."""
+        z = np.linspace(-self.length / 2.0, self.length / 2.0, self.cells[0] + 1)
+        # A node where the work space ends.
+        z[np.abs(z - self._front()).argmin()] = self._front()
+        y = np.linspace(self.bottom, self.height - self.top, self.cells[1] + 1)
+        mesh = MeshQuad.init_tensor(z, np.concatenate([[0.0], y, [self.height]]))
+        middle = mesh.p[1, mesh.t].mean(axis=0)
+        web = (middle > self.bottom) & (middle < self.height - self.top)
+        return Space(mesh, np.where(web, self.web, self.width))
 
-def _hat(axis: int, at: float, radius: float) -> Callable[[FloatArray], FloatArray]:
-    """Return a weight that falls from 1 at a coordinate to 0 at the radius."""
-    return lambda x: np.maximum(0.0, 1.0 - np.abs(x[axis] - at) / radius)
+    def _front(self) -> float:
+        """Return where the work space ends: in front of the column."""
+        return self.foot - 2.0 * self.shoe

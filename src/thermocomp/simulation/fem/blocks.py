@@ -35,16 +35,16 @@ class Blocks:
     cuts : mapping of str to sequence of float
         Grid lines beside those at the ends of blocks, by axis ``r`` or ``z`` [m]: places end at grid lines only.
 
-    Raises
-    ------
-    InputError
-        Two blocks overlap, or a block is empty.
-
     Attributes
     ----------
     mesh : skfem.MeshQuad
     materials : list of Material
         One per element.
+
+    Raises
+    ------
+    InputError
+        Two blocks overlap, or a block is empty.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from thermocomp.simulation.fem.conduction import capacity, conduction, contact, 
 from thermocomp.simulation.fem.elasticity import Elastic, Tie
 from thermocomp.simulation.fem.materials import Material
 from thermocomp.simulation.fem.part import Part, Surface
-from thermocomp.simulation.fem.space import Space
+from thermocomp.simulation.fem.space import Space, spot
 
 FloatArray = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Column:
     test: float
     sensors: tuple[float, float]
     cabinet: float
-    cells: tuple[int, int] = (6, 20)
+    cells: tuple[int, int] = (8, 32)
 
     def part(self, name: str, material: Material, positions: tuple[int, ...] = ()) -> Part:
         """Cut the column into finite elements.
@@ -100,68 +100,64 @@ class Column:
         Heat passes between the sheets through the front and the rear wall, from the middle of one half to the middle
         of the other: half the width.
         """
-        space = self._space()
+        space = self.space()
         half = self.width / 2.0
         joined = conduction(space, material.conductivity)
         for wall, thickness in (("front", self.front_wall), ("rear", self.rear_wall)):
             through = material.conductivity * thickness / half**2
-            joined += contact(
-                space, self._edge(wall, "right", space), self._edge(wall, "left", space), through, (_SHEETS["left"], 0.0)
-            )
+            first, last = (self._edge(wall, s, space) for s in ("right", "left"))
+            joined += contact(space, first, last, through, (_SHEETS["left"], 0.0))
 
         def up(x: FloatArray) -> FloatArray:
-            return self.base + x[1]
+            return np.asarray(self.base + x[1])
 
         def right(x: FloatArray) -> FloatArray:
             return np.where(x[0] < _SHEETS["left"] / 2.0, half, -half)
 
-        def wall_right(x: FloatArray) -> FloatArray:
-            return right(x) / 2.0
-
-        def wall(where: str, span: tuple[float, float]) -> list[Surface]:
-            return [edge(space, self._edge(where, s, space, span), height=up, side=wall_right, width=half) for s in _SHEETS]
+        def walls(where: str, span: tuple[float, float] = (0.0, np.inf)) -> Surface:
+            """Return both halves of a wall; the middle of each is half as far to the side as the sheets."""
+            edges = [self._edge(where, s, space, span) for s in _SHEETS]
+            return together(*(edge(space, e, height=up, side=lambda x: right(x) / 2.0, width=half) for e in edges))
 
         below = self.first - self.carriage
-        whole = (0.0, self.height)
-        side_walls = (space.section < half).astype(float)
-        patches = {}
-        for s in _SHEETS:
-            spots = {
-                "front": ("front", self.sensors[1], _SPOT),
-                "front_low": ("front", self.sensors[0], _SPOT),
-                "rear": ("rear", self.sensors[1], _SPOT),
-                "rear_low": ("rear", self.sensors[0], _SPOT),
-                "guide": ("front", self.test, 2.0 * self.carriage),
-                "bearing": ("front", self.bearing, _SPOT),
-                "cabinet": ("rear", self.cabinet, 0.4),
-            }
-            for patch, (where, at, radius) in spots.items():
-                patches[f"{patch}_{s}"] = space.edge_mean(self._edge(where, s, space), _hat(1, at, radius))
-            for patch, at in (("shoe_front", -self.shoe), ("shoe_rear", self.shoe)):
-                patches[f"{patch}_{s}"] = self._shoe(s, at, space)
-            patches[f"foot_{s}"] = (patches[f"shoe_front_{s}"] + patches[f"shoe_rear_{s}"]) / 2.0
+        sheets = (np.asarray(space.section) < half).astype(float)
         return Part(
             name,
             capacity(space, material.heat_capacity),
             joined,
             {
                 "outside": together(
-                    faces(space, 1.0, height=up, side=right),
-                    *wall("front", (below, self.height)),
-                    *wall("rear", whole),
+                    faces(space, 1.0, height=up, side=right), walls("front", (below, np.inf)), walls("rear")
                 ),
-                "front_low": together(*wall("front", (0.0, below))),
+                "front_low": walls("front", (0.0, below)),
                 "inside": together(
-                    faces(space, side_walls, height=up, side=right),
-                    *wall("front_inside", whole),
-                    *wall("rear_inside", whole),
+                    faces(space, sheets, height=up, side=right), walls("front_inside"), walls("rear_inside")
                 ),
             },
-            patches,
+            self._patches(space),
             self._displaced(space, material, positions),
         )
 
-    def _space(self) -> Space:
+    def _patches(self, space: Space) -> dict[str, FloatArray]:
+        spots = {
+            "front": ("front", self.sensors[1], _SPOT),
+            "front_low": ("front", self.sensors[0], _SPOT),
+            "rear": ("rear", self.sensors[1], _SPOT),
+            "rear_low": ("rear", self.sensors[0], _SPOT),
+            "guide": ("front", self.test, 2.0 * self.carriage),
+            "bearing": ("front", self.bearing, _SPOT),
+            "cabinet": ("rear", self.cabinet, 4.0 * _SPOT),
+        }
+        patches = {}
+        for s in _SHEETS:
+            for patch, (wall, at, radius) in spots.items():
+                patches[f"{patch}_{s}"] = space.edge_mean(self._edge(wall, s, space), spot(1, at, radius))
+            front, rear = (self._shoe(s, at, space) for at in (-self.shoe, self.shoe))
+            patches |= {f"shoe_front_{s}": front, f"shoe_rear_{s}": rear, f"foot_{s}": (front + rear) / 2.0}
+        return patches
+
+    def space(self) -> Space:
+        """Return the elements: the right sheet at its z, the left one 10 m beside it."""
         z, rear = -self.depth / 2.0, self.depth / 2.0
         across = np.linspace(z + self.front_wall, rear - self.rear_wall, self.cells[0] + 1)
         # A node where the work space ends.
@@ -171,7 +167,8 @@ class Column:
             [np.linspace(0.0, below, low + 1), np.linspace(below, self.height, self.cells[1] - low + 1)[1:]]
         )
         sheet = MeshQuad.init_tensor(np.concatenate([[z], across, [rear]]), up)
-        mesh = sheet + sheet.translated((_SHEETS["left"], 0.0))
+        beside = sheet.p + np.array([[_SHEETS["left"]], [0.0]])
+        mesh = MeshQuad(np.hstack([sheet.p, beside]), np.hstack([sheet.t, sheet.t + sheet.nvertices]))
         middle = mesh.p[0, mesh.t].mean(axis=0)
         middle = np.where(middle > _SHEETS["left"] / 2.0, middle - _SHEETS["left"], middle)
         side = (middle > z + self.front_wall) & (middle < rear - self.rear_wall)
@@ -198,7 +195,7 @@ class Column:
             lambda x: (np.abs(x[1]) < 1e-9) & (np.abs(x[0] - _SHEETS[side]) < self.depth), boundaries_only=True
         )
         # The foot is a flange all along: the thickness of the walls above it is no weight.
-        row = space.edge_load(foot, _hat(0, _SHEETS[side] + at, _SPOT), width=1.0)
+        row = space.edge_load(foot, spot(0, _SHEETS[side] + at, _SPOT), width=1.0)
         return np.asarray(row / row.sum())
 
     def _displaced(self, space: Space, material: Material, positions: tuple[int, ...]) -> dict[str, FloatArray]:
@@ -208,11 +205,11 @@ class Column:
         section = float(sheet.load().sum()) / 2.0 / self.height
 
         def front(side: str, at: float) -> FloatArray:
-            return sheet.edge_mean(self._edge("front", side, sheet), _hat(1, at, _SPOT))
+            return sheet.edge_mean(self._edge("front", side, sheet), spot(1, at, _SPOT))
 
-        def guide(side: str, at: float, direction: int = 0) -> tuple[FloatArray, FloatArray]:
-            """Return mean of the upper and the lower carriage, and upper minus lower over their distance."""
-            high, low = (body.row(front(side, at + d), direction) for d in (self.carriage, -self.carriage))
+        def guide(side: str, at: float) -> tuple[FloatArray, FloatArray]:
+            """Return z: mean of the upper and the lower carriage, and upper minus lower over their distance."""
+            high, low = (body.row(front(side, at + d), 0) for d in (self.carriage, -self.carriage))
             return (high + low) / 2.0, (high - low) / (2.0 * self.carriage)
 
         def on(side: str) -> Callable[[FloatArray], FloatArray]:
@@ -230,7 +227,7 @@ class Column:
             """Return the lift of the sections, integrated up the sheet with a weight."""
             return body.row(sheet.load(lambda x: on(side)(x) * weight(x)) / section, 1)
 
-        at_test = _hat(1, self.test, 2.0 * cell)
+        at_test = spot(1, self.test, 2.0 * cell)
         rows = {
             "z": both(lambda s: guide(s, self.test)[0]),
             "a": both(lambda s: guide(s, self.test)[1]),
@@ -242,15 +239,11 @@ class Column:
             "foot": both(lambda s: body.row(self._shoe(s, self.shoe, sheet) - self._shoe(s, -self.shoe, sheet), 0)),
         }
         for p in positions:
-            rows[f"zy@{p}"] = both(lambda s, p=p: guide(s, self.first + p / 1000.0)[0])
-            rows[f"ay@{p}"] = both(lambda s, p=p: guide(s, self.first + p / 1000.0)[1])
+            (right, tilt_right), (left, tilt_left) = (guide(s, self.first + p / 1000.0) for s in _SHEETS)
+            rows[f"zy@{p}"] = (right + left) / 2.0
+            rows[f"ay@{p}"] = (tilt_right + tilt_left) / 2.0
         ties = []
         for s in _SHEETS:
             ties += [Tie(body.row(self._shoe(s, at, sheet), 1)) for at in (self.shoe, -self.shoe)]
             ties.append(Tie(body.row(self._shoe(s, 0.0, sheet), 0)))
         return body.observables(rows, ties)
-
-
-def _hat(axis: int, at: float, radius: float) -> Callable[[FloatArray], FloatArray]:
-    """Return a weight that falls from 1 at a coordinate to 0 at the radius."""
-    return lambda x: np.maximum(0.0, 1.0 - np.abs(x[axis] - at) / radius)

@@ -6,24 +6,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.simulation.axes import GUIDE_STATIONS, N_HATS, STATIONS, TEST_POSITION
 from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, Link, lump
 from thermocomp.simulation.fem.bed import Bed
 from thermocomp.simulation.fem.column import Column
 from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.screw import HATS, Screw
+from thermocomp.simulation.fem.reduction import reduce
+from thermocomp.simulation.fem.screw import Screw
 from thermocomp.simulation.fem.spindle import spindle
 from thermocomp.simulation.fem.toolholder import toolholder
+from thermocomp.simulation.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]
 
 #: shares: of the rotating spindle's convection, of the coolant's flow, of the turning screws' convection
 THETAS = ("rotation", "flow", "feed_x", "feed_y", "feed_z")
-#: positions at which the positioning of each axis is known [mm]
-POSITIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": tuple(range(0, 601, 100))}
-#: positions of Y at which the column's guide is known [mm]
-GUIDE = tuple(range(0, 551, 110))
-#: position of the axes at which the tool point is known [mm]
-TEST = {"x": 300, "y": 250, "z": 300}
 
 
 def centre(table: dict[str, Any] | None = None) -> FullModel:
@@ -37,32 +34,32 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
     Returns
     -------
     FullModel
-        Its observables in machine coordinates, tool minus workpiece [um, urad] at `TEST`: ``x y z a b`` (``a b``: tilt of
-        the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its flange);
+        Its observables in machine coordinates, tool minus workpiece [um, urad] at `TEST_POSITION`: ``x y z a b`` (``a b``:
+        tilt of the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its flange);
         ``xx@P yy@P zz@P`` (what the drive of an axis at P mm contributes to x, y, z); ``zy@P ay@P`` (column guide's
         z and tilt about X with the headstock at Y = P mm); ``slide`` (how far the column's foot grows against the bed).
     """
     table = data("centre.toml") if table is None else table
     lengths = table["lengths"]
-    screws = {axis: Screw(**_dimensions(values)) for axis, values in table["screw"].items()}
-    column = Column(**_dimensions(table["column"]))
-    foot = table["bed"]["bearing"] - screws["z"].distance(TEST["z"])
+    screws = {axis: Screw(**dimensions(values)) for axis, values in table["screw"].items()}
+    column = Column(**dimensions(table["column"]))
+    foot = table["bed"]["bearing"] - screws["z"].distance(TEST_POSITION["z"])
     tool = foot - column.depth / 2.0 - lengths["headstock"] - lengths["tip"]
-    bed = Bed(**_dimensions(table["bed"]), table=tool - lengths["table"], foot=foot, shoe=column.shoe)
+    bed = Bed(**dimensions(table["bed"]), table=tool - lengths["table"], foot=foot, shoe=column.shoe)
     lumps = table["lump"]
     parts = Assembly(
         [
             spindle(),
-            column.part("column", material(table["column"]["material"]), GUIDE),
+            column.part("column", material(table["column"]["material"]), GUIDE_STATIONS),
             bed.part("bed", material(table["bed"]["material"])),
             *(
-                screw.part(f"{axis}_screw", material(table["screw"][axis]["material"]), POSITIONS[axis])
+                screw.part(f"{axis}_screw", material(table["screw"][axis]["material"]), STATIONS[axis])
                 for axis, screw in screws.items()
             ),
             *(lump(name, **{k: v for k, v in values.items() if k != "air"}) for name, values in lumps.items()),
         ]
     )
-    hats = {f"{axis}_screw_{k}": f"{axis}_screw.hat_{k}" for axis in screws for k in range(HATS)}
+    hats = {f"{axis}_screw_{k}": f"{axis}_screw.hat_{k}" for axis in screws for k in range(N_HATS)}
     return parts.join(
         [Film(**f) for f in table["film"]] + [Film(f"{name}.air", values["air"]) for name, values in lumps.items()],
         [Link(a, b, value) for a, others in table["link"].items() for b, value in others.items()],
@@ -88,7 +85,7 @@ def tool(table: dict[str, Any] | None = None) -> FullModel:
     """
     table = data("tool.toml") if table is None else table
     part = toolholder(table)
-    load = sum(part.surfaces[name].load for name in ("tool", "chuck", "shaft"))
+    load = np.sum([part.surfaces[name].load for name in ("tool", "chuck", "shaft")], axis=0)
     part = replace(part, patches={**part.patches, "surface": load / load.sum()})
     places = {name: f"tool.{name}" for name in part.patches}
     parts = Assembly([part])
@@ -102,7 +99,28 @@ def tool(table: dict[str, Any] | None = None) -> FullModel:
     )
 
 
-def _dimensions(values: dict[str, Any]) -> dict[str, Any]:
+def reduced_centre() -> ReducedModel:
+    """Return the machining centre as it is shipped."""
+    settings = data("centre.toml")["reduction"]
+    mixes = [
+        {k: v for k, v in mix.items() if k != "screws"}
+        | {f"{axis}_screw_{k}": mix["screws"] for axis in STATIONS for k in range(N_HATS) if "screws" in mix}
+        for mix in settings["mix"]
+    ]
+    return reduce(centre(), settings["size"], mixes, settings["regime"])
+
+
+def reduced_tool() -> ReducedModel:
+    """Return the resting tool as it is shipped."""
+    settings = data("tool.toml")["reduction"]
+    return reduce(tool(), settings["size"], settings["mix"], settings["regime"])
+
+
+#: what makes each of the files in ``simulation/reduced``
+MODELS = {"centre": reduced_centre, "tool": reduced_tool}
+
+
+def dimensions(values: dict[str, Any]) -> dict[str, Any]:
     """Return the dimensions of a part, without its material; lists as tuples."""
     return {k: tuple(v) if isinstance(v, list) else v for k, v in values.items() if k != "material"}
 
@@ -110,7 +128,7 @@ def _dimensions(values: dict[str, Any]) -> dict[str, Any]:
 def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhang: float) -> dict[str, FloatArray]:
     """Compose what the parts do into what the tool point does, by levers of first order.
 
-    A turn a about X moves a point at (y, z) by (-a z, a y), b about Y one at z by b z in x, c about Z one at y by -c y in x.
+    A turn a about X moves a point by -a z in y and a y in z, b about Y by b z in x, c about Z by -c y in x.
     """
     lengths = table["lengths"]
     iron = 1e6 * material(table["column"]["material"]).expansion
@@ -124,19 +142,21 @@ def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhan
     reach = overhang - column.depth / 2.0
     front, rear, workpiece = (parts.place(p) for p in ("headstock_front", "headstock_rear", "table"))
     head = iron * (lengths["head_front"] * front + (1.0 - lengths["head_front"]) * rear)
+    # The right guide leads the headstock, which grows away from it; the column carries that guide.
+    aside = iron * lengths["guide_x"] * (parts.place("column.guide_right") - (front + rear) / 2.0)
     # The headstock's front rises more than its rear.
     nod = iron * high / lengths["bearing_span"] * (front - rear)
     foot, under = of("bed", "a_foot"), of("bed", "a_table")
     a, b, c = of("column", "a"), of("column", "b"), of("column", "c")
     bearing_x = iron * lengths["bearing_x"] * parts.place("bed.table")
     drives = {
-        "x": [(p, of("x_screw", f"at@{p}") - bearing_x) for p in POSITIONS["x"]],
-        "y": [(p, of("column", "lift") - of("y_screw", f"at@{p}")) for p in POSITIONS["y"]],
-        "z": [(p, of("bed", "z") - of("z_screw", f"at@{p}")) for p in POSITIONS["z"]],
+        "x": [(p, of("x_screw", f"at@{p}") - bearing_x) for p in STATIONS["x"]],
+        "y": [(p, of("column", "lift") - of("y_screw", f"at@{p}")) for p in STATIONS["y"]],
+        "z": [(p, of("bed", "z") - of("z_screw", f"at@{p}")) for p in STATIONS["z"]],
     }
-    at_test = {axis: dict(rows)[TEST[axis]] for axis, rows in drives.items()}
+    at_test = {axis: dict(rows)[TEST_POSITION[axis]] for axis, rows in drives.items()}
     return {
-        "x": at_test["x"] + of("column", "x") - c * high - b * (-reach),
+        "x": at_test["x"] + of("column", "x") + aside - c * high - b * reach,
         "y": at_test["y"]
         + of("bed", "y")
         + high * head
@@ -156,6 +176,6 @@ def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhan
         "nose": of("spindle", "nose"),
         "tip": of("spindle", "tip"),
         **{f"{axis}{axis}@{p}": row for axis, rows in drives.items() for p, row in rows},
-        **{f"{kind}@{p}": of("column", f"{kind}@{p}") for kind in ("zy", "ay") for p in GUIDE},
+        **{f"{kind}@{p}": of("column", f"{kind}@{p}") for kind in ("zy", "ay") for p in GUIDE_STATIONS},
         "slide": of("column", "foot") - of("bed", "foot"),
     }

@@ -1,21 +1,23 @@
 """From a full model to a small state space that answers alike.
 
-The basis holds the answers of the full model to all inputs, and those of its transpose to all outputs, at real shifts
-from seconds to a day and in several regimes: a rational Krylov space, of which the dominant directions are kept
-(Grimme, Krylov projection methods for model reduction, thesis, Univ. of Illinois, 1997; Penzl, Algorithms for model
-reduction of large dynamical systems, Linear Algebra Appl. 415 (2006) 322: dominant subspaces). K is symmetric, so a
-projection with the same basis on both sides keeps it so, and passive; an error of the inputs' answers counts
-only multiplied by an error of the outputs' ones.
+The basis holds the answers of the full model to its inputs, and those of its transpose to its outputs, at real shifts
+from seconds to days and in several regimes: a rational Krylov space, of which the dominant directions are kept
+(Grimme, Krylov projection methods for model reduction, thesis, University of Illinois, 1997; Penzl, Algorithms for
+model reduction of large dynamical systems, Linear Algebra Appl. 415 (2006) 322: dominant subspaces). K is symmetric: a
+projection with one basis on both sides keeps it so, and cannot make heat; what is missed of an answer to an input
+counts only as far as it is missed of an answer to an output as well.
 """
 
-import io
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
+from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.fem.assembly import FullModel
 from thermocomp.simulation.fem.transient import factorised
 from thermocomp.simulation.statespace import ReducedModel
@@ -23,83 +25,87 @@ from thermocomp.simulation.statespace import ReducedModel
 FloatArray = NDArray[np.float64]
 
 #: shifts: one over a time [1/s]
-SHIFTS = tuple(1.0 / t for t in (10.0, 40.0, 150.0, 600.0, 2400.0, 9600.0, 38400.0, 400000.0))
+SHIFTS = tuple(1.0 / t for t in (5.0, 20.0, 60.0, 200.0, 600.0, 2000.0, 6000.0, 20000.0, 60000.0, 300000.0))
+#: how far the air usually changes: temperature [K], rise with height, rise to the right [K/m]
+AIR_CHANGE = (2.0, 0.5, 0.5)
+#: fields are compared by the heat they would drive and by what they store over this time [s]
+_MEMORY = 600.0
 
 
 def reduce(
     full: FullModel,
     size: int,
+    mixes: Sequence[Mapping[str, float]],
     regimes: Sequence[Mapping[str, float]] = ({},),
     shifts: Sequence[float] = SHIFTS,
 ) -> ReducedModel:
-    """Return a model of at most `size` states.
+    """Return a model of `size` states.
 
     Parameters
     ----------
     full : FullModel
     size : int
         Number of states.
+    mixes : sequence of mapping of str to float
+        Heat that usually comes together, by input [W]. Each mix counts as an input, and each input counts alone, with
+        its largest heat in any mix.
     regimes : sequence of mapping of str to float
         Shares in which the answers are taken.
     shifts : sequence of float
         [1/s]
+
+    Raises
+    ------
+    InputError
+        A mix has an input that is not there, or an input is in no mix.
     """
-    return project(full, basis(full, size, regimes, shifts))
+    return project(full, basis(full, size, mixes, regimes, shifts))
 
 
 def basis(
-    full: FullModel, size: int, regimes: Sequence[Mapping[str, float]], shifts: Sequence[float] = SHIFTS
+    full: FullModel,
+    size: int,
+    mixes: Sequence[Mapping[str, float]],
+    regimes: Sequence[Mapping[str, float]] = ({},),
+    shifts: Sequence[float] = SHIFTS,
 ) -> FloatArray:
-    """Return V of shape (n, size): orthonormal in C, the first column constant."""
-    snapshots = []
-    # Each input and each output counts alike: by the answer of the slowest shift in the first regime.
-    slow = factorised(full.stiffness(regimes[0]) + min(shifts) * full.capacity)
-    scales = [_inverse_norms(full, slow(side)) for side in _sides(full, regimes[0])]
+    """Return the basis V of shape (n, size): orthonormal in C, with the constant field. Parameters as of `reduce`."""
+    together = _mixed(full, mixes)
+    outputs = np.array([*full.places.values(), *full.observables.values()]).T
+    energy = full.stiffness(regimes[-1]) + full.capacity / _MEMORY
+    forward, backward = [], []
+    scale: FloatArray | None = None
     for theta in regimes:
-        stiffness = full.stiffness(theta)
-        for shift in shifts:
-            solve = factorised(stiffness + shift * full.capacity)
-            snapshots += [solve(side) * scale for side, scale in zip(_sides(full, theta), scales, strict=True)]
-    one = full.one / np.sqrt(full.one @ (full.capacity @ full.one))
-    answers = np.column_stack(snapshots)
-    answers -= np.outer(one, one @ (full.capacity @ answers))
-    values, vectors = np.linalg.eigh(answers.T @ (full.capacity @ answers))
-    strongest = np.argsort(values)[::-1][: size - 1]
-    v = np.column_stack([one, answers @ vectors[:, strongest]])
-    # Orthonormal but for rounding, which a second pass takes away.
+        solvers = [factorised(full.stiffness(theta) + s * full.capacity) for s in shifts]
+        loads = np.column_stack([full.heat @ together, full.air_heat(theta) * AIR_CHANGE])
+        answers = [solve(loads) for solve in solvers]
+        if scale is None:
+            # Each output counts by how far it usually moves.
+            moved = np.max([np.sqrt(((outputs.T @ a) ** 2).sum(axis=1)) for a in answers], axis=0)
+            scale = 1.0 / np.where(moved > 0.0, moved, np.inf)
+        forward.append(_dominant(np.column_stack(answers), energy))
+        backward.append(_dominant(np.column_stack([solve(outputs * scale) for solve in solvers]), energy))
+    sides = [_dominant(np.column_stack(s), energy) for s in (forward, backward)]
+    sides = [s / np.sqrt(np.einsum("ij,ij->", s, energy @ s)) for s in sides]
+    kept = _dominant(np.column_stack(sides), energy, size - 1)
+    v = np.column_stack([full.one, kept])
+    # Twice: the first pass leaves rounding.
     for _ in range(2):
         v = np.linalg.solve(np.linalg.cholesky(v.T @ (full.capacity @ v)), v.T).T
     return np.asarray(v)
 
 
-def _sides(full: FullModel, theta: Mapping[str, float]) -> list[FloatArray]:
-    """Return what goes in, and the transpose of what comes out."""
-    return [
-        np.column_stack([full.heat, full.air_heat(theta)]),
-        np.array([*full.places.values(), *full.observables.values()]).T,
-    ]
-
-
-def _inverse_norms(full: FullModel, fields: FloatArray) -> FloatArray:
-    # An input that moves nothing (layers of the air round a part that has no height) stays nothing.
-    norms = np.sqrt(np.einsum("ij,ij->j", fields, full.capacity @ fields))
-    return np.asarray(1.0 / np.where(norms > 0.0, norms, 1.0))
-
-
-def _symmetric(matrix: FloatArray) -> FloatArray:
-    return (matrix + matrix.T) / 2.0
-
-
 def project(full: FullModel, v: FloatArray) -> ReducedModel:
     """Return the model in the basis V of shape (n, r), orthonormal in C."""
+    r = v.shape[1]
     return ReducedModel(
         conduction=_symmetric(v.T @ (full.conduction @ v)),
         conduction_theta=np.array([_symmetric(v.T @ (k @ v)) for k in full.conduction_theta.values()]).reshape(
-            -1, v.shape[1], v.shape[1]
+            -1, r, r
         ),
         heat=v.T @ full.heat,
         air=v.T @ full.air,
-        air_theta=np.array([v.T @ a for a in full.air_theta.values()]).reshape(-1, v.shape[1], full.air.shape[1]),
+        air_theta=np.array([v.T @ a for a in full.air_theta.values()]).reshape(-1, r, full.air.shape[1]),
         temperature=np.array(list(full.places.values())) @ v,
         observable=np.array(list(full.observables.values())) @ v,
         one=v.T @ (full.capacity @ full.one),
@@ -108,3 +114,42 @@ def project(full: FullModel, v: FloatArray) -> ReducedModel:
         places=tuple(full.places),
         observables=tuple(full.observables),
     )
+
+
+def write(model: ReducedModel, path: Path) -> None:
+    """Write a model as plain arrays; equal numbers make equal files."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name in (f.name for f in fields(model) if f.init):
+            # A fixed date: else every file would differ.
+            with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w") as file:
+                value = np.ascontiguousarray(getattr(model, name))
+                np.lib.format.write_array(file, value, version=(1, 0), allow_pickle=False)
+
+
+def _mixed(full: FullModel, mixes: Sequence[Mapping[str, float]]) -> FloatArray:
+    """Return every input alone, and every mix, as columns of heat [W]."""
+    columns = np.zeros((len(full.inputs), len(mixes)))
+    for k, mix in enumerate(mixes):
+        for name, heat in mix.items():
+            if name not in full.inputs:
+                raise InputError(f"heat {name!r} of a mix is not an input; there are {', '.join(full.inputs)}")
+            columns[full.inputs.index(name), k] = heat
+    largest = np.abs(columns).max(axis=1)
+    if not largest.all():
+        raise InputError(f"no mix has the input {full.inputs[int(largest.argmin())]!r}: how much heat is usual there?")
+    # A mix of one input is that input.
+    several = (columns != 0.0).sum(axis=0) > 1
+    return np.column_stack([np.diag(largest), columns[:, several]])
+
+
+def _dominant(fields_: FloatArray, metric: csr_matrix, count: int | None = None) -> FloatArray:
+    """Return the directions that hold most of some fields, as long as what they hold; all that matter if no count."""
+    values, vectors = np.linalg.eigh(fields_.T @ (metric @ fields_))
+    kept = values > 1e-10 * values[-1]
+    if count is not None:
+        kept &= values >= np.sort(values)[-count]
+    return np.asarray(fields_ @ vectors[:, kept])
+
+
+def _symmetric(matrix: FloatArray) -> FloatArray:
+    return np.asarray((matrix + matrix.T) / 2.0)

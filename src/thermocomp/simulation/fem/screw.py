@@ -2,20 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshLine
 
+from thermocomp.core.exceptions import InputError
+from thermocomp.simulation.axes import N_HATS
 from thermocomp.simulation.fem.conduction import capacity, conduction, faces
 from thermocomp.simulation.fem.materials import Material
 from thermocomp.simulation.fem.part import Part
 from thermocomp.simulation.fem.space import Space
 
 FloatArray = NDArray[np.float64]
-
-#: places over the travel where the heat of the nut can go
-HATS = 7
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,22 @@ class Screw:
             over the travel) and ``hat_0`` ... ``hat_6`` (from the start of the travel to its end); observables
             ``at@P``: how far the point at which the nut is at P mm moves away from the fixed bearing. Nothing holds
             the far end: that is the integral of ``alpha (T - 20 degC)``.
+
+        Raises
+        ------
+        InputError
+            The nut leaves the screw.
         """
         first, last = sorted(self.nut)
-        hats = np.linspace(*self.nut, HATS)
+        if not 0.0 <= first < last <= self.length:
+            raise InputError(f"screw {name}: nut from {first} to {last} m is not within the length of {self.length} m")
+        hats = np.linspace(*self.nut, N_HATS)
         reached = [self.distance(p) for p in positions]
         # A node where anything begins or ends: then all integrals are exact.
         marks = np.unique(np.round([0.0, *hats, *reached, self.length], 9))
         nodes = np.unique(
             np.concatenate(
-                [
-                    np.linspace(a, b, 1 + max(1, round((b - a) / self.length * self.cells)))
-                    for a, b in zip(marks[:-1], marks[1:], strict=True)
-                ]
+                [np.linspace(a, b, 1 + max(1, round((b - a) / self.length * self.cells))) for a, b in pairwise(marks)]
             )
         )
         section = np.pi / 4.0 * self.diameter**2
@@ -85,7 +89,7 @@ class Screw:
         strain = 1e6 * material.expansion / section
 
         def hat(at: float) -> Callable[[FloatArray], FloatArray]:
-            width = (last - first) / (HATS - 1)
+            width = (last - first) / (N_HATS - 1)
             return lambda x: np.maximum(0.0, 1.0 - np.abs(x[0] - at) / width) * (x[0] > first) * (x[0] < last)
 
         return Part(

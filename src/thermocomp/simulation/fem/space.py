@@ -57,11 +57,6 @@ class Space:
     degree : {1, 2}
         Of the polynomials.
 
-    Raises
-    ------
-    InputError
-        There is no such element, or the section is not positive.
-
     Attributes
     ----------
     n : int
@@ -70,6 +65,11 @@ class Space:
         Where they are [m].
     volume : float
         [m3]
+
+    Raises
+    ------
+    InputError
+        There is no such element, or the section is not positive.
     """
 
     def __init__(self, mesh: Mesh, section: ArrayLike | None, degree: int = 2) -> None:
@@ -255,3 +255,11 @@ def _normalised(row: FloatArray) -> FloatArray:
     if not total > 0:
         raise InputError("no part of the mesh is at the place to be averaged")
     return np.asarray(row / total, dtype=np.float64)
+
+
+def spot(axis: int, at: float, radius: float) -> Callable[[FloatArray], FloatArray]:
+    """Return a weight that falls smoothly from 1 at a coordinate to 0 at the radius [m].
+
+    Smooth, because integrals over elements are exact for polynomials only.
+    """
+    return lambda x: np.asarray(0.5 + 0.5 * np.cos(np.pi * np.minimum(1.0, np.abs(x[axis] - at) / radius)))

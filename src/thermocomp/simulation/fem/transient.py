@@ -83,7 +83,19 @@ class Stepper:
         return Step(end, WEIGHTS[0] * early + WEIGHTS[1] * end, WEIGHTS[0] * first + WEIGHTS[1] * last)
 
     def march(self, temperatures: FloatArray, heat: Heat, steps: int, time: float = 0.0) -> list[Step]:
-        """Return a number of steps, one after the other."""
+        """Return a number of steps, one after the other.
+
+        Parameters
+        ----------
+        temperatures : ndarray of shape (n,)
+            At the start [degC].
+        heat : Heat
+            Put in, with what the air brings [W].
+        steps : int
+            Number of steps.
+        time : float
+            At the start [s].
+        """
         done: list[Step] = []
         for k in range(steps):
             done.append(self.advance(temperatures, heat, time + k * self.dt))
