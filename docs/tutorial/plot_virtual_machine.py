@@ -71,8 +71,8 @@ assert until(0.63, drift["tip"]) < 0.4 * until(0.63, temperature["column_front_r
 # ----------
 #
 # The same temperature of the housing belongs to different drifts on the way up and on the way down. No function of that
-# one temperature can predict the drift, however bent: this is why the papers take several sensors, and why `dynamic` takes
-# their past as well.
+# one temperature can predict the drift, however bent: this is why the papers take several sensors, and why `dynamic`
+# takes their past as well.
 
 fig, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 for ax, name in zip(axes, ("z", "y"), strict=True):

@@ -10,10 +10,15 @@ import pytest
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mra import StepwiseMRA
-from thermocomp.papers import chen1996_drift, chen1996_setup, chen1996_show, chen1996_slope, chen1996_unseen, common
-from thermocomp.papers.chen1996_drift import Learned
-from thermocomp.papers.chen1996_slope import Profiles, Slopes
-from thermocomp.papers.chen1996_unseen import DYNAMIC, MRA, NET, NONE, Unseen
+from thermocomp.papers import common
+from thermocomp.papers.chen1996 import drift as chen1996_drift
+from thermocomp.papers.chen1996 import setup as chen1996_setup
+from thermocomp.papers.chen1996 import show as chen1996_show
+from thermocomp.papers.chen1996 import slope as chen1996_slope
+from thermocomp.papers.chen1996 import unseen as chen1996_unseen
+from thermocomp.papers.chen1996.drift import Learned
+from thermocomp.papers.chen1996.slope import Profiles, Slopes
+from thermocomp.papers.chen1996.unseen import DYNAMIC, MRA, NET, NONE, Unseen
 from thermocomp.papers.studies import run
 from thermocomp.papers.study import Claim, Study
 from thermocomp.recording.recording import Recording

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.grouping import Interval
-from thermocomp.papers import hwang, hwang_setup
 from thermocomp.papers.common import predicted
+from thermocomp.papers.hwang import redo as hwang
+from thermocomp.papers.hwang import setup as hwang_setup
 from thermocomp.papers.study import Claim, Study, silent
 from thermocomp.recording.recording import Recording
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.models.arx import ARX
-from thermocomp.papers import precompensation, precompensation_setup
 from thermocomp.papers.common import fitted
+from thermocomp.papers.precompensation import redo as precompensation
+from thermocomp.papers.precompensation import setup as precompensation_setup
 from thermocomp.papers.study import Claim, Study, silent
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from smallmachine import small_machine
 from thermocomp.datasets.virtual import record
-from thermocomp.papers import stepwise2017, stepwise2017_setup
+from thermocomp.papers.stepwise2017 import redo as stepwise2017
+from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
 from thermocomp.papers.study import Claim, Study, silent
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from thermocomp.core.machine import Channel
 from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import equivalents
-from thermocomp.papers import wessel2004, wessel2004_sets, wessel2004_spindle, wessel2004_tools
 from thermocomp.papers.study import Claim, Study
-from thermocomp.papers.wessel2004_trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
+from thermocomp.papers.wessel2004 import redo as wessel2004
+from thermocomp.papers.wessel2004 import sets as wessel2004_sets
+from thermocomp.papers.wessel2004 import spindle as wessel2004_spindle
+from thermocomp.papers.wessel2004 import tools as wessel2004_tools
+from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
 from thermocomp.recording.cycles import whole
 from thermocomp.recording.recording import Recording
 

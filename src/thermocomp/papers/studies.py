@@ -1,43 +1,18 @@
 """The studies by name; each is imported when it is asked for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 
 from thermocomp.papers.study import Claim, Progress, Study, silent
 
-
-@dataclass(frozen=True)
-class Paper:
-    """A paper that can be redone.
-
-    Parameters
-    ----------
-    title : str
-        Authors, year and title.
-    module : str
-        Of its ``run(seed, progress) -> Study``.
-    """
-
-    title: str
-    module: str
-
-
-STUDIES: dict[str, Paper] = {
-    "chen1996": Paper(
-        "Chen, Yuan, Ni 1996: Thermal error modelling for real-time error compensation", "thermocomp.papers.chen1996"
-    ),
-    "wessel2004": Paper(
-        "Wessel et al. 2004: Predicting thermal displacements in modular tool systems", "thermocomp.papers.wessel2004"
-    ),
-    "hwang": Paper("Hwang, Lee, Yang: Optimal variable selection for a thermal error model", "thermocomp.papers.hwang"),
-    "precompensation": Paper(
-        "Pre-compensation of thermal error by revision of the NC program", "thermocomp.papers.precompensation"
-    ),
-    "stepwise2017": Paper(
-        "Open Mech. Eng. J. 11 (2017): Stepwise selection of temperature points by partial F",
-        "thermocomp.papers.stepwise2017",
-    ),
+#: title by name; each name is a package beside this module, with ``redo.run(seed, progress) -> Study``
+STUDIES: dict[str, str] = {
+    "chen1996": "Chen, Yuan, Ni 1996: Thermal error modelling for real-time error compensation",
+    "wessel2004": "Wessel et al. 2004: Predicting thermal displacements in modular tool systems",
+    "hwang": "Hwang, Lee, Yang: Optimal variable selection for a thermal error model",
+    "precompensation": "Pre-compensation of thermal error by revision of the NC program",
+    "stepwise2017": "Open Mech. Eng. J. 11 (2017): Stepwise selection of temperature points by partial F",
 }
 
 
@@ -57,7 +32,7 @@ def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
     -------
     Study
     """
-    study: Study = import_module(STUDIES[name].module).run(seed, progress)
+    study: Study = import_module(f"thermocomp.papers.{name}.redo").run(seed, progress)
     return study
 
 

@@ -244,6 +244,8 @@ class Kit:
             return Probe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
         if name in self.probes:
             return self.probes[name]
+        if name in self.nests.get("y_pitch", ()):
+            return _pitch(int(name.rpartition("_")[2]))
         found = re.fullmatch(r"([xyz])_(laser|at)_(\d+)", name) if self.top_speed else None
         if not found:
             raise unknown("probe", name, [*self.probes, *self.nests])
@@ -328,7 +330,7 @@ PLACES: dict[str, str] = {
 CENTRE = Kit(
     places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
     air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
-    probes=_NEST | _SPINDLE | {f"y_pitch_{p}": _pitch(p) for p in GUIDE_STATIONS},
+    probes=_NEST | _SPINDLE,
     observables=(
         *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
         *(_at(a, p) for a in AXES for p in STATIONS[a]),

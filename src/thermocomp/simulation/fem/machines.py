@@ -34,10 +34,11 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
     Returns
     -------
     FullModel
-        Its observables in machine coordinates, tool minus workpiece [um, urad] at `TEST_POSITION`: ``x y z a b`` (``a b``:
-        tilt of the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its flange);
-        ``xx@P yy@P zz@P`` (what the drive of an axis at P mm contributes to x, y, z); ``zy@P ay@P`` (column guide's
-        z and tilt about X with the headstock at Y = P mm); ``slide`` (how far the column's foot grows against the bed).
+        Its observables in machine coordinates, tool minus workpiece [um, urad] at `TEST_POSITION`: ``x y z a b``
+        (``a b``: tilt of the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its
+        flange); ``xx@P yy@P zz@P`` (what the drive of an axis at P mm contributes to x, y, z); ``zy@P ay@P`` (column
+        guide's z and tilt about X with the headstock at Y = P mm); ``slide`` (how far the column's foot grows against
+        the bed).
     """
     table = data("centre.toml") if table is None else table
     lengths = table["lengths"]

@@ -15,7 +15,7 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.training import train
 from thermocomp.papers import common
-from thermocomp.papers.chen1996_setup import (
+from thermocomp.papers.chen1996.setup import (
     CLOSELY,
     DIFFERENCES,
     SLOPE_VARIABLES,

@@ -15,7 +15,7 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.papers.study import Claim, Progress, Table
-from thermocomp.papers.wessel2004_trial import Part
+from thermocomp.papers.wessel2004.trial import Part
 
 #: mean Psi of the best set, for each displacement, by the number of temperatures
 BySize = dict[int, NDArray[np.float64]]

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.selection.collinearity import Spectrum, contributions
 from thermocomp.models.selection.grouping import group, interval_of
-from thermocomp.papers import hwang_setup as setup
-from thermocomp.papers import hwang_show as show
-from thermocomp.papers.hwang_setup import (
+from thermocomp.papers.hwang import setup, show
+from thermocomp.papers.hwang.setup import (
     JUDGED,
     LINEAR,
     NAMES,

@@ -1,17 +1,17 @@
 """Wessel et al. 2004 redone: optimal transformations of temperatures and displacements (W-01 to W-13).
 
-Four experiments: a spindle of finite elements (`thermocomp.papers.wessel2004_spindle`), the choice of temperatures on
-23 data sets (`thermocomp.papers.wessel2004_sets`), a resting tool that is heated and a tool of a working milling
-machine (`thermocomp.papers.wessel2004_tools`). What a claim is judged by stands at the top of these modules; it was set
+Four experiments: a spindle of finite elements (`thermocomp.papers.wessel2004.spindle`), the choice of temperatures on
+23 data sets (`thermocomp.papers.wessel2004.sets`), a resting tool that is heated and a tool of a working milling
+machine (`thermocomp.papers.wessel2004.tools`). What a claim is judged by stands at the top of these modules; it was set
 down before the first run.
 """
 
 from collections.abc import Callable
 
 from thermocomp.papers.study import Progress, Study
-from thermocomp.papers.wessel2004_sets import appendix_b
-from thermocomp.papers.wessel2004_spindle import spindle
-from thermocomp.papers.wessel2004_tools import milling_machine, resting_tool
+from thermocomp.papers.wessel2004.sets import appendix_b
+from thermocomp.papers.wessel2004.spindle import spindle
+from thermocomp.papers.wessel2004.tools import milling_machine, resting_tool
 
 TITLE = "Wessel et al. 2004: Predicting thermal displacements in modular tool systems"
 

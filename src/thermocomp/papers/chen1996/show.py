@@ -6,8 +6,8 @@ import numpy as np
 
 from thermocomp.models.mra import StepwiseMRA
 from thermocomp.papers import common
-from thermocomp.papers.chen1996_drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
-from thermocomp.papers.chen1996_setup import DRIFTS, SENSORS, SUBGROUPS
+from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
+from thermocomp.papers.chen1996.setup import DRIFTS, SENSORS, SUBGROUPS
 from thermocomp.papers.study import Curve, Figure, Panel, Table
 
 #: Eq. 5 (C-18)

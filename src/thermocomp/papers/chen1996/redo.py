@@ -4,7 +4,7 @@ What the paper says of the volume that the tool reaches needs the kinematics of 
 built yet; here its headline is judged at one position (C-35).
 """
 
-from thermocomp.papers import chen1996_drift, chen1996_show, chen1996_slope, chen1996_unseen
+from thermocomp.papers.chen1996 import drift, show, slope, unseen
 from thermocomp.papers.study import Progress, Study
 
 
@@ -24,35 +24,35 @@ def run(seed: int, progress: Progress) -> Study:
     """
     new, first_laser, second_laser = ((seed + 1) * 1000 + k for k in range(3))
     progress(0.0, "five tests, regressions and nets")
-    learned = chen1996_drift.learn(seed, lambda share: progress(0.8 * share, "nets"))
+    learned = drift.learn(seed, lambda share: progress(0.8 * share, "nets"))
     progress(0.8, "slopes of Y")
-    slopes = chen1996_slope.learn(first_laser, second_laser)
+    slopes = slope.learn(first_laser, second_laser)
     progress(0.9, "new observations, noise, a lost sensor")
-    unseen = chen1996_unseen.observe(learned, new)
+    observed = unseen.observe(learned, new)
     study = Study(
         "chen1996",
         "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Time Error Compensation",
         (
-            *chen1996_drift.claims(learned),
-            *chen1996_slope.claims(slopes),
-            *chen1996_unseen.claims(unseen),
+            *drift.claims(learned),
+            *slope.claims(slopes),
+            *unseen.claims(observed),
         ),
         (
-            *chen1996_show.tables(learned),
-            *chen1996_slope.tables(slopes),
-            *chen1996_unseen.tables(unseen),
+            *show.tables(learned),
+            *slope.tables(slopes),
+            *unseen.tables(observed),
         ),
         tuple(
             sorted(
                 (
-                    *chen1996_show.figures(learned),
-                    *chen1996_slope.figures(slopes),
-                    *chen1996_unseen.figures(unseen),
+                    *show.figures(learned),
+                    *slope.figures(slopes),
+                    *unseen.figures(observed),
                 ),
                 key=lambda figure: int(figure.key.removeprefix("chen1996-fig")),
             )
         ),
-        chen1996_drift.numbers(learned) | chen1996_slope.numbers(slopes) | chen1996_unseen.numbers(unseen),
+        drift.numbers(learned) | slope.numbers(slopes) | unseen.numbers(observed),
     )
     progress(1.0, "done")
     return study

@@ -12,8 +12,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.papers import common
-from thermocomp.papers.chen1996_drift import Learned
-from thermocomp.papers.chen1996_setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
+from thermocomp.papers.chen1996.drift import Learned
+from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
 from thermocomp.papers.common import Errors, judged, shown
 from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
 from thermocomp.recording.samples import Samples

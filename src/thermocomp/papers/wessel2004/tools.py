@@ -8,8 +8,8 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
 from thermocomp.papers.common import Errors
 from thermocomp.papers.study import Claim, Curve, Figure, Panel, Progress, Table
-from thermocomp.papers.wessel2004_sets import PAPER_SET, Selection, called
-from thermocomp.papers.wessel2004_trial import (
+from thermocomp.papers.wessel2004.sets import PAPER_SET, Selection, called
+from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
     MLR_NAME,
     SWEEPS,

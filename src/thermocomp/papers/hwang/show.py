@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.models.selection.collinearity import Spectrum, spectrum
-from thermocomp.papers import hwang_setup as setup
 from thermocomp.papers.common import errors_table
-from thermocomp.papers.hwang_setup import JUDGED, LINEAR, OPTIMAL, PLAIN, QUADRATIC, Computed, named, rms
+from thermocomp.papers.hwang import setup
+from thermocomp.papers.hwang.setup import JUDGED, LINEAR, OPTIMAL, PLAIN, QUADRATIC, Computed, named, rms
 from thermocomp.papers.study import Curve, Figure, Panel, Table
 
 FloatArray = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What the study of stepwise2017 computes; `thermocomp.papers.stepwise2017` tells it."""
+"""What the study of stepwise2017 computes; `thermocomp.papers.stepwise2017.redo` tells it."""
 
 from dataclasses import dataclass
 from functools import cached_property

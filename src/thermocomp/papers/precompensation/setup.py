@@ -1,4 +1,4 @@
-"""What the study of pre-compensation computes; `thermocomp.papers.precompensation` tells it."""
+"""What the study of pre-compensation computes; `thermocomp.papers.precompensation.redo` tells it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.models.selection.orders import Order
-from thermocomp.papers import precompensation_setup as setup
 from thermocomp.papers.common import Errors, errors_table
-from thermocomp.papers.precompensation_setup import (
+from thermocomp.papers.precompensation import setup
+from thermocomp.papers.precompensation.setup import (
     CHOSEN,
     CUTS,
     LEAST,

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.numerics.stepwise import Step
-from thermocomp.papers import stepwise2017_setup as setup
 from thermocomp.papers.common import Errors, errors_table
-from thermocomp.papers.stepwise2017_setup import (
+from thermocomp.papers.stepwise2017 import setup
+from thermocomp.papers.stepwise2017.setup import (
     COMPONENTS,
     F_DELETE,
     F_ENTER,

@@ -1,4 +1,4 @@
-"""What the study of Hwang, Lee and Yang computes; `thermocomp.papers.hwang` tells it.
+"""What the study of Hwang, Lee and Yang computes; `thermocomp.papers.hwang.redo` tells it.
 
 One test of six hours in three states drawn by lot, 14 sensors, drift Z. T14 (bed) is the reference: every variable is
 ``T_i - T14``, temperatures as they are, not from the start of the test (H-08). The paper's threshold is not known

@@ -12,7 +12,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mra import StepwiseMRA
 from thermocomp.papers import common
-from thermocomp.papers.chen1996_setup import (
+from thermocomp.papers.chen1996.setup import (
     CLOSELY,
     COMPETITIVE,
     DIFFERENCES,
