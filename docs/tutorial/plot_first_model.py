@@ -90,11 +90,11 @@ plt.show()
 # out, with temperatures and spindle speed only. Temperatures are counted from the first row, as the displacement is.
 
 samples = stack([recording], targets=["z_um"])
-protocol = leave_one_cycle_out(samples)
+judging = leave_one_cycle_out(samples)
 methods = ["ols", "partial-f", "mra", "dynamic"]
-comparison = compare(samples, methods, protocol, robustness=False)
+comparison = compare(samples, methods, judging, robustness=False)
 
-print(protocol.name)
+print(judging.name)
 print(f"{'':10} {'MAE':>6} {'RMS':>6} {'max':>6}  sensors")
 for a in comparison.overall():
     mae, rms, largest = (a.metric(m) for m in ("mae", "rms", "max_abs"))
@@ -145,7 +145,7 @@ plt.show()
 # The winner is fitted to all six cycles and frozen into plain numbers. The model keeps its error on unseen cycles,
 # not the flattering one of the fit.
 
-model = study.fit(samples, best.model, protocol).models[0]
+model = study.fit(samples, best.model, judging).models[0]
 honest = model.honest_error
 print(f"{model.family}, {len(model.sensors)} sensors")
 print(f"honest error: {honest.rms:.2f} um RMS, {honest.verdict}")

@@ -56,10 +56,10 @@ def test_what_is_judged_is_never_learned_from(name: str, recording: Recording, s
 
 
 def test_comparison_covers_every_piece(samples: Samples) -> None:
-    protocol = splits.leave_one_cycle_out(samples)
+    judging = splits.leave_one_cycle_out(samples)
     heard: list[str] = []
-    result = compare(samples, ["ols", "dynamic", "ols"], protocol, progress=heard.append)
-    assert len(heard) == n_pieces(samples, ["ols", "dynamic", "ols"], protocol) == 2 * 2 * 4
+    result = compare(samples, ["ols", "dynamic", "ols"], judging, progress=heard.append)
+    assert len(heard) == n_pieces(samples, ["ols", "dynamic", "ols"], judging) == 2 * 2 * 4
     overall = result.overall()
     assert [(a.target, a.model) for a in overall] == [(t, m) for t in ("z_um", "x_um") for m in ("ols", "dynamic")]
     for a in overall:
@@ -75,9 +75,9 @@ def test_comparison_covers_every_piece(samples: Samples) -> None:
 
 
 def test_two_processes_find_the_same(samples: Samples) -> None:
-    protocol = splits.parse("0.75/0.25", samples)
-    one = compare(samples, ["ols", "partial-f"], protocol, robustness=False)
-    two = compare(samples, ["ols", "partial-f"], protocol, robustness=False, jobs=2)
+    judging = splits.parse("0.75/0.25", samples)
+    one = compare(samples, ["ols", "partial-f"], judging, robustness=False)
+    two = compare(samples, ["ols", "partial-f"], judging, robustness=False, jobs=2)
     for a, b in zip(one.assessments, two.assessments, strict=True):
         assert (a.model, a.target, a.block) == (b.model, b.target, b.block)
         assert np.array_equal(a.predicted, b.predicted)
@@ -173,8 +173,8 @@ def test_stress_finds_the_sensor_that_matters(samples: Samples) -> None:
 
 
 def test_fit_writes_its_honest_error_into_the_models(samples: Samples) -> None:
-    protocol = splits.leave_one_cycle_out(samples)
-    fitted = study.fit(samples, "dynamic", protocol, support=Support("fade"))
+    judging = splits.leave_one_cycle_out(samples)
+    fitted = study.fit(samples, "dynamic", judging, support=Support("fade"))
     assert [m.target for m in fitted.models] == ["z_um", "x_um"]
     for m, a, r2 in zip(fitted.models, fitted.comparison.overall(), fitted.r_squared, strict=True):
         assert m.honest_error is not None

@@ -35,9 +35,9 @@ def test_shapes_and_sizes(found: pareto.Budget) -> None:
 
 def test_errors_are_those_of_training_on_the_chosen_sensors(found: pareto.Budget, crowd: Samples) -> None:
     """With all temperatures there is nothing to choose, so the error is that of `compare`."""
-    protocol = splits.leave_one_cycle_out(crowd)
-    every = pareto.budget(crowd, 0, protocol, ["ols"], max_sensors=6)
-    whole = next(a for a in compare(crowd, ["ols"], protocol, robustness=False).overall() if a.target == "x_um")
+    judging = splits.leave_one_cycle_out(crowd)
+    every = pareto.budget(crowd, 0, judging, ["ols"], max_sensors=6)
+    whole = next(a for a in compare(crowd, ["ols"], judging, robustness=False).overall() if a.target == "x_um")
     assert every.pooled()[0, -1] == pytest.approx(whole.metric("rms"))
     assert every.none_pooled() == pytest.approx(whole.none_metric("rms"))
     assert found.none == pytest.approx(every.none)
@@ -45,10 +45,10 @@ def test_errors_are_those_of_training_on_the_chosen_sensors(found: pareto.Budget
 
 def test_the_unseen_block_has_no_part_in_the_choice(crowd: Samples, found: pareto.Budget) -> None:
     """A cycle spoiled beyond recognition changes no error but its own and none of the choices made without it."""
-    protocol = splits.leave_one_cycle_out(crowd)
+    judging = splits.leave_one_cycle_out(crowd)
     spoiled = crowd.deviations.copy()
-    spoiled[protocol.splits[2].judge] = 1e5 * np.sin(np.arange(protocol.splits[2].judge.sum()))[:, None]
-    only = splits.Protocol("one", (protocol.splits[2],))
+    spoiled[judging.splits[2].judge] = 1e5 * np.sin(np.arange(judging.splits[2].judge.sum()))[:, None]
+    only = splits.Judging("one", (judging.splits[2],))
     before = pareto.budget(crowd, 0, only, ["ols"], max_sensors=3)
     after = pareto.budget(replace(crowd, deviations=spoiled), 0, only, ["ols"], max_sensors=3)
     assert np.array_equal(before.frequency, after.frequency)
@@ -82,15 +82,15 @@ def test_enough_is_the_smallest_within_one_standard_error() -> None:
 
 
 def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:
-    protocol = splits.leave_one_cycle_out(crowd)
+    judging = splits.leave_one_cycle_out(crowd)
     gone = crowd.deviations.copy()
-    gone[protocol.splits[1].judge, 0] = np.nan
-    found = pareto.budget(replace(crowd, deviations=gone), 0, protocol, ["ols"], max_sensors=2)
-    assert len(found.blocks) == len(protocol.splits) - 1
+    gone[judging.splits[1].judge, 0] = np.nan
+    found = pareto.budget(replace(crowd, deviations=gone), 0, judging, ["ols"], max_sensors=2)
+    assert len(found.blocks) == len(judging.splits) - 1
     assert np.isfinite(found.rms).all()
     gone[:, 0] = np.nan
     with pytest.raises(FitError, match="x_um has no number in any of the blocks"):
-        pareto.budget(replace(crowd, deviations=gone), 0, protocol, ["ols"], max_sensors=2)
+        pareto.budget(replace(crowd, deviations=gone), 0, judging, ["ols"], max_sensors=2)
 
 
 def test_sensors_that_repeat_are_told_by_the_condition(found: pareto.Budget) -> None:
@@ -99,11 +99,11 @@ def test_sensors_that_repeat_are_told_by_the_condition(found: pareto.Budget) -> 
 
 
 def test_bad_budgets_are_refused(crowd: Samples) -> None:
-    protocol = splits.leave_one_cycle_out(crowd)
+    judging = splits.leave_one_cycle_out(crowd)
     with pytest.raises(InputError, match="budget of 0 among 6 temperatures"):
-        pareto.budget(crowd, 0, protocol, ["ols"], max_sensors=0)
+        pareto.budget(crowd, 0, judging, ["ols"], max_sensors=0)
     with pytest.raises(InputError, match="unknown model 'olss'"):
-        pareto.budget(crowd, 0, protocol, ["olss"])
+        pareto.budget(crowd, 0, judging, ["olss"])
     plain = small_machine()
     speed_only = stack([plain], ["x_um"], ["spindle_rpm"])
     with pytest.raises(InputError, match="among 0 temperatures"):

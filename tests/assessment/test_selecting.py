@@ -25,8 +25,8 @@ def crowd() -> Samples:
 
 @pytest.fixture(scope="module")
 def choices(crowd: Samples) -> dict[str, tuple[Choice, ...]]:
-    protocol = splits.leave_one_cycle_out(crowd)
-    return {m: selecting.select(m, crowd, protocol, SETTINGS) for m in METHODS}
+    judging = splits.leave_one_cycle_out(crowd)
+    return {m: selecting.select(m, crowd, judging, SETTINGS) for m in METHODS}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -109,18 +109,18 @@ def test_the_budget_is_within_its_limit(choices: dict[str, tuple[Choice, ...]]) 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_is_told_piece_by_piece(crowd: Samples, method: str) -> None:
-    protocol = splits.leave_one_cycle_out(crowd)
+    judging = splits.leave_one_cycle_out(crowd)
     heard: list[str] = []
-    selecting.select(method, crowd, protocol, SETTINGS, progress=lambda text, steps=1: heard.extend([text] * steps))
-    assert len(heard) == selecting.n_pieces(method, crowd, protocol, SETTINGS)
+    selecting.select(method, crowd, judging, SETTINGS, progress=lambda text, steps=1: heard.extend([text] * steps))
+    assert len(heard) == selecting.n_pieces(method, crowd, judging, SETTINGS)
 
 
 def test_nothing_to_choose_from_is_an_error() -> None:
     speed_only = stack([crowded_machine()], ["x_um"], ["spindle_rpm"])
-    protocol = splits.leave_one_cycle_out(speed_only)
+    judging = splits.leave_one_cycle_out(speed_only)
     for method in METHODS:
         with pytest.raises((InputError, FitError), match=r"temperature|complete rows"):
-            selecting.select(method, speed_only, protocol, SETTINGS)
+            selecting.select(method, speed_only, judging, SETTINGS)
 
 
 def test_cells_as_text() -> None:

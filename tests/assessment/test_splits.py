@@ -30,16 +30,16 @@ def test_hours(samples: Samples) -> None:
 
 
 def test_cycles(samples: Samples) -> None:
-    protocol = splits.leave_one_cycle_out(samples)
-    assert [s.block for s in protocol.splits] == [f"cycle {n}" for n in samples.cycle_names]
-    for s in protocol.splits:
+    judging = splits.leave_one_cycle_out(samples)
+    assert [s.block for s in judging.splits] == [f"cycle {n}" for n in samples.cycle_names]
+    for s in judging.splits:
         assert (s.learn ^ s.judge).all()
 
 
 def test_files(recording: Recording) -> None:
     two = stack([recording, small_machine((1500.0, 500.0), seed=1)], ["z_um"])
-    protocol = splits.leave_one_file_out(two)
-    assert [s.judge.sum() for s in protocol.splits] == [800, 400]
+    judging = splits.leave_one_file_out(two)
+    assert [s.judge.sum() for s in judging.splits] == [800, 400]
     assert two.test_names == ("small#1", "small#2")
 
 

@@ -359,8 +359,8 @@ def test_process_cannot_be_frozen_nor_written(samples: Samples) -> None:
 
 def test_process_is_judged_beside_the_others(samples: Samples, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(METHODS, "gp", Method("gp", "Gaussian process", "gp.GaussianProcess"))
-    protocol = splits.parse("0.75/0.25", samples)
-    result = compare(samples, ["ols", "gp"], protocol)
+    judging = splits.parse("0.75/0.25", samples)
+    result = compare(samples, ["ols", "gp"], judging)
     for a in result.overall():
         assert a.failure == ""
         assert a.metric("rms") < 0.5 * a.none_metric("rms")
@@ -376,4 +376,4 @@ def test_process_is_judged_beside_the_others(samples: Samples, monkeypatch: pyte
 
     monkeypatch.setattr(study, "compare", never)
     with pytest.raises(InputError, match="gp cannot be frozen to plain numbers: judge it with 'compare'"):
-        study.fit(samples, "gp", protocol)
+        study.fit(samples, "gp", judging)

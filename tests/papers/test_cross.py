@@ -54,7 +54,7 @@ def row(rows: Sequence[Row], method: str) -> Row:
 
 def test_the_last_tests_are_unseen(machine: list[tuple[str, int]]) -> None:
     task = cross.virtual(Experiment("moving", "z_um", unseen=2), seed=3)
-    (split,) = task.protocol.splits
+    (split,) = task.judging.splits
     np.testing.assert_array_equal(split.learn, task.samples.test == 0)
     np.testing.assert_array_equal(split.judge, task.samples.test > 0)
     assert machine == [("moving", 3)]
@@ -65,7 +65,7 @@ def test_what_follows_has_another_seed(machine: list[tuple[str, int]]) -> None:
     task = cross.virtual(Experiment("moving", -1, then="later"), seed=3)
     assert machine == [("moving", 3), ("later", 4)]
     assert task.samples.targets[0].name == "x_um"
-    np.testing.assert_array_equal(task.protocol.splits[0].judge, task.samples.test == 5)
+    np.testing.assert_array_equal(task.judging.splits[0].judge, task.samples.test == 5)
 
 
 @pytest.mark.usefixtures("machine")
@@ -73,7 +73,7 @@ def test_figures_of_a_row() -> None:
     task = cross.virtual(Experiment("moving", "z_um"), seed=0)
     rows = cross.judge(task, METHODS_HERE)
     assert [r.method for r in rows] == [cross.NONE, *METHODS_HERE]
-    split, y = task.protocol.splits[0], task.samples.deviations[:, 0]
+    split, y = task.judging.splits[0], task.samples.deviations[:, 0]
     none = row(rows, cross.NONE)
     assert none.rms == pytest.approx(np.sqrt(np.mean(y[split.judge] ** 2)))
     assert none.fit_rms == pytest.approx(np.sqrt(np.mean(y[split.learn] ** 2)))
@@ -96,11 +96,11 @@ def test_figures_of_a_row() -> None:
 
 def test_of_a_measured_machine_every_cycle_is_unseen_once(recording: Recording) -> None:
     task = cross.measured([recording], "x_um")
-    assert len(task.protocol.splits) == 4
-    assert np.sum([s.judge for s in task.protocol.splits], axis=0).tolist() == [1] * len(recording)
+    assert len(task.judging.splits) == 4
+    assert np.sum([s.judge for s in task.judging.splits], axis=0).tolist() == [1] * len(recording)
     (none, ols) = cross.judge(task, ["ols"])
     y, squares, n = task.samples.deviations[:, 0], 0.0, 0
-    for s in task.protocol.splits:
+    for s in task.judging.splits:
         trained = train("ols", task.samples, 0, s.learn)
         fitted = trained.estimator.predict(task.samples.only([i.name for i in trained.model.inputs]).frame())
         squares, n = squares + float(((y - fitted)[s.learn] ** 2).sum()), n + int(s.learn.sum())

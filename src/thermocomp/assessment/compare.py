@@ -11,7 +11,7 @@ from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.robustness import Robustness, pooled, stress
-from thermocomp.assessment.splits import Protocol, Split
+from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.methods import deployable, expand
@@ -107,7 +107,7 @@ class Comparison:
 
     Parameters
     ----------
-    protocol : Protocol
+    judging : Judging
     assessments : tuple of Assessment
         Per target, method and block; with several blocks also one for all of them together.
     collinearity : Collinearity
@@ -116,7 +116,7 @@ class Comparison:
         Pairs of method and target that were not judged, because the work was stopped.
     """
 
-    protocol: Protocol
+    judging: Judging
     assessments: tuple[Assessment, ...]
     collinearity: Collinearity
     left: int = 0
@@ -134,7 +134,7 @@ class Comparison:
 def compare(
     samples: Samples,
     methods: Sequence[str],
-    protocol: Protocol,
+    judging: Judging,
     *,
     support: Support = Support(),
     robustness: bool = True,
@@ -150,7 +150,7 @@ def compare(
     samples : Samples
     methods : sequence of str
         ``all`` stands for all of them.
-    protocol : Protocol
+    judging : Judging
         What is learned from and what is judged.
     support : Support
         What the models do outside their trained range.
@@ -166,7 +166,7 @@ def compare(
     Comparison
     """
     names = expand(methods)
-    pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in protocol.splits]
+    pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in judging.splits]
     done: list[Assessment] = []
     work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
     try:
@@ -174,23 +174,23 @@ def compare(
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
     except KeyboardInterrupt:
-        if len(done) < len(protocol.splits):
+        if len(done) < len(judging.splits):
             raise
     found: list[Assessment] = []
-    whole = len(done) // len(protocol.splits)  # a method that was judged on some of the blocks only is left out
+    whole = len(done) // len(judging.splits)  # a method that was judged on some of the blocks only is left out
     for k in range(whole):
-        parts = done[k * len(protocol.splits) : (k + 1) * len(protocol.splits)]
+        parts = done[k * len(judging.splits) : (k + 1) * len(judging.splits)]
         found += parts if len(parts) > 1 else []
         found.append(_together(parts))
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
-    return Comparison(protocol, tuple(found), heat, left=len(pieces) // len(protocol.splits) - whole)
+    return Comparison(judging, tuple(found), heat, left=len(pieces) // len(judging.splits) - whole)
 
 
-def n_pieces(samples: Samples, methods: Sequence[str], protocol: Protocol) -> int:
+def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging) -> int:
     """Return the number of pieces of work of `compare`."""
-    return len(samples.targets) * len(expand(methods)) * len(protocol.splits)
+    return len(samples.targets) * len(expand(methods)) * len(judging.splits)
 
 
 def judge(

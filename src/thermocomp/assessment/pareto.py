@@ -13,7 +13,7 @@ from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.metrics import rms
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.splits import Protocol, Split
+from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.methods import expand
 from thermocomp.models.selection.subsets import best_subsets
@@ -106,7 +106,7 @@ class Budget:
 def budget(
     samples: Samples,
     target: int,
-    protocol: Protocol,
+    judging: Judging,
     models: Sequence[str],
     *,
     max_sensors: int = 10,
@@ -125,7 +125,7 @@ def budget(
     samples : Samples
     target : int
         Index into ``samples.targets``.
-    protocol : Protocol
+    judging : Judging
     models : sequence of str
         Methods that are trained on the chosen sensors.
     max_sensors : int
@@ -152,7 +152,7 @@ def budget(
     if max_sensors < 1 or not temperatures:
         raise InputError(f"a sensor budget of {max_sensors} among {len(temperatures)} temperatures: want at least 1")
     deviation = samples.deviations[:, target]
-    splits = [split for split in protocol.splits if np.isfinite(deviation[split.judge]).any()]
+    splits = [split for split in judging.splits if np.isfinite(deviation[split.judge]).any()]
     if not splits:
         raise FitError(f"{samples.targets[target].name} has no number in any of the blocks to judge by")
     everything = np.ones(len(samples), dtype=np.bool_)
@@ -202,7 +202,7 @@ def budget(
 
 
 def choose(
-    samples: Samples, target: int, protocol: Protocol, settings: Settings, *, jobs: int, progress: Progress
+    samples: Samples, target: int, judging: Judging, settings: Settings, *, jobs: int, progress: Progress
 ) -> Choice:
     """Choose by the error on unseen blocks against the number of sensors.
 
@@ -211,7 +211,7 @@ def choose(
     samples : Samples
     target : int
         Index into ``samples.targets``.
-    protocol : Protocol
+    judging : Judging
     settings : Settings
     jobs : int
         Processes to share the work among; -1 takes all cores.
@@ -231,7 +231,7 @@ def choose(
     found = budget(
         samples,
         target,
-        protocol,
+        judging,
         settings.models,
         max_sensors=settings.most("pareto"),
         seconds=settings.seconds,
@@ -245,7 +245,7 @@ def choose(
     model, place = recommended
     sensors = found.sensors[place]
     errors = Table(
-        f"Error on unseen blocks: {protocol.name}",
+        f"Error on unseen blocks: {judging.name}",
         ("sensors", *(f"{m} RMS [um]" for m in found.models), "condition", "chosen in all rows"),
         tuple(
             (size, *(float(v) for v in pooled[:, k]), float(found.condition[k]), " ".join(found.sensors[k]))
@@ -274,9 +274,9 @@ def choose(
     ]
     if not found.proven:
         notes.append("Not all of these sets are proven to be the best of their size.")
-    if len(found.blocks) < len(protocol.splits):
+    if len(found.blocks) < len(judging.splits):
         notes.append(
-            f"{len(protocol.splits) - len(found.blocks)} block(s) without a number of the target were left out."
+            f"{len(judging.splits) - len(found.blocks)} block(s) without a number of the target were left out."
         )
     return Choice(
         "pareto",
@@ -292,13 +292,13 @@ def choose(
     )
 
 
-def n_pieces(samples: Samples, protocol: Protocol, models: Sequence[str], max_sensors: int) -> int:
+def n_pieces(samples: Samples, judging: Judging, models: Sequence[str], max_sensors: int) -> int:
     """Return the number of pieces of work of `budget`, at most.
 
     Parameters
     ----------
     samples : Samples
-    protocol : Protocol
+    judging : Judging
     models : sequence of str
     max_sensors : int
 
@@ -307,7 +307,7 @@ def n_pieces(samples: Samples, protocol: Protocol, models: Sequence[str], max_se
     int
     """
     temperatures = sum(c.quantity == "temperature" for c in samples.inputs)
-    return len(protocol.splits) * len(expand(models)) * min(max_sensors + 1, temperatures)
+    return len(judging.splits) * len(expand(models)) * min(max_sensors + 1, temperatures)
 
 
 def _best(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
-from thermocomp.assessment.splits import Protocol
+from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.mra import StepwiseMRA
@@ -32,14 +32,14 @@ HALF_WINDOW = 10
 ENOUGH_PSI = 0.99
 
 
-def n_pieces(method: str, samples: Samples, protocol: Protocol, settings: Settings) -> int:
+def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings) -> int:
     """Return the number of pieces of work of `select`, at most.
 
     Parameters
     ----------
     method : str
     samples : Samples
-    protocol : Protocol
+    judging : Judging
     settings : Settings
 
     Returns
@@ -47,7 +47,7 @@ def n_pieces(method: str, samples: Samples, protocol: Protocol, settings: Settin
     int
     """
     if method == "pareto":
-        return len(samples.targets) * pareto.n_pieces(samples, protocol, settings.models, settings.most("pareto"))
+        return len(samples.targets) * pareto.n_pieces(samples, judging, settings.models, settings.most("pareto"))
     if method == "ace":
         return len(samples.targets) * len(samples.cycle_names)
     return len(samples.targets)
@@ -56,7 +56,7 @@ def n_pieces(method: str, samples: Samples, protocol: Protocol, settings: Settin
 def select(
     method: str,
     samples: Samples,
-    protocol: Protocol,
+    judging: Judging,
     settings: Settings,
     *,
     jobs: int = 1,
@@ -69,7 +69,7 @@ def select(
     method : str
         grouping, partial-f, stepwise, subsets, ace or pareto.
     samples : Samples
-    protocol : Protocol
+    judging : Judging
         Unseen blocks; only ``pareto`` has a use for them.
     settings : Settings
     jobs : int
@@ -85,7 +85,7 @@ def select(
     """
     targets = range(len(samples.targets))
     if method == "pareto":
-        return tuple(pareto.choose(samples, k, protocol, settings, jobs=jobs, progress=progress) for k in targets)
+        return tuple(pareto.choose(samples, k, judging, settings, jobs=jobs, progress=progress) for k in targets)
     if method == "ace":
         return (_by_maximal_correlation(samples, settings, jobs=jobs, progress=progress),)
     choosers: dict[str, Callable[[Candidates], Choice]] = {

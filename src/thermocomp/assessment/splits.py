@@ -28,7 +28,7 @@ class Split:
 
 
 @dataclass(frozen=True)
-class Protocol:
+class Judging:
     """How models are judged: one split or several.
 
     Parameters
@@ -42,7 +42,7 @@ class Protocol:
     splits: tuple[Split, ...]
 
 
-def by_rows(samples: Samples, train: float, test: float) -> Protocol:
+def by_rows(samples: Samples, train: float, test: float) -> Judging:
     """Learn from the first share of the rows, judge on the next.
 
     Parameters
@@ -63,7 +63,7 @@ def by_rows(samples: Samples, train: float, test: float) -> Protocol:
     return _consecutive(f"first {train:.0%} of the rows to learn, next {test:.0%} unseen", n, first, stop)
 
 
-def by_time(samples: Samples, train_s: float, test_s: float) -> Protocol:
+def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
     """Learn from the first seconds of the recordings, judge on the next.
 
     Time runs through the tests one after the other, without the breaks between them.
@@ -86,7 +86,7 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Protocol:
     return _consecutive(name, len(samples), first, stop)
 
 
-def leave_one_cycle_out(samples: Samples) -> Protocol:
+def leave_one_cycle_out(samples: Samples) -> Judging:
     """Judge on each thermal cycle in turn, learn from all others.
 
     Raises
@@ -101,10 +101,10 @@ def leave_one_cycle_out(samples: Samples) -> Protocol:
             "column or several files; or judge by time with --split 0.75/0.25"
         )
     splits = [Split(f"cycle {samples.cycle_names[k]}", samples.cycle != k, samples.cycle == k) for k in range(n)]
-    return Protocol(f"leave one thermal cycle out ({n} cycles)", tuple(splits))
+    return Judging(f"leave one thermal cycle out ({n} cycles)", tuple(splits))
 
 
-def leave_one_file_out(samples: Samples) -> Protocol:
+def leave_one_file_out(samples: Samples) -> Judging:
     """Judge on each file in turn, learn from all others.
 
     Raises
@@ -116,10 +116,10 @@ def leave_one_file_out(samples: Samples) -> Protocol:
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings")
     splits = [Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k) for k in range(n)]
-    return Protocol(f"leave one file out ({n} files)", tuple(splits))
+    return Judging(f"leave one file out ({n} files)", tuple(splits))
 
 
-def parse(text: str, samples: Samples) -> Protocol:
+def parse(text: str, samples: Samples) -> Judging:
     """Understand a split as written on the command line.
 
     Parameters
@@ -145,8 +145,8 @@ def parse(text: str, samples: Samples) -> Protocol:
     raise InputError(f"split {text!r}: write two shares of the rows such as 0.75/0.25, or hours such as 20h/8h")
 
 
-def _consecutive(name: str, n: int, first: int, stop: int) -> Protocol:
+def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
     rows = np.arange(n)
     if first < 1 or stop <= first:
         raise InputError(f"{name}: leaves no row to learn from or none to judge on ({n} rows in all)")
-    return Protocol(name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop)),))
+    return Judging(name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop)),))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
-from thermocomp.assessment.splits import Protocol, Split
+from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
 from thermocomp.models.base import ThermalRegressor
@@ -45,7 +45,7 @@ class Fitted:
 def fit(
     samples: Samples,
     method: str,
-    protocol: Protocol,
+    judging: Judging,
     *,
     support: Support = Support(),
     jobs: int = 1,
@@ -57,7 +57,7 @@ def fit(
     ----------
     samples : Samples
     method : str
-    protocol : Protocol
+    judging : Judging
     support : Support
         For the models.
     jobs : int
@@ -76,19 +76,19 @@ def fit(
     """
     if not find(method).kind.freezable:
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
-    comparison = compare(samples, [method], protocol, support=support, robustness=False, jobs=jobs, progress=progress)
+    comparison = compare(samples, [method], judging, support=support, robustness=False, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
         trained = train(method, samples, k, everything, support=support)
         progress(f"{overall.target} {method} all rows")
-        models.append(replace(trained.model, honest_error=honest_error(overall, protocol)))
+        models.append(replace(trained.model, honest_error=honest_error(overall, judging)))
         estimators.append(trained.estimator)
         r_squared.append(trained.r_squared)
     return Fitted(tuple(models), tuple(estimators), tuple(r_squared), comparison)
 
 
-def honest_error(overall: Assessment, protocol: Protocol) -> HonestError:
+def honest_error(overall: Assessment, judging: Judging) -> HonestError:
     """Summarise an assessment for the model file.
 
     Raises
@@ -99,7 +99,7 @@ def honest_error(overall: Assessment, protocol: Protocol) -> HonestError:
     if overall.failure:
         raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
     return HonestError(
-        protocol=protocol.name,
+        protocol=judging.name,
         mae=overall.metric("mae"),
         rms=overall.metric("rms"),
         max_abs=overall.metric("max_abs"),

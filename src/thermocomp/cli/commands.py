@@ -202,16 +202,16 @@ def select(
     tests = read_recordings(recordings, study.mapping)
     with needs("study"):
         from thermocomp.assessment import selecting
-        from thermocomp.assessment.splits import Protocol
+        from thermocomp.assessment.splits import Judging
         from thermocomp.cli import output as out
     if output is not None:
         refuse_existing([output], overwrite, recordings)
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
-    protocol = study.protocol(samples) if method == "pareto" else Protocol("", ())
-    with _progress(selecting.n_pieces(method, samples, protocol, settings), json) as progress:
-        choices = selecting.select(method, samples, protocol, settings, jobs=study.jobs, progress=progress)
+    judging = study.judging(samples) if method == "pareto" else Judging("", ())
+    with _progress(selecting.n_pieces(method, samples, judging, settings), json) as progress:
+        choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
@@ -272,10 +272,10 @@ def fit(
     refuse_existing([output], overwrite, recordings)
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
-    protocol = study.protocol(samples)
-    with _progress(n_pieces(samples, [model], protocol) + len(samples.targets), quiet or json) as progress:
+    judging = study.judging(samples)
+    with _progress(n_pieces(samples, [model], judging) + len(samples.targets), quiet or json) as progress:
         result = studies.fit(
-            samples, model, protocol, support=Support(support, margin), jobs=study.jobs, progress=progress
+            samples, model, judging, support=Support(support, margin), jobs=study.jobs, progress=progress
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
@@ -364,9 +364,9 @@ def compare(
         refuse_existing([output], overwrite, recordings)
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
-    protocol = study.protocol(samples)
-    with _progress(comparing.n_pieces(samples, models, protocol), json) as progress:
-        comparison = comparing.compare(samples, models, protocol, jobs=study.jobs, progress=progress)
+    judging = study.judging(samples)
+    with _progress(comparing.n_pieces(samples, models, judging), json) as progress:
+        comparison = comparing.compare(samples, models, judging, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html

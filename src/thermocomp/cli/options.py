@@ -14,7 +14,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
-    from thermocomp.assessment.splits import Protocol
+    from thermocomp.assessment.splits import Judging
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
 
@@ -71,7 +71,7 @@ class Study:
             raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
         return stack(tests, self.target, self.inputs, rezero=not self.absolute)
 
-    def protocol(self, samples: "Samples") -> "Protocol":
+    def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""
         from thermocomp.assessment import splits
 

@@ -30,7 +30,7 @@ def show_comparison(
     """Print a comparison of methods on unseen blocks."""
     if as_json:
         content = {
-            "protocol": comparison.protocol.name,
+            "judging": comparison.judging.name,
             "condition_number": comparison.collinearity.condition_number,
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
@@ -40,7 +40,7 @@ def show_comparison(
         }
         print_json(content, console)
         return
-    console.print(f"Judged on: {comparison.protocol.name}")
+    console.print(f"Judged on: {comparison.judging.name}")
     console.print(_assessment_table(comparison.assessments))
     console.print(_cycle_table(comparison.assessments))
     for a in comparison.overall():
@@ -124,10 +124,10 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     """Print models that were fitted and written."""
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
-        content = {"protocol": fitted.comparison.protocol.name, "file": str(path), "trouble": trouble, "models": models}
+        content = {"judging": fitted.comparison.judging.name, "file": str(path), "trouble": trouble, "models": models}
         print_json(content, console)
         return
-    console.print(f"Judged on: {fitted.comparison.protocol.name}")
+    console.print(f"Judged on: {fitted.comparison.judging.name}")
     table = Table()
     for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):
         table.add_column(heading, justify="left" if heading in ("target", "verdict") else "right")

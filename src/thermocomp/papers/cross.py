@@ -8,7 +8,7 @@ from scipy.stats import spearmanr
 
 from thermocomp.assessment.compare import Assessment, compare, n_pieces
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.splits import Protocol, Split, leave_one_cycle_out
+from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
 from thermocomp.papers.common import Errors
@@ -68,12 +68,12 @@ class Task:
     name : str
     samples : Samples
         With one target.
-    protocol : Protocol
+    judging : Judging
     """
 
     name: str
     samples: Samples
-    protocol: Protocol
+    judging: Judging
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def virtual(experiment: Experiment, seed: int) -> Task:
     samples = stack(recordings, [name])
     unseen = samples.test >= len(recordings) - experiment.unseen
     split = Split("unseen tests", ~unseen, unseen)
-    return Task(f"{experiment.name}, {name}", samples, Protocol("whole tests left out", (split,)))
+    return Task(f"{experiment.name}, {name}", samples, Judging("whole tests left out", (split,)))
 
 
 def measured(recordings: Sequence[Recording], target: str) -> Task:
@@ -177,14 +177,14 @@ def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progre
     -------
     list of Row
     """
-    pieces, done = n_pieces(task.samples, methods, task.protocol), 0
+    pieces, done = n_pieces(task.samples, methods, task.judging), 0
 
     def tell(what: str) -> None:
         nonlocal done
         done += 1
         progress(done / pieces, f"{task.name}: {what}")
 
-    found = compare(task.samples, methods, task.protocol, jobs=jobs, progress=tell)
+    found = compare(task.samples, methods, task.judging, jobs=jobs, progress=tell)
     rows = []
     for overall in found.overall():
         blocks = [a for a in found.assessments if a.model == overall.model and a.frozen is not None]
@@ -277,7 +277,7 @@ def _row(task: Task, overall: Assessment, blocks: Sequence[Assessment]) -> Row:
 
 
 def _none(task: Task, first: Assessment) -> Row:
-    learned = np.any([s.learn for s in task.protocol.splits], axis=0)
+    learned = np.any([s.learn for s in task.judging.splits], axis=0)
     rms = first.none_metric("rms")
     return Row(
         task=task.name,
@@ -295,8 +295,8 @@ def _none(task: Task, first: Assessment) -> Row:
 
 
 def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
-    """Replay the models on what they learned from; in the order of the protocol's splits."""
-    splits = {s.block: s for s in task.protocol.splits}
+    """Replay the models on what they learned from; in the order of the splits."""
+    splits = {s.block: s for s in task.judging.splits}
     residuals = []
     for block in blocks:
         if block.frozen is not None:

@@ -32,7 +32,7 @@ def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     return {
         "version": __version__,
-        "protocol": comparison.protocol.name,
+        "judging": comparison.judging.name,
         "verdict": verdict(comparison),
         "cautions": cautions(comparison),
         "usable": [t for t in targets if comparison.best(t) is not None],

@@ -7,7 +7,9 @@ try:
     from thermocomp.simulation.fem.machines import MODELS
     from thermocomp.simulation.fem.reduction import write
 except ModuleNotFoundError as error:
-    sys.exit(f"{error.name} is missing; it takes pip install 'thermocomp[fem]' to make the virtual machine, not to run it")
+    sys.exit(
+        f"{error.name} is missing; it takes pip install 'thermocomp[fem]' to make the virtual machine, not to run it"
+    )
 
 FOLDER = Path(__file__).parents[1] / "reduced"
 

@@ -69,7 +69,20 @@ def basis(
     regimes: Sequence[Mapping[str, float]] = ({},),
     shifts: Sequence[float] = SHIFTS,
 ) -> FloatArray:
-    """Return the basis V of shape (n, size): orthonormal in C, with the constant field. Parameters as of `reduce`."""
+    """Return the basis V of shape (n, size): orthonormal in C, and it contains the constant field.
+
+    Parameters
+    ----------
+    full : FullModel
+    size : int
+        Number of columns.
+    mixes : sequence of mapping of str to float
+        As of `reduce`.
+    regimes : sequence of mapping of str to float
+        Shares in which the answers are taken.
+    shifts : sequence of float
+        [1/s]
+    """
     together = _mixed(full, mixes)
     outputs = np.array([*full.places.values(), *full.observables.values()]).T
     energy = full.stiffness(regimes[-1]) + full.capacity / _MEMORY
