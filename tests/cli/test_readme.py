@@ -44,6 +44,14 @@ def test_the_real_machine_prints_what_the_readme_shows(
     assert_printed(blocks()[2], capsys.readouterr().out)
 
 
+def test_the_study_prints_what_the_readme_shows(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(["papers", "hwang"]) == 0
+    assert_printed(blocks()[3], capsys.readouterr().out)
+
+
 def test_commands_of_the_readme_exist() -> None:
     text = README.read_text("utf-8")
     for name in re.findall(r"^ +thermocomp (\S+)", text, re.MULTILINE):

@@ -67,8 +67,7 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = s
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
     """Return a claim that knows its other runs, and what was found where it does not hold."""
     same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
-    finding = claim.finding
-    if claim.holds and not finding:
-        failed = [(k, c) for k, c in enumerate(same, start=seed + 1) if c.holds is False]
-        finding = f"Seed {failed[0][0]}: {failed[0][1].finding}" if failed else ""
+    failed = [(k, c) for k, c in enumerate(same, start=seed + 1) if c.holds is False]
+    otherwise = f"Seed {failed[0][0]}: {failed[0][1].finding}" if claim.holds and failed else ""
+    finding = " ".join(text for text in (claim.finding, otherwise) if text)
     return replace(claim, finding=finding, again=tuple(c.holds for c in same if c.holds is not None))
