@@ -22,6 +22,7 @@ release = version = version_of("thermocomp")
 extensions = [
     "cli_help",
     "method_table",
+    "requirement_table",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

@@ -18,7 +18,7 @@ from thermocomp.papers.study import Claim, Progress, Table
 from thermocomp.papers.wessel2004.trial import Part
 
 #: mean Psi of the best set, for each displacement, by the number of temperatures
-BySize = dict[int, NDArray[np.float64]]
+_BySize = dict[int, NDArray[np.float64]]
 
 #: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS, PAPER_DATA_SETS = 511, 35_259, 129, 23
@@ -123,7 +123,7 @@ def _choice(small: Equivalents) -> tuple[int, ...]:
     return max(equals, key=lambda s: total[s])
 
 
-def _enough(by_size: BySize) -> Claim:
+def _enough(by_size: _BySize) -> Claim:
     told = "; ".join(f"{k}: {', '.join(f'{v:.4f}' for v in by_size[k])}" for k in (1, 2, MOST, max(by_size)))
     least = next((k for k, best in by_size.items() if (best > ENOUGH_PSI).all()), None)
     return Claim(
@@ -136,7 +136,7 @@ def _enough(by_size: BySize) -> Claim:
     )
 
 
-def _best_by_size(psi: MaximalCorrelations) -> BySize:
+def _best_by_size(psi: MaximalCorrelations) -> _BySize:
     """Return the mean Psi of the best set of each size, for each displacement."""
     sizes = np.array([len(s) for s in psi.subsets])
     means = psi.psi.mean(axis=2)
@@ -191,7 +191,7 @@ def called(places: tuple[int, ...]) -> str:
 
 
 def _tables(
-    by_size: BySize, psi: MaximalCorrelations, small: Equivalents, chosen: tuple[int, ...]
+    by_size: _BySize, psi: MaximalCorrelations, small: Equivalents, chosen: tuple[int, ...]
 ) -> tuple[Table, ...]:
     n_tests = len(psi.tests)
     targets = [f"S{d + 1}" for d in range(len(psi.psi))]

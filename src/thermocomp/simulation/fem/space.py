@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from skfem import (
     Basis,
     BilinearForm,
@@ -230,7 +230,7 @@ class Space:
         if theirs.size != mine.size:
             raise InputError(f"edges of {mine.size} and {theirs.size} points do not lie on each other")
         target = (self.points[:, mine] + np.asarray(offset, dtype=np.float64).reshape(-1, 1)).T
-        away, partner = cKDTree(self.points[:, theirs].T).query(target)
+        away, partner = KDTree(self.points[:, theirs].T).query(target)
         if away.max() > 1e-9 or np.unique(partner).size != partner.size:
             raise InputError(f"edges do not lie on each other: a point is {away.max():.3g} m from the other edge")
         rows = np.arange(mine.size)
