@@ -113,8 +113,10 @@ def test_a_method_that_cannot_be_fitted_is_told(recording: Recording) -> None:
     study = cross.run(0, methods=METHODS_HERE, experiments=[Experiment("resting", "z_um")])
     (claim,) = study.claims
     assert claim.finding.endswith("Not fitted: arx.")
-    cells = next(r for r in study.tables[0].rows if r[1] == "arx")
-    assert cells[2].startswith("not fitted: there is no spindle speed")
+    overview, table = study.tables
+    assert ["arx", "-"] in [list(r) for r in overview.rows]
+    cells = next(r for r in table.rows if r[0] == "arx")
+    assert cells[7].startswith("not fitted: there is no spindle speed")
     assert "resting, z_um, arx: rms_um" not in study.numbers
 
 
@@ -130,10 +132,15 @@ def test_one_table_of_all(recording: Recording) -> None:
     )
     assert told == sorted(told)
     assert told[-1] == 1.0
-    (table,) = study.tables
-    assert all(len(r) == len(table.header) for r in table.rows)
+    overview, *tables = study.tables
+    assert all(len(r) == len(t.header) for t in study.tables for r in t.rows)
     tasks = ["moving, z_um", "resting, x_um", "small, z_um", "small, x_um"]
-    assert [r[:2] for r in table.rows] == [[t, m] for t in tasks for m in (cross.NONE, "ols", "dynamic")]
+    assert list(overview.header[1:]) == [task.replace(",", "") for task in tasks]
+    assert [r[0] for r in overview.rows] == [cross.NONE, "ols", "dynamic"]
+    for task, table, k in zip(tasks, tables, range(1, 5), strict=True):
+        assert table.caption.startswith(task)
+        assert [r[0] for r in table.rows] == [cross.NONE, "ols", "dynamic"]
+        assert [r[2] for r in table.rows] == [r[k] for r in overview.rows]
     assert [c.ids for c in study.claims] == [("X-03",), ("X-03",), ("X-02", "X-03"), ("X-02", "X-03")]
     ratio = study.numbers["moving, z_um, ols: rms_um"] / study.numbers["moving, z_um, none: rms_um"]
     (panel,) = study.figures[0].panels
@@ -168,5 +175,5 @@ def test_a_measured_machine(shared_data: Path) -> None:
     rms = {m: study.numbers[f"recording, ch1_um, {m}: rms_um"] for m in (cross.NONE, "ols", "dynamic")}
     assert rms["dynamic"] < 2.0
     assert 3 * rms["dynamic"] < rms["ols"] < rms[cross.NONE]
-    (ols,) = [r for r in study.tables[0].rows if r[1] == "ols"]
-    assert float(ols[3]) > 4 * float(ols[2])
+    (ols,) = [r for r in study.tables[1].rows if r[0] == "ols"]
+    assert float(ols[2]) > 4 * float(ols[1])

@@ -174,10 +174,8 @@ def _table(t: "StudyTable") -> Table:
     left = words(t)
     table = Table(caption=escape(t.caption))
     for k, heading in enumerate(t.header):
-        table.add_column(escape(heading), justify="left" if k in left else "right", overflow="fold")
-    for number, row in enumerate(rows(t)):
-        if row[0] and number and 0 in left:
-            table.add_section()
+        table.add_column(escape(heading), justify="left" if k in left else "right", overflow="fold", no_wrap=k == 0)
+    for row in rows(t):
         table.add_row(*map(escape, row))
     return table
 

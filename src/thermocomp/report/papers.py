@@ -19,7 +19,7 @@ _NUMBER = re.compile(r"[-+]?[\d.,]+(e[-+]?\d+)?( ?%)?|nan|inf|[-–]")
 WIDTH = 9.6
 PANEL_HEIGHT = 2.7
 #: of plain text
-COLUMNS, INDENT = 100, "    "
+COLUMNS, INDENT = 88, "    "
 
 
 def counted(study: Study) -> dict[str, int]:
@@ -74,7 +74,7 @@ def laid_out(table: Table) -> str:
         return cell.ljust(widths[k]) if k in left else cell.rjust(widths[k])
 
     said = ("  ".join(placed(k, cell) for k, cell in enumerate(line)).rstrip() for line in lines)
-    return "\n".join([table.caption, *said])
+    return "\n".join([textwrap.fill(table.caption, COLUMNS), *said])
 
 
 def words(table: Table) -> list[int]:
