@@ -3,8 +3,8 @@ All methods on all experiments
 ==============================
 
 Each paper tries its own method on its own machine. Here every method is trained on every paper's experiment and judged
-on tests it has not seen: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv`` adds
-recordings of your own, ``--models all`` the slower methods.
+on tests it has not seen: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv``
+adds recordings of your own, ``--models all`` the slower methods.
 """
 
 # %%

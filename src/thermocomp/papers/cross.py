@@ -338,7 +338,7 @@ def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
 
 
 def _overview(rows: Sequence[Sequence[Row]]) -> Table:
-    """The one table of X-03."""
+    """Return the one table of X-03."""
     cells = [
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
         for k, first in enumerate(rows[0])
