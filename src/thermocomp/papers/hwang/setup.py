@@ -27,26 +27,11 @@ from thermocomp.papers.common import PAPERS_SUPPORT, Errors, predicted, renamed
 from thermocomp.papers.study import Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.simulation.kits import HWANG_PLACES
 
 FloatArray = NDArray[np.float64]
 
-#: channels of T1 .. T14 (H-08)
-PLACES = (
-    "x_bearing",
-    "x_nut",
-    "y_bearing",
-    "y_nut",
-    "z_bearing",
-    "z_nut",
-    "front_seat",
-    "rear_seat",
-    "column_front_right",
-    "column_front_left",
-    "column_rear_right",
-    "column_rear_left",
-    "bed_front",
-    "bed_rear",
-)
+#: of the temperatures in `HWANG_PLACES` (H-08)
 NAMES = tuple(f"T{k}" for k in range(1, 15))
 REFERENCE = "T14"
 TARGET = "z_um"
@@ -92,7 +77,7 @@ class Fit:
 
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return tests with the paper's names, temperatures as they are."""
-    names = {f"t_{p}_C": n for p, n in zip(PLACES, NAMES, strict=True)} | {TARGET: TARGET}
+    names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
     return stack([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
@@ -246,7 +231,7 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> Fit:
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
-    inputs = [*(f"t_{p}_C" for p in PLACES), "spindle_rpm"]
+    inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
     learned = stack(tests[:1], [TARGET], inputs)
     model = train("dynamic", learned, 0, np.ones(len(learned), dtype=np.bool_)).model
     new = stack(tests[1:], [TARGET], inputs)
