@@ -71,7 +71,7 @@ def test_every_experiment_is_well_formed(experiment: str) -> None:
 
 def test_shapes_are_those_of_the_papers() -> None:
     assert shapes("chen1996") == [(162, 24, 5)] * 5  # 810 rows
-    assert shapes("chen1996-slope") == [(51, 24, 18)]  # twelve displacements, six angles
+    assert shapes("chen1996-slope") == [(51, 24, 24)]  # twelve displacements, twelve angles
     assert shapes("wessel-fem") == [(199, 3, 2)] * 2
     assert [s[1:] for s in shapes("wessel-tool")] == [(9, 3)] * 2
     assert shapes("wessel-milling") == [(81, 3, 1)] * 5

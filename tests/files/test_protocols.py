@@ -196,7 +196,21 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         ),
         (BODY + '[[faults]]\nchannel = "t_air_C"\nkind = "lost"', "[[faults]] 1, key 'start': is missing"),
         (
-            BODY + '[[faults]]\nchannel = "air"\nkind = "lost"\nstart = "1 h"',
+            BODY + '[[faults]]\nchannel = "t_air_C"\nkind = "lost"\nstart = "2 h"',
+            "[[faults]] 1, key 'start' = '2 h': 7200 s: must be from 0 to the end of the test, 60 s",
+        ),
+        (HEAD + 'segments = [{duration = "10000000 h"}]', "make 3.6e+09 rows; at most 10,000,000"),
+        (BODY + "copies = 1000000", "key 'copies' = 1000000: must be from 1 to 10000"),
+        (HEAD + 'duration = "1 min"\nrepeat = 1000000\nsegments = [{}]', "must be from 1 to 10000"),
+        (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "take a larger step"),
+        (HEAD + 'segments = [{duration = "1 min", powered = "no"}]', "must be true or false, without quotes"),
+        (BODY + "perfect = 1", "key 'perfect' = 1: must be true or false"),
+        (HEAD + 'segments = [{duration = "1 min", speed = true}]', "true and false say nothing here"),
+        (HEAD + 'segments = [{duration = "1 min", speed = "1000"}]', "write a number without quotes"),
+        (BODY + "climate = {mean = 1e6}", "1e+06 degC: must be from -30 to 60"),
+        (BODY + 'touch = {every = "1 h", noise = -3, points = {a = [0, 0, 0]}}', "'noise' = -3: must not be negative"),
+        (
+            BODY + '[[faults]]\nchannel = "air"\nkind = "lost"\nstart = "30 s"',
             "[[faults]] 1, key 'channel' = 'air': there",
         ),
         (

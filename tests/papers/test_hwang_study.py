@@ -49,7 +49,7 @@ def test_numbers_of_models(study: Study) -> None:
     assert n["models_tried_without_grouping"] == 2**13 - 1
     assert n["models_tried"] >= 2 ** n["groups"]
     assert 1 <= n["variables"] <= n["groups"]
-    assert claim(study, "H-07").holds is (n["models_tried"] < 2**13 - 1)
+    assert claim(study, "H-07").holds is None  # arithmetic, no finding
 
 
 def test_the_verdicts_are_those_of_the_numbers(study: Study) -> None:

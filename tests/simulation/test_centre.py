@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -240,9 +241,25 @@ def test_friction_under_the_column_is_a_play() -> None:
 
 
 def test_joints_that_are_not_linear() -> None:
-    joints = Joints(preload=0.1, gib=0.2, centrifugal=4.0, lift=-1.0)
-    np.testing.assert_allclose(joints.shaft(np.array([10.0, -10.0, 0.0]), np.array([0.0, 0.0, 0.5])), [10, -10, -1])
-    np.testing.assert_allclose(joints.headstock(np.array([3.0, 0.0]), np.array([0.0, 1.0])), [-1.8, -1.0])
+    joints = Joints(preload=0.1, centrifugal=4.0)
+    np.testing.assert_allclose(joints.shaft(np.array([10.0, -10.0, 0.0]), np.array([0.0, 0.0, 0.5])), [1, 0, -1])
+
+
+def test_joints_act_on_the_tool_point_in_the_right_direction(centre: MachiningCentre) -> None:
+    _, truth = run(centre, centre.init(AIR), Drive(3000.0, cooled=False), 2.0)
+    tight = MachiningCentre(joints=replace(centre.joints, preload=centre.joints.preload + 1.0))
+    _, tighter = run(tight, tight.init(AIR), Drive(3000.0, cooled=False), 2.0)
+    warmer = seen(centre, truth, "shaft") - seen(centre, truth, "front_seat")
+    assert warmer[-1] > 3.0
+    # a shaft that is pushed out comes nearer to the workpiece
+    np.testing.assert_allclose(seen(centre, tighter, "z") - seen(centre, truth, "z"), -warmer, atol=1e-9)
+    np.testing.assert_allclose(seen(centre, tighter, "tip") - seen(centre, truth, "tip"), warmer, atol=1e-9)
+    spun = MachiningCentre(joints=replace(centre.joints, centrifugal=2.0, lift=-1.5))
+    _, drawn = run(spun, spun.init(AIR), Drive(3500.0 / 2), 20.0 / HOUR)
+    _, plain = run(centre, centre.init(AIR), Drive(3500.0 / 2), 20.0 / HOUR)
+    # centrifugal forces draw the shaft in, and let it sink
+    assert (seen(centre, drawn, "z") - seen(centre, plain, "z"))[0] == pytest.approx(1.0 / 4)
+    assert (seen(centre, drawn, "y") - seen(centre, plain, "y"))[0] == pytest.approx(-1.0 / 4)
 
 
 def test_an_even_temperature_hurts_little(centre: MachiningCentre) -> None:
@@ -259,8 +276,22 @@ def test_unusable_steps_are_refused(centre: MachiningCentre) -> None:
     for dt in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(InputError, match="must be positive"):
             centre.run(state, [Drive()], air, dt)
-    for speed in (4000.0, float("nan")):
-        with pytest.raises(InputError, match="beyond the machine's 3500"):
-            centre.run(state, [Drive(speed)], air, 1.0)
+    with pytest.raises(InputError, match="beyond the machine's 3500"):
+        centre.run(state, [Drive(4000.0)], air, 1.0)
+    for drives, given in (([], air), ([Drive()] * 2, air), ([Drive()], air[:, :2])):
+        with pytest.raises(InputError, match="three numbers per"):
+            centre.run(state, drives, given, 1.0)
+    with pytest.raises(InputError, match="air: a number is not finite"):
+        centre.run(state, [Drive()], air * np.nan, 1.0)
+    for wrong in (
+        {"speed": float("nan")},
+        {"feed": (0.0, float("inf"), 0.0)},
+        {"loads": {"tool_tip": float("nan")}},
+        {"stroke": (None, (0.0, 600.0), None)},
+        {"speed": 100.0, "powered": False},
+        {"feed": (1.0, 0.0, 0.0), "powered": False},
+    ):
+        with pytest.raises(InputError, match="drive"):
+            Drive(**wrong)
     with pytest.raises(InputError, match="'tool_tp'; the nearest are tool_tip"):
         centre.run(state, [Drive(loads={"tool_tp": 5.0})], air, 1.0)

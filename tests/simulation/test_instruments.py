@@ -99,9 +99,9 @@ def test_only_a_calculation_looks_into_a_shaft() -> None:
 
 
 def test_the_pitch_of_y_is_an_angle() -> None:
-    pitch = displacement("p", CENTRE.probe("y_pitch_220"), perfect=False)
+    pitch = displacement("p", CENTRE.probe("y_pitch_200"), perfect=False)
     assert (pitch.sensor.channel.name, pitch.sensor.channel.quantity) == ("p_urad", "angle")
-    assert read(CENTRE, "y_pitch_220", **{"ay@0": 1.0, "ay@220": 5.0}) == 4.0
+    assert read(CENTRE, "y_pitch_200", **{"ay@0": 1.0, "ay@200": 5.0}) == 4.0
     assert CENTRE.probe("y_pitch_0").reads == {}
 
 
@@ -128,8 +128,10 @@ def test_what_is_not_there_is_refused_and_the_nearest_told() -> None:
 
 
 def test_the_points_of_an_artefact() -> None:
-    touch = Touch(1800.0, {"p": (400.0, 250.0, 300.0)})
-    x, y, z = touch.instruments(perfect=False)
+    touch = Touch(1800.0, {"p": (400.0, 250.0, 300.0), "high": (300.0, 400.0, 300.0)})
+    x, y, z, *high = touch.instruments(perfect=False)
+    assert high[1].reads == {"y": 1.0, "yy@400": 1.0, "yy@250": -1.0}
+    assert high[2].reads == {"z": 1.0, "zy@400": 1.0, "zy@250": -1.0}  # the column leans
     assert [i.sensor.channel.name for i in (x, y, z)] == ["x_p_um", "y_p_um", "z_p_um"]
     assert x.reads == {"x": 1.0, "xx@400": 1.0, "xx@300": -1.0}
     assert y.reads == {"y": 1.0}

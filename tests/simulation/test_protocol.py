@@ -44,12 +44,18 @@ def test_a_stretch_becomes_segments() -> None:
                 stroke=Stroke(y=(100.0, 200.0)),
                 loads={"tool_tip": 40.0},
                 cooled=False,
-                powered=False,
+                powered=True,
             ),
         )
     )
-    full = Drive(2000.0, (100.0, 0.0, 300.0), (None, (100.0, 200.0), None), {"tool_tip": 40.0}, False, False)
+    full = Drive(2000.0, (100.0, 0.0, 300.0), (None, (100.0, 200.0), None), {"tool_tip": 40.0}, False, True)
     assert stretch.draw(rng()) == [Segment(60.0), Segment(120.0, full)]
+
+
+def test_what_is_switched_off_stands_whatever_it_inherits() -> None:
+    stretch = Stretch(speed=2000.0, feed=Feed(x=100.0), segments=(Stretch(duration=60.0, powered=False),))
+    (segment,) = stretch.draw(rng())
+    assert segment.drive == Drive(powered=False)
 
 
 def test_what_is_said_outside_holds_within() -> None:
@@ -160,7 +166,7 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
         ({"duration": Lot(one_of=(20.0, 25.0))}, ("duration",), "25 s is no multiple"),
         ({"segments": (Stretch(), Stretch(duration=5.0))}, ("segments", 1, "duration"), "5 s is no multiple"),
         ({"soak": Stretch(speed=100.0)}, ("soak", "duration"), "missing"),
-        ({"copies": 0}, ("copies",), "at least 1"),
+        ({"copies": 0}, ("copies",), "from 1 to"),
         ({"weight": 2.0}, ("weight",), "counts only"),
     ],
 )

@@ -74,7 +74,7 @@ def papers(
     seed : int
         Of the weather, the sensors' noise and what is drawn by lot.
     repeats : int
-        Runs of each paper's study, each with the next seed: what holds in one weather only is told. Numbers and figures
+        Runs of each paper's study, with seeds 100 apart: what holds in one weather only is told. Numbers and figures
         are those of the first.
     output : Path
         Page with claims, figures and tables to write (.html).

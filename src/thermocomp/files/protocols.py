@@ -25,6 +25,9 @@ ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False
 
 #: keys that hold a time, which is written with its unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
+#: keys that hold true or false, and texts that may look like a number
+SWITCHES = ("perfect", "cooled", "powered")
+TEXTS = ("description", "name", *TIMES)
 #: keys of the whole file; all others belong to the tests
 _OF_ALL = ("description", "machine", "tests")
 #: what stands under a key; numbers that are drawn by lot stand under any other
@@ -92,6 +95,7 @@ def read_protocol(path: str | Path) -> Experiment:
     except tomllib.TOMLDecodeError as e:
         raise InputError(f"{source}: not valid TOML: {e}") from e
     try:
+        _check_types(content, ())
         given = _in_house_units(content)
         try:
             return ADAPTER.validate_python({"name": source.stem, **given})
@@ -100,6 +104,24 @@ def read_protocol(path: str | Path) -> Experiment:
             raise SettingError(message, keys) from e
     except SettingError as e:
         raise InputError(": ".join(part for part in (str(source), _where(e.path, content), str(e)) if part)) from e
+
+
+def _check_types(value: Any, path: Keys) -> None:
+    """Refuse true and false where a number belongs, and numbers in quotes: both would pass for something else."""
+    if isinstance(value, dict):
+        for key, v in value.items():
+            _check_types(v, (*path, key))
+    elif isinstance(value, list):
+        for k, v in enumerate(value):
+            _check_types(v, (*path, k))
+    else:
+        key = next((k for k in reversed(path) if isinstance(k, str)), "")
+        if key in SWITCHES and not isinstance(value, bool):
+            raise SettingError("must be true or false, without quotes", path)
+        if isinstance(value, bool) and key not in SWITCHES:
+            raise SettingError("true and false say nothing here", path)
+        if isinstance(value, str) and key not in TEXTS and re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", value):
+            raise SettingError("write a number without quotes", path)
 
 
 def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:

@@ -247,7 +247,7 @@ def run(
     progress(1.0, "done")
     return Study(
         name="cross",
-        title="All methods on all experiments",
+        title="The methods on all experiments",
         claims=tuple(c for k, mine in enumerate(rows) for c in _claims(mine, real=k >= len(experiments))),
         tables=(_overview(rows), *map(_table, rows)) if rows else (),
         figures=(_figure(rows),),

@@ -16,6 +16,10 @@ STUDIES: dict[str, str] = {
 }
 
 
+#: between the seeds of a study's repeated runs
+APART = 100
+
+
 def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
     """Redo a paper's study on the virtual machine.
 
@@ -44,7 +48,7 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = s
     name : str
         Key of `STUDIES`.
     seed : int
-        Of the first run; the others take the next ones.
+        Of the first run; the others take seeds `APART` further on: a study steps its own seeds by one.
     repeats : int
         Number of runs.
     progress : callable
@@ -59,7 +63,7 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = s
     for k in range(repeats):
         word = f"run {k + 1} of {repeats}, " if repeats > 1 else ""
         found.append(
-            run(name, seed=seed + k, progress=lambda done, text: progress((k + done) / repeats, word + text))  # noqa: B023
+            run(name, seed=seed + APART * k, progress=lambda done, text: progress((k + done) / repeats, word + text))  # noqa: B023
         )
     return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
 
@@ -67,7 +71,7 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = s
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
     """Return a claim that knows its other runs, and what was found where it does not hold."""
     same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
-    failed = [(k, c) for k, c in enumerate(same, start=seed + 1) if c.holds is False]
-    otherwise = f"Seed {failed[0][0]}: {failed[0][1].finding}" if claim.holds and failed else ""
+    failed = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False]
+    otherwise = f"Seed {seed + APART * failed[0][0]}: {failed[0][1].finding}" if claim.holds and failed else ""
     finding = " ".join(text for text in (claim.finding, otherwise) if text)
     return replace(claim, finding=finding, again=tuple(c.holds for c in same if c.holds is not None))

@@ -8,7 +8,5 @@ TRAVEL = {"x": 600.0, "y": 550.0, "z": 600.0}
 TEST_POSITION = {"x": 300, "y": 250, "z": 300}
 #: positions at which the machine tells the positioning of each axis [mm]
 STATIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": tuple(range(0, 601, 100))}
-#: positions of Y at which it tells straightness and pitch of the column's guide [mm]
-GUIDE_STATIONS = tuple(range(0, 551, 110))
 #: hat functions along each screw that take the heat of its nut
 N_HATS = 7

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.joints import Joints, play
-from thermocomp.simulation.machine import Air, Drive, Truth, stretches
+from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -20,7 +20,6 @@ FloatArray = NDArray[np.float64]
 _WATCHED = ("front_bearing", "rear_bearing", "shaft", "front_seat", "coolant", "bed_front")
 #: inputs that depend on them
 _FRICTION = ("front_bearing", "rear_bearing", "coolant")
-_COLUMN = ("column_front_right", "column_front_left", "column_rear_right", "column_rear_left")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ class MachiningCentre:
 
     Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
     headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants
-    from half a minute (bearings) to half a day (bed); heat that is nonlinear in speed and temperature; hysteresis by
+    from half a minute (bearings) to days (foundation); heat that is nonlinear in speed and temperature; hysteresis by
     the chiller's thermostat and by friction under the column.
 
     Parameters
@@ -104,10 +103,10 @@ class MachiningCentre:
         Raises
         ------
         InputError
-            `dt` is not positive, a speed is beyond the top speed, or a load is put in where there is no place for it.
+            `dt` is not positive, there is no drive, the air has another length or is not finite, a speed is beyond the
+            top speed, or a load is put in where there is no place for it.
         """
-        if not (dt > 0 and math.isfinite(dt)):
-            raise InputError(f"step of {dt} s: must be positive")
+        check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)
         fields = np.empty((len(drives) * parts, len(self.model.one)))
         ratio = np.empty(len(drives))
@@ -118,7 +117,7 @@ class MachiningCentre:
             rows = slice(first * parts, last * parts)
             stretch = np.repeat(air[first:last], parts, axis=0)
             chilling = self._advance(current, chilling, drive, stretch, dt / parts, fields[rows])
-            current = fields[rows.stop - 1]
+            current = fields[rows.stop - 1].copy()
         truth, slid = self._truth(fields, np.repeat(ratio, parts), state.slid)
         ends = slice(parts - 1, None, parts)
         return CentreState(current, chilling, slid), Truth(truth.temperatures[ends], truth.observables[ends])
@@ -139,9 +138,8 @@ class MachiningCentre:
         turning = ratio > 0 and drive.powered
         for k in range(len(fields)):
             if turning:
-                tightening = shaft - seat
-                power[0] = heat.front.heat(ratio, front, tightening)
-                power[1] = heat.rear.heat(ratio, rear, tightening)
+                power[0] = heat.front.heat(ratio, front, shaft - seat)
+                power[1] = heat.rear.heat(ratio, rear, 0.0)  # it floats on springs
             power[2] = -heat.chiller if flow and chilling else 0.0
             after = operators.state @ now
             after += forcing[k]
@@ -164,12 +162,12 @@ class MachiningCentre:
         observables = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
         place = dict(zip(self.places, temperatures.T, strict=True))
         index = {name: k for k, name in enumerate(self.observables)}
-        slide = play(slid, observables[:, index["slide"]], self.joints.stiction)
+        wish = observables[:, index["slide"]]
+        slide = play(slid, wish, self.joints.stiction)
         shaft = self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
-        head = 0.6 * place["headstock_front"] + 0.4 * place["headstock_rear"]
-        column = np.mean([place[c] for c in _COLUMN], axis=0)
-        observables[:, index["z"]] += slide - shaft
-        observables[:, index["y"]] += self.joints.headstock(head - column, ratio)
+        # What the foot does not slide, the column is pushed.
+        observables[:, index["z"]] += self.joints.share * (slide - wish) - shaft
+        observables[:, index["y"]] += self.joints.lift * ratio**2
         observables[:, [index["nose"], index["tip"]]] += shaft[:, None]
         observables[:, index["slide"]] = slide
         return Truth(temperatures, observables), float(slide[-1])

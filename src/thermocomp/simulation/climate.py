@@ -49,6 +49,8 @@ class Climate:
     def __post_init__(self) -> None:
         if not self.memory > 0:
             raise SettingError("must be positive", ("memory",))
+        if not -30.0 <= self.mean <= 60.0:
+            raise SettingError(f"{self.mean:g} degC: must be from -30 to 60", ("mean",))
         for name in ("wander", "draught"):
             if not getattr(self, name) >= 0:
                 raise SettingError("must not be negative", (name,))

@@ -53,7 +53,7 @@ class HeatSources:
     hold : float
         Motor of the vertical axis Y, which holds the headstock [W].
     cabinet, cabinet_share : float
-        From the electric cabinet on the column's rear right: always [W], and per watt of motor loss.
+        Conducted into the column's rear right by the electric cabinet: always [W], and per watt of motor loss.
     rotor_share : float
         Of the motor's loss that arises in the rotor; the rest in the stator.
     screw_share : float
@@ -61,7 +61,7 @@ class HeatSources:
     top_feed : float
         Feed rate at which a screw has all its extra convection [mm/min].
     hydraulics : float
-        From the hydraulic unit at the bed's rear [W].
+        Conducted into the bed's rear by the hydraulic unit [W].
     pump : float
         From the coolant pump [W].
     chiller : float
@@ -71,8 +71,8 @@ class HeatSources:
     """
 
     top_speed: float = 3500.0
-    front: BearingFriction = BearingFriction(viscous=330.0, load=60.0)
-    rear: BearingFriction = BearingFriction(viscous=130.0, load=25.0)
+    front: BearingFriction = BearingFriction(viscous=220.0, load=60.0)
+    rear: BearingFriction = BearingFriction(viscous=90.0, load=25.0)
     motor_on: float = 50.0
     motor_top: float = 340.0
     drive_nut: float = 9.0
@@ -90,12 +90,12 @@ class HeatSources:
     half_band: float = 0.8
 
     def rotation(self, speed: float) -> float:
-        """Share of the rotating parts' extra convection in force at a speed [1/min]: turbulent, with n^0.7."""
-        return float((abs(speed) / self.top_speed) ** 0.7)
+        """Share of the rotating parts' extra convection in force at a speed [1/min]: with n^(2/3) (Becker 1963)."""
+        return float((abs(speed) / self.top_speed) ** (2.0 / 3.0))
 
     def moving(self, feed: float) -> float:
         """Share of a turning screw's extra convection in force at a feed rate [mm/min], in the same way."""
-        return float(min(abs(feed) / self.top_feed, 1.0) ** 0.7)
+        return float(min(abs(feed) / self.top_feed, 1.0) ** (2.0 / 3.0))
 
     def given(self, drive: Drive) -> dict[str, float]:
         """Return the heat put in at each named place that does not depend on temperatures [W]."""
@@ -130,6 +130,8 @@ class HeatSources:
             Coolant minus bed at the start of the step, and at its end if nothing switches [K].
         """
         limit = self.setpoint + (-self.half_band if chilling else self.half_band)
+        if (before > limit) != chilling:
+            return 0.0  # long beyond it, such as after a stop of the loop
         if (after > limit) == chilling:
             return 1.0
         return min(max((limit - before) / (after - before), 0.0), 1.0) if after != before else 0.0

@@ -123,9 +123,9 @@ def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
 class Touch:
     """A probing cycle: a touch probe in the spindle measures points of an artefact on the table, again and again.
 
-    Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: how far it has moved since the
-    start, as the machine sees it. Between two cycles they have no value. A cycle that is due while the spindle turns
-    waits until it stands.
+    Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: how far the tool point is off it
+    since the start, actual minus commanded; a spindle that grows towards the artefact reads a negative z. Between two
+    cycles they have no value. A cycle that is due while the spindle turns waits until it stands.
 
     Parameters
     ----------
@@ -147,6 +147,9 @@ class Touch:
     def __post_init__(self) -> None:
         if not self.every > 0:
             raise SettingError("must be positive", ("every",))
+        for name in ("noise", "resolution"):
+            if not getattr(self, name) >= 0:
+                raise SettingError("must not be negative", (name,))
         if not self.points:
             raise SettingError("write at least one point, such as points = {p1 = [300, 250, 250]}", ("points",))
         check_labels(self.points)
@@ -164,7 +167,7 @@ class Touch:
                     noise=0.0 if perfect else self.noise,
                     resolution=0.0 if perfect else self.resolution,
                 ),
-                touched(axis, point[k]),
+                touched(axis, dict(zip(AXES, point, strict=True))),
                 touches=True,
             )
             for label, point in self.points.items()

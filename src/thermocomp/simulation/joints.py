@@ -1,4 +1,4 @@
-"""Where the virtual machining centre is not linear: preload, guide and sliding foot; plausible engineering values."""
+"""Where the virtual machining centre is not linear: preload, spinning shaft, sliding foot; engineering values."""
 
 from dataclasses import dataclass
 
@@ -15,20 +15,21 @@ class Joints:
     Parameters
     ----------
     preload : float
-        Axial shift of the shaft by thermal preload, per squared difference of shaft and housing [um/K^2].
-    gib : float
-        Sinking of the headstock in its guide, per squared difference of headstock and column [um/K^2].
+        Axial shift of the shaft by thermal preload, per kelvin that it is warmer than its seat; a colder one does not
+        move [um/K].
     centrifugal, lift : float
         Shift of the shaft along Z and Y at top speed by centrifugal forces, with the square of speed [um].
     stiction : float
         How far the column's foot may want to slide on the bed before it does [um].
+    share : float
+        Of what the foot does not slide, the share that moves the tool: the column is located midway between carriages.
     """
 
-    preload: float = 0.06
-    gib: float = 0.3
-    centrifugal: float = 4.0
-    lift: float = -1.5
+    preload: float = 0.4
+    centrifugal: float = 1.0
+    lift: float = -0.5
     stiction: float = 1.0
+    share: float = 0.5
 
     def shaft(self, tightening: FloatArray, ratio: FloatArray) -> FloatArray:
         """Shift of the shaft towards the workpiece [um].
@@ -40,12 +41,7 @@ class Joints:
         ratio : ndarray of shape (n_steps,)
             Share of top speed.
         """
-        result: FloatArray = self.preload * tightening * np.abs(tightening) - self.centrifugal * ratio**2
-        return result
-
-    def headstock(self, difference: FloatArray, ratio: FloatArray) -> FloatArray:
-        """Lift of the spindle [um], from headstock minus column [K] and the share of top speed."""
-        result: FloatArray = self.lift * ratio**2 - self.gib * difference**2
+        result: FloatArray = self.preload * np.maximum(0.0, tightening) - self.centrifugal * ratio**2
         return result
 
 

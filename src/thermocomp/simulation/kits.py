@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from typing import TypeVar
 
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.axes import AXES, GUIDE_STATIONS, STATIONS, TEST_POSITION, TRAVEL
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.machine import Air
 
@@ -107,13 +107,18 @@ def positioning(axis: str, position: float) -> dict[str, float]:
     SettingError
         The position is beyond the travel.
     """
+    return _between(axis, axis, position)
+
+
+def _between(along: str, axis: str, position: float) -> dict[str, float]:
+    """Return the weights of what an axis that stands at a position contributes along an axis."""
     if not 0.0 <= position <= TRAVEL[axis]:
         raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
     stations = STATIONS[axis]
     below = max(k for k in range(len(stations) - 1) if stations[k] <= position)
     low, high = stations[below : below + 2]
     share = (position - low) / (high - low)
-    return {name: w for name, w in ((_at(axis, low), 1.0 - share), (_at(axis, high), share)) if w}
+    return {f"{along}{axis}@{p}": w for p, w in ((low, 1.0 - share), (high, share)) if w}
 
 
 def _at(axis: str, station: int) -> str:
@@ -130,7 +135,8 @@ def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
 
 
 def _laser(axis: str, position: float) -> Probe:
-    # A laser measures each profile from its first position: the shift of the origin is not in it.
+    # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
+    # origin is not in it.
     reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
     cold = cold_profile(position) if axis == "y" else 0.0
     return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, cold)
@@ -141,22 +147,28 @@ def _pitch(position: int) -> Probe:
     return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
 
 
-def touched(axis: str, position: float) -> dict[str, float]:
-    """Return the weights of the observables in the tool point's deviation along an axis that stands at a position.
+def touched(axis: str, point: Mapping[str, float]) -> dict[str, float]:
+    """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
+
+    What Z and X do across themselves is not in it: the machine does not tell.
 
     Parameters
     ----------
     axis : {'x', 'y', 'z'}
-    position : float
-        [mm]
+        Along which the deviation is.
+    point : mapping of str to float
+        Positions of the axes [mm]; one that is not named stands at `TEST_POSITION`.
     """
-    own = (1.0, positioning(axis, position)), (-1.0, positioning(axis, TEST_POSITION[axis]))
-    return _summed((1.0, {axis: 1.0}), *own)
+    parts = [(1.0, {axis: 1.0})]
+    for moved, lead in ((axis, axis), ("y", "z")) if axis == "z" else ((axis, axis),):
+        if moved in point:
+            parts += [(1.0, _between(lead, moved, point[moved])), (-1.0, _between(lead, moved, TEST_POSITION[moved]))]
+    return _summed(*parts)
 
 
 def _at_position(axis: str, position: float) -> Probe:
     where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
-    return Probe(where, touched(axis, position))
+    return Probe(where, touched(axis, {axis: position}))
 
 
 #: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L
@@ -334,13 +346,13 @@ CENTRE = Kit(
     observables=(
         *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
         *(_at(a, p) for a in AXES for p in STATIONS[a]),
-        *(f"{what}@{p}" for what in ("zy", "ay") for p in GUIDE_STATIONS),
+        *(f"{what}@{p}" for what in ("zy", "ay") for p in STATIONS["y"]),
     ),
     outfits={"all": tuple(PLACES), "usual": USUAL_PLACES, "chen": CHEN_PLACES, "hwang": HWANG_PLACES},
     nests={
         "nest": tuple(_NEST),
         **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES},
-        "y_pitch": tuple(f"y_pitch_{p}" for p in GUIDE_STATIONS),
+        "y_pitch": tuple(f"y_pitch_{p}" for p in STATIONS["y"]),
     },
     loads={
         "tool_tip": "cutting edge: what of the cutting power goes into the tool",

@@ -4,12 +4,16 @@ Reduced finite-element models fill it (`thermocomp.simulation.centre`, `thermoco
 asked the same and answer the same.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.simulation.axes import AXES, TRAVEL
 
 FloatArray = NDArray[np.float64]
 S = TypeVar("S")
@@ -36,10 +40,6 @@ class Air:
     #: height above the floor at which `temperature` holds [m]
     REFERENCE_HEIGHT = 1.2
 
-    def at(self, height: float, side: float = 0.0) -> float:
-        """Temperature [degC] at a height above the floor [m] and a distance to the right of the middle [m]."""
-        return self.temperature + self.stratification * (height - self.REFERENCE_HEIGHT) + self.side * side
-
     @property
     def values(self) -> FloatArray:
         """Temperature, stratification, side: a row of what `VirtualMachine.run` takes."""
@@ -64,6 +64,11 @@ class Drive:
         The coolant loop runs.
     powered : bool
         The machine is switched on; if not there is no heat at all, and no coolant loop.
+
+    Raises
+    ------
+    InputError
+        A number is not finite, a stroke is beyond the travel, or a machine that is switched off is to turn or move.
     """
 
     speed: float = 0.0
@@ -72,6 +77,17 @@ class Drive:
     loads: Mapping[str, float] = field(default_factory=dict)
     cooled: bool = True
     powered: bool = True
+
+    def __post_init__(self) -> None:
+        numbers = {"speed": self.speed, **dict(zip(AXES, self.feed, strict=True)), **self.loads}
+        for name, value in numbers.items():
+            if not math.isfinite(value):
+                raise InputError(f"drive: {name} = {value}: must be a finite number")
+        for axis, stroke in zip(AXES, self.stroke, strict=True):
+            if stroke is not None and not all(0.0 <= p <= TRAVEL[axis] for p in stroke):
+                raise InputError(f"drive: stroke {stroke} mm of {axis.upper()} is beyond 0 to {TRAVEL[axis]:g} mm")
+        if not self.powered and (self.speed or any(self.feed)):
+            raise InputError("drive: a machine that is switched off neither turns nor moves")
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +139,31 @@ class VirtualMachine(Protocol[S]):
             [s]
         """
         ...
+
+
+def check(drives: Sequence[Drive], air: FloatArray, dt: float) -> None:
+    """Refuse what `VirtualMachine.run` cannot take.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    air : ndarray of shape (n_steps, 3)
+    dt : float
+        [s]
+
+    Raises
+    ------
+    InputError
+        `dt` is not positive, there is no drive, or the air has another length or is not finite.
+    """
+    if not (dt > 0 and math.isfinite(dt)):
+        raise InputError(f"step of {dt} s: must be positive")
+    if not drives or np.shape(air) != (len(drives), 3):
+        raise InputError(
+            f"{len(drives)} drives and air of shape {np.shape(air)}: want one row of three numbers per drive"
+        )
+    if not np.isfinite(air).all():
+        raise InputError("air: a number is not finite")
 
 
 def stretches(drives: Sequence[Drive]) -> Iterator[tuple[int, int]]:

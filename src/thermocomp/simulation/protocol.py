@@ -25,6 +25,10 @@ SPEED = Channel("spindle_rpm", "spindle_speed", "1/min", "spindle")
 FEED = Channel("feed_mm_min", "feed", "mm/min", "of the axes, along the path")
 
 
+#: what a protocol may ask for; more is a mistake, or would take for ever
+MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
+
+
 @dataclass(frozen=True, kw_only=True)
 class Setup:
     """What is recorded of a test, and where it stands.
@@ -137,14 +141,25 @@ class Plan(Setup, Stretch):
     def __post_init__(self) -> None:
         Setup.__post_init__(self)
         Stretch.__post_init__(self)
-        if self.copies < 1:
-            raise SettingError("must be at least 1", ("copies",))
+        if not 1 <= self.copies <= MOST_COPIES:
+            raise SettingError(f"must be from 1 to {MOST_COPIES}", ("copies",))
         if self.weight != 1.0:
             raise SettingError('counts only inside segments whose order is "drawn"', ("weight",))
         for path, given in self.leaves():
             _check_duration(values(given.get("duration")), (*path, "duration"), self.sampling)
         for path, given in self.soak.leaves():
             _check_duration(values(given.get("duration")), ("soak", *path, "duration"))
+        for k, fault in enumerate(self.faults):
+            if not 0 <= fault.start <= self.longest:
+                last = f"{self.longest:g} s"
+                raise SettingError(
+                    f"{fault.start:g} s: must be from 0 to the end of the test, {last}", ("faults", k, "start")
+                )
+        if self.longest / self.sampling > MOST_ROWS:
+            rows = f"{self.longest / self.sampling:.3g} rows"
+            raise SettingError(
+                f"{self.longest:g} s every {self.sampling:g} s make {rows}; at most {MOST_ROWS:,}", ("segments",)
+            )
 
     def programme(self, name: str, rng: np.random.Generator) -> Programme:
         """Return a test that is ready to run, with all that is left open drawn by lot."""

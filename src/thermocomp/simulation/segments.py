@@ -16,6 +16,10 @@ Path = tuple[str | int, ...]
 Leaf = tuple[Path, dict[str, Any]]
 
 
+#: what a protocol may ask for; more is a mistake, or would take for ever
+MOST_VALUES, MOST_REPEATS = 10_000, 10_000
+
+
 @dataclass(frozen=True)
 class Segment:
     """A stretch of a test in which everything stays as it is.
@@ -55,6 +59,8 @@ class Lot:
         low, high = self.between
         if not (self.step > 0 and high > low) or abs(self._steps - round(self._steps)) > 1e-9:
             raise SettingError("from the lowest to the highest there must be a whole number of steps")
+        if self._steps > MOST_VALUES:
+            raise SettingError(f"{self._steps:.3g} values to draw from; at most {MOST_VALUES}: take a larger step")
 
     @property
     def _steps(self) -> float:
@@ -156,8 +162,8 @@ class Stretch:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.repeat < 1:
-            raise SettingError("must be at least 1", ("repeat",))
+        if not 1 <= self.repeat <= MOST_REPEATS:
+            raise SettingError(f"must be from 1 to {MOST_REPEATS}", ("repeat",))
         if not self.segments and (self.repeat > 1 or self.order != "given"):
             key = "repeat" if self.repeat > 1 else "order"
             raise SettingError("needs segments = [...], which it says how to do", (key,))
@@ -166,6 +172,18 @@ class Stretch:
         for k, s in enumerate(self.segments):
             if s.weight != 1.0 and self.order != "drawn":
                 raise SettingError('counts only where the order is "drawn"', ("segments", k, "weight"))
+
+    @property
+    def longest(self) -> float:
+        """How long it may last, whatever is drawn [s]."""
+        return self._longest(0.0)
+
+    def _longest(self, outer: float) -> float:
+        own = max(values(self.duration), default=outer)
+        if not self.segments:
+            return own
+        parts = [s._longest(own) for s in self.segments]
+        return self.repeat * (max(parts) if self.order == "drawn" else sum(parts))
 
     def leaves(self, outer: Mapping[str, Any] | None = None, path: Path = ()) -> Iterator[Leaf]:
         """Yield where each segment stands, and what holds in it."""
@@ -206,12 +224,16 @@ def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> Segment:
     feed, stroke = given.get("feed", Feed()), given.get("stroke", Stroke())
     # The order of the draws is part of the protocol: duration first.
     duration = _drawn(given["duration"], rng)
+    speed = _drawn(given.get("speed", 0.0), rng)
+    feeds = (_drawn(feed.x, rng), _drawn(feed.y, rng), _drawn(feed.z, rng))
+    powered = given.get("powered", True)
+    # A machine that is switched off stands, whatever speed it has inherited.
     drive = Drive(
-        speed=_drawn(given.get("speed", 0.0), rng),
-        feed=(_drawn(feed.x, rng), _drawn(feed.y, rng), _drawn(feed.z, rng)),
+        speed=speed if powered else 0.0,
+        feed=feeds if powered else (0.0, 0.0, 0.0),
         stroke=(stroke.x, stroke.y, stroke.z),
         loads={place: _drawn(load, rng) for place, load in given.get("loads", {}).items()},
         cooled=given.get("cooled", True),
-        powered=given.get("powered", True),
+        powered=powered,
     )
     return Segment(duration, drive)

@@ -140,11 +140,13 @@ class ReducedModel:
             Places whose temperatures after the step are wanted at once, below the states.
         """
         key = (theta, dt, watched)
-        if key not in self._kept:
+        found = self._kept.get(key)
+        if found is None:
+            found = self._exponential(theta, dt, watched)
             if len(self._kept) >= self._KEEP:
-                self._kept.pop(next(iter(self._kept)))
-            self._kept[key] = self._exponential(theta, dt, watched)
-        return self._kept[key]
+                self._kept.clear()  # at once: another thread may be looking
+            self._kept[key] = found
+        return found
 
     def _exponential(self, theta: tuple[float, ...], dt: float, watched: tuple[str, ...]) -> Operators:
         rates, modes = np.linalg.eigh(self.stiffness(theta))

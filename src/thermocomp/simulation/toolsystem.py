@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.joints import play
-from thermocomp.simulation.machine import Air, Drive, Truth, stretches
+from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -43,17 +43,18 @@ class RestingTool:
     model : ReducedModel
     stiction : float
         How far the shank may want to slip in the chuck before it does [um]; an engineering value.
-    loss, loss_exponent : float
-        Heat given to the room beyond the linear part is ``loss rise |rise|^loss_exponent``, of the surface's mean
-        rise [W, K]; free convection has an exponent of 1/4 (laminar, vertical or cylindrical surfaces).
+    convection : float
+        Conductance by free convection that is in the model, at `usual_rise` [W/K]: half of what its films amount to.
+    usual_rise : float
+        Mean rise of the surface at which the films hold [K]; free convection goes with its power of 1/4 (laminar).
     longest_step : float
         The loss is looked at this often [s].
     """
 
     model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool"))
     stiction: float = 0.8
-    loss: float = 0.02
-    loss_exponent: float = 0.25
+    convection: float = 0.35
+    usual_rise: float = 20.0
     longest_step: float = 20.0
 
     @property
@@ -92,10 +93,10 @@ class RestingTool:
         Raises
         ------
         InputError
-            `dt` is not positive, the tool is asked to turn, or a load is put in where there is no place for it.
+            `dt` is not positive, there is no drive, the air has another length or is not finite, the tool is asked to
+            turn, or a load is put in where there is no place for it.
         """
-        if not (dt > 0 and math.isfinite(dt)):
-            raise InputError(f"step of {dt} s: must be positive")
+        check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)
         fields = np.empty((len(drives) * parts, len(self.model.one)))
         operators = self.model.operators((), dt / parts, ("surface",))
@@ -105,7 +106,7 @@ class RestingTool:
             given = self._given(drives[first])
             for k in range(first * parts, last * parts):
                 rise = watched - air[k // parts, 0]
-                given[surface] = -self.loss * rise * abs(rise) ** self.loss_exponent
+                given[surface] = -self.convection * rise * ((abs(rise) / self.usual_rise) ** 0.25 - 1.0)
                 after = operators.state @ now + operators.heat @ given + operators.air @ air[k // parts]
                 fields[k] = now = after[:-1]
                 watched = float(after[-1])
@@ -132,7 +133,8 @@ class RestingTool:
             raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
         given = np.zeros(len(self.model.inputs))
         for place, load in drive.loads.items():
-            if place not in self.model.inputs:
-                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(self.model.inputs)}")
+            if place not in self.model.inputs or place == "surface":
+                known = [name for name in self.model.inputs if name != "surface"]
+                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(known)}")
             given[self.model.inputs.index(place)] = load if drive.powered else 0.0
         return given

@@ -165,13 +165,11 @@ def _regression_claims(found: Learned) -> list[Claim]:
     loose = [t for t in DRIFTS if round(r2[t], 3) < CLOSELY]
     many = [t for t in DRIFTS if terms[t] > candidates[t] / 2]
     return [
-        judged(
+        shown(
             ("C-14",),
             "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down",
             "810",
             f"{len(samples)} of {n_tests} tests",
-            (len(samples), n_tests) == (810, 5),
-            f"the experiment has {len(samples)} rows in {n_tests} tests",
         ),
         shown(
             ("C-11",),
@@ -179,13 +177,11 @@ def _regression_claims(found: Learned) -> list[Claim]:
             "",
             f"|r| with the drift it goes with best: {max(weakest[1]):.2f} ({weakest[0]}) to {max(others[-1][1]):.2f}",
         ),
-        judged(
+        shown(
             ("C-09", "C-10", "C-12", "C-13"),
             "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
             _listed(CANDIDATES),
             _listed(candidates),
-            candidates == CANDIDATES,
-            "the subgroups do not have the sizes of Table 2",
         ),
         judged(
             ("C-15", "C-20"),

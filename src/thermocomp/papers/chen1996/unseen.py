@@ -115,12 +115,12 @@ def _new_observations(found: Unseen, test: int) -> Claim:
     none, mra, ours = (found.errors(test, "z", m).rms for m in (NONE, MRA, DYNAMIC))
     nets = found.nets("z", found.tests[test])
     net, wide = float(np.median(nets)), rms(found.learned.wide["z"], found.tests[test])
-    equal = 1 / COMPETITIVE <= net / mra <= COMPETITIVE
+    equal = net <= COMPETITIVE * mra and mra <= COMPETITIVE * net
     reasons = [f"the {m} leaves {e / none:.0%} of the drift" for m, e in ((MRA, mra), (NET, net)) if _bad(e, none)]
     if not equal:
         reasons.append(
-            f"the net's error is {net / mra:.2f} times that of the MRA; on all nine temperatures, which the net has, "
-            f"an MRA leaves {wide:.2f} um"
+            f"the net's error is {net:.2f} um, that of the MRA {mra:.2f} um; on all nine temperatures, which the net "
+            f"has, an MRA leaves {wide:.2f} um"
         )
     if ours < BETTER * min(mra, net, wide):
         reasons.append(
@@ -257,6 +257,7 @@ def largest_depth(found: Unseen) -> dict[str, float]:
 def _tenfold(found: Unseen, text: str, paper: str, largest: Mapping[str, float]) -> Claim:
     closest = min((MRA, NET), key=lambda m: largest[m])
     none, best = largest[NONE], largest[closest]
+    times = none / best if best else float("inf")
     fitted = {
         m: max(Errors.of(common.residual(models[t], found.learned.samples)).max_abs for t in DRIFTS)
         for m, models in found.models.items()
@@ -266,9 +267,9 @@ def _tenfold(found: Unseen, text: str, paper: str, largest: Mapping[str, float])
         ("C-35",),
         text,
         paper,
-        f"{none:.1f} um; MRA {largest[MRA]:.1f}, net {largest[NET]:.1f} um: {none / best:.1f} times; "
+        f"{none:.1f} um; MRA {largest[MRA]:.1f}, net {largest[NET]:.1f} um: the better of them {times:.1f} times; "
         f"dynamic (ours) {largest[DYNAMIC]:.1f} um",
-        none / best >= TENFOLD,
+        times >= TENFOLD,
         f"even in the rows they were fitted to, the regressions are wrong by up to {fitted[MRA]:.1f} um and the net by "
         f"{fitted[NET]:.1f}; the largest error of the {closest} in the new tests stands "
         f"{60 * _since_change(found, closest):.0f} min after the spindle changed its speed",

@@ -78,10 +78,9 @@ def _models(c: Computed) -> list[Claim]:
             same,
             ""
             if same
-            else f"With k = 1, m = 0 it is {max(p / o.fpe for p, o in zip(plain, best, strict=True)):.1f} times as "
-            "large: a machine is more than one store of heat. "
-            f"In free run under new conditions the orders it chooses leave {rms[CHOSEN]:.2f} um "
-            f"RMS, k = 1, m = 0 {rms[LEAST]:.2f} um: "
+            else "With k = 1, m = 0 it is at most "
+            f"{max(p / o.fpe for p, o in zip(plain, best, strict=True)):.2f} times as large. In free run under new "
+            f"conditions the orders it chooses leave {rms[CHOSEN]:.2f} um RMS, k = 1, m = 0 {rms[LEAST]:.2f} um: "
             + ("the larger model is not the better one (E-P3)." if rms[CHOSEN] >= rms[LEAST] else "they are worth it.")
             + f" By the step of time: {'; '.join(others)}.",
         ),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.simulation.axes import GUIDE_STATIONS, N_HATS, STATIONS, TEST_POSITION
+from thermocomp.simulation.axes import N_HATS, STATIONS, TEST_POSITION
 from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, Link, lump
 from thermocomp.simulation.fem.bed import Bed
 from thermocomp.simulation.fem.column import Column
@@ -36,9 +36,9 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
     FullModel
         Its observables in machine coordinates, tool minus workpiece [um, urad] at `TEST_POSITION`: ``x y z a b``
         (``a b``: tilt of the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its
-        flange); ``xx@P yy@P zz@P`` (what the drive of an axis at P mm contributes to x, y, z); ``zy@P ay@P`` (column
-        guide's z and tilt about X with the headstock at Y = P mm); ``slide`` (how far the column's foot grows against
-        the bed).
+        flange); ``xx@P yy@P zz@P`` (what an axis at P mm contributes to the tool point along itself: its drive, for Y
+        with the pitch of its guide); ``zy@P`` (what Y at P mm contributes to z); ``ay@P`` (pitch of the headstock with
+        Y at P mm); ``slide`` (how far the column's foot grows against the bed).
     """
     table = data("centre.toml") if table is None else table
     lengths = table["lengths"]
@@ -51,7 +51,7 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
     parts = Assembly(
         [
             spindle(),
-            column.part("column", material(table["column"]["material"]), GUIDE_STATIONS),
+            column.part("column", material(table["column"]["material"]), STATIONS["y"]),
             bed.part("bed", material(table["bed"]["material"])),
             *(
                 screw.part(f"{axis}_screw", material(table["screw"][axis]["material"]), STATIONS[axis])
@@ -150,17 +150,28 @@ def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhan
     foot, under = of("bed", "a_foot"), of("bed", "a_table")
     a, b, c = of("column", "a"), of("column", "b"), of("column", "c")
     bearing_x = iron * lengths["bearing_x"] * parts.place("bed.table")
+    pitch_at_test = of("column", f"ay@{TEST_POSITION['y']}")
+    # Where Y stands the headstock has the pitch of the column's guide there, and the tool its lever.
     drives = {
         "x": [(p, of("x_screw", f"at@{p}") - bearing_x) for p in STATIONS["x"]],
-        "y": [(p, of("column", "lift") - of("y_screw", f"at@{p}")) for p in STATIONS["y"]],
+        "y": [
+            (
+                p,
+                of("column", "lift") - of("y_screw", f"at@{p}") + reach * (of("column", f"ay@{p}") - pitch_at_test),
+            )
+            for p in STATIONS["y"]
+        ],
         "z": [(p, of("bed", "z") - of("z_screw", f"at@{p}")) for p in STATIONS["z"]],
     }
+    across = [
+        (p, of("column", f"zy@{p}") + high * of("column", f"ay@{p}") + 1e-3 * p * (foot - under)) for p in STATIONS["y"]
+    ]
     at_test = {axis: dict(rows)[TEST_POSITION[axis]] for axis, rows in drives.items()}
     return {
         "x": at_test["x"] + of("column", "x") + aside - c * high - b * reach,
         "y": at_test["y"]
         + of("bed", "y")
-        + high * head
+        + iron * high * rear
         - iron * height * workpiece
         + foot * overhang
         + (a + nod) * reach
@@ -177,6 +188,7 @@ def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhan
         "nose": of("spindle", "nose"),
         "tip": of("spindle", "tip"),
         **{f"{axis}{axis}@{p}": row for axis, rows in drives.items() for p, row in rows},
-        **{f"{kind}@{p}": of("column", f"{kind}@{p}") for kind in ("zy", "ay") for p in GUIDE_STATIONS},
+        **{f"zy@{p}": row for p, row in across},
+        **{f"ay@{p}": of("column", f"ay@{p}") for p in STATIONS["y"]},
         "slide": of("column", "foot") - of("bed", "foot"),
     }
