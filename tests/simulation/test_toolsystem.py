@@ -160,7 +160,8 @@ def test_in_blocks_it_is_the_same_and_nothing_hides_in_the_machine(tool: Resting
     kept = start.field.copy()
     end, whole = tool.run(start, drives, air, 30.0)
     state, parts = start, []
-    for block in (slice(0, 1), slice(1, 100), slice(100, 200)):
+    # the last block begins while friction holds the shank on its way back
+    for block in (slice(0, 1), slice(1, 100), slice(100, 140), slice(140, 200)):
         state, truth = tool.run(state, drives[block], air[block], 30.0)
         parts.append(truth)
     np.testing.assert_allclose(np.vstack([p.observables for p in parts]), whole.observables, atol=1e-9)
