@@ -23,6 +23,7 @@ from thermocomp.simulation.sensors import Fault
 #: the one door for a protocol from outside
 ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Experiment))
 
+_TIME = re.compile(r"\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)\s*")
 #: keys that hold a time, which is written with its unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
 #: keys that hold true or false, and texts that may look like a number
@@ -167,7 +168,11 @@ def _seconds(value: Any, path: Keys) -> Any:
         return {key: _seconds(v, (*path, key)) for key, v in value.items()}
     if isinstance(value, list):
         return [_seconds(v, (*path, k)) for k, v in enumerate(value)]
-    found = re.fullmatch(r"\s*([-+]?\d+\.?\d*)\s*([^\d\s].*?)\s*", value) if isinstance(value, str) else None
+    found = (
+        re.fullmatch(r"\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)\s*", value)
+        if isinstance(value, str)
+        else None
+    )
     if not found:
         raise SettingError('write a time with its unit, such as "30 min", "6 h" or "10 s"', path)
     try:

@@ -10,8 +10,8 @@ from scipy.sparse.linalg import spsolve
 from skfem import Mesh, MeshLine, MeshQuad, MeshTri
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.conduction import capacity, conduction, contact, edge, faces, link, together
-from thermocomp.simulation.fem.part import MIDDLE, Part, Surface
+from thermocomp.simulation.fem.conduction import MIDDLE, capacity, conduction, contact, edge, faces, together
+from thermocomp.simulation.fem.part import Part, Surface
 from thermocomp.simulation.fem.space import Space
 
 FloatArray = NDArray[np.float64]
@@ -145,14 +145,6 @@ def test_edges_of_different_division_do_not_touch() -> None:
     space = two_bars()
     with pytest.raises(InputError, match="5 and 3 points"):
         contact(space, left, joint(space, 1)[:1], 1.0)
-
-
-def test_a_link_carries_its_conductance_times_the_difference() -> None:
-    space = two_bars()
-    a, b = space.edge_mean(left), space.edge_mean(right)
-    flow = link(a, b, 7.0) @ space.points[0]
-    assert flow.sum() == pytest.approx(0.0, abs=1e-12)
-    assert flow == pytest.approx(7.0 * 0.2 * (b - a), rel=1e-12)
 
 
 class TestMeasures:

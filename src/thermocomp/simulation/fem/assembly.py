@@ -11,6 +11,7 @@ from scipy.sparse import csr_matrix
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.fem.part import Part, Surface
+from thermocomp.simulation.machine import Air
 
 FloatArray = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ class Link:
     theta: str | None = None
 
 
-def lump(name: str, capacity: float, height: float = 1.2, side: float = 0.0) -> Part:
+def lump(name: str, capacity: float, height: float = Air.REFERENCE_HEIGHT, side: float = 0.0) -> Part:
     """Return a part with one temperature, and a surface ``air`` of 1 m2: its film's coefficient is in W/K.
 
     Parameters
@@ -72,7 +73,7 @@ def lump(name: str, capacity: float, height: float = 1.2, side: float = 0.0) -> 
         Above the floor, and to the right of the middle [m].
     """
     one = np.ones(1)
-    surface = Surface(csr_matrix([[1.0]]), one, one * (height - 1.2), one * side)
+    surface = Surface(csr_matrix([[1.0]]), one, one * (height - Air.REFERENCE_HEIGHT), one * side)
     return Part(name, csr_matrix([[float(capacity)]]), csr_matrix((1, 1)), {"air": surface}, {"": one}, {})
 
 

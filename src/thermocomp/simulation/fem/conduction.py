@@ -8,10 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 from skfem import BilinearForm
 
-from thermocomp.simulation.fem.part import MIDDLE, Surface
+from thermocomp.simulation.fem.part import Surface
 from thermocomp.simulation.fem.space import Facets, Space, Weight
+from thermocomp.simulation.machine import Air
 
 FloatArray = NDArray[np.float64]
+MIDDLE = Air.REFERENCE_HEIGHT
 
 
 def capacity(space: Space, heat_capacity: ArrayLike) -> csr_matrix:
@@ -55,12 +57,6 @@ def contact(space: Space, a: Facets, b: Facets, conductance: float, offset: Arra
     """
     area, difference = space.jump(a, b, offset)
     return csr_matrix(conductance * (difference.T @ area @ difference))
-
-
-def link(a: FloatArray, b: FloatArray, conductance: float) -> csr_matrix:
-    """Return the conduction [W/K] between two patches with rows `a` and `b` of shape (n,)."""
-    difference = csr_matrix(a - b)
-    return csr_matrix(conductance * (difference.T @ difference))
 
 
 def edge(

@@ -11,11 +11,6 @@ from thermocomp.core.exceptions import InputError
 
 FloatArray = NDArray[np.float64]
 
-#: temperature at which nothing is displaced [degC]
-REFERENCE = 20.0
-#: height above the floor at which the air has its nominal temperature [m]
-MIDDLE = 1.2
-
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -30,7 +25,8 @@ class Surface:
     load : ndarray of shape (n,)
         Integral of phi_i [m2].
     height, side : ndarray of shape (n,)
-        Integral of phi_i times height above `MIDDLE`, and times distance to the right of the machine's middle [m3].
+        Integral of phi_i times height above `Air.REFERENCE_HEIGHT`, and times distance to the right of the machine's
+        middle [m3].
     """
 
     mass: csr_matrix
@@ -60,7 +56,7 @@ class Part:
         Weights w that sum to 1. The temperature there is ``w @ T``, heat put in there is spread as w, and a link of
         conductance g to another part carries g times the difference of the two temperatures.
     observables : mapping of str to ndarray of shape (n,)
-        Displacement per temperature [um/K] or tilt [urad/K]: ``row @ (T - REFERENCE)``.
+        Displacement per temperature [um/K] or tilt [urad/K]: ``row @ (T - 20 degC)``.
     switched : mapping of str to csr_matrix of shape (n, n)
         Conduction that is in force by the share of the switch of that name, such as ``rotation`` [W/K].
 
