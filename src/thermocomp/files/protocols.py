@@ -168,11 +168,7 @@ def _seconds(value: Any, path: Keys) -> Any:
         return {key: _seconds(v, (*path, key)) for key, v in value.items()}
     if isinstance(value, list):
         return [_seconds(v, (*path, k)) for k, v in enumerate(value)]
-    found = (
-        re.fullmatch(r"\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)\s*", value)
-        if isinstance(value, str)
-        else None
-    )
+    found = _TIME.fullmatch(value) if isinstance(value, str) else None
     if not found:
         raise SettingError('write a time with its unit, such as "30 min", "6 h" or "10 s"', path)
     try:
