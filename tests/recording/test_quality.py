@@ -308,3 +308,15 @@ def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
     few = [(f.severity, f.text.split(",")[0]) for f in check(short) if f.kind == "short"]
     assert few == ([("warning", f"has only {n} row{'s' * (n > 1)}")] if n < 10 else [])
     assert not {f for f in kinds if f[0] == "t1"}
+
+
+def test_probing_cycles_are_no_trouble() -> None:
+    """A touch probe has values in its cycles only, in the same rows for all points; a lone gappy probe is trouble."""
+    drift = _warm_up(noise=0.5)
+    there = np.arange(N) % 50 == 0
+    touched = {name: np.where(there, drift + k, np.nan) for k, name in enumerate(("x", "y"))}
+    found = check(_recording(quantity="displacement", **touched))
+    assert [(f.severity, f.kind, f.channel) for f in found if f.channel] == [("info", "probed", n) for n in "xy"]
+    assert "has 40 values in 2000 rows" in found[-1].text
+    (lone,) = [f for f in _check(np.where(there, drift, np.nan), "displacement") if f.kind == "missing values"]
+    assert lone.severity == "trouble"

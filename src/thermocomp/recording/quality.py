@@ -68,9 +68,10 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     found = [Finding("warning", "", "left out", note) for note in recording.notes if note.startswith("left out")]
     found += [*_sampling(recording.time), *_no_cycle(recording)]
     prints: dict[int, str] = {}
+    probed = _probed(recording)
     for channel in recording.channels:
         values = recording.table[channel.name].to_numpy(dtype=np.float64)
-        found.extend(_channel(channel, values, recording.time))
+        found.extend(_channel(channel, values, recording.time, probed=channel.name in probed))
         if np.nanmax(values, initial=-np.inf) > np.nanmin(values, initial=np.inf):  # constant ones are told as such
             other = prints.setdefault(hash(values.tobytes()), channel.name)
             if other != channel.name:
@@ -79,7 +80,17 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda f: _ORDER.index(f.severity)))
 
 
-def _channel(channel: Channel, values: FloatArray, time: FloatArray) -> Iterator[Finding]:
+def _probed(recording: Recording) -> set[str]:
+    """Return the displacements that are measured in probing cycles: several have their few values in the same rows."""
+    rows: dict[bytes, list[str]] = {}
+    for channel in recording.displacements:
+        there = np.isfinite(recording.table[channel.name].to_numpy(dtype=np.float64))
+        if 1 < there.sum() < 0.5 * len(there):
+            rows.setdefault(there.tobytes(), []).append(channel.name)
+    return {name for names in rows.values() if len(names) > 1 for name in names}
+
+
+def _channel(channel: Channel, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:
     """Yield all findings of one channel."""
     name = channel.name
     least, most = PLAUSIBLE.get(channel.quantity, (-np.inf, np.inf))
@@ -96,7 +107,9 @@ def _channel(channel: Channel, values: FloatArray, time: FloatArray) -> Iterator
             "sensor"
         )
         yield Finding("trouble", name, "implausible", text)
-    yield from _missing(name, values, time)
+    yield from _missing(name, values, time, probed=probed)
+    if probed:
+        return
     # the other checks look at the rest: beside such values nothing else would stand out
     rows: IntArray = np.flatnonzero(np.isfinite(values) & plausible & ~coded)
     if rows.size < 2:
@@ -198,14 +211,18 @@ def _code_finding(channel: Channel, values: FloatArray, coded: NDArray[np.bool_]
     return Finding("trouble", channel.name, "missing-value code", text)
 
 
-def _missing(name: str, values: FloatArray, time: FloatArray) -> Iterator[Finding]:
-    """Yield missing values; trouble where they are more than a fifth."""
+def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:
+    """Yield missing values; trouble where they are more than a fifth, but between the cycles of a touch probe."""
     gone = ~np.isfinite(values)
     count = int(gone.sum())
     if not count:
         return
     if count == len(values):
         yield Finding("trouble", name, "missing values", "has no value at all; leave the channel out")
+        return
+    if probed:
+        text = f"has {len(values) - count} values in {len(values)} rows, as others have: probing cycles"
+        yield Finding("info", name, "probed", f"{text}; models see only these rows")
         return
     starts, lengths = _runs(gone)
     starts, lengths = starts[gone[starts]], lengths[gone[starts]]
