@@ -289,8 +289,9 @@ def test_unseen_tests_of_the_virtual_machine() -> None:
         return float(np.sqrt(np.mean((m.fit(T, y).predict(unseen) - truth) ** 2)))
 
     assert ACE().fit(T, y).psi_ > 0.99
-    assert rms(MonotoneACE()) < 1.2 * rms(LeastSquares())
-    assert rms(MonotoneACE()) < rms(ACE())
+    # the test goes beyond what was learned: the monotone curves go on, the paper's are cropped (W-07)
+    assert rms(MonotoneACE()) < 0.6 * rms(ACE())
+    assert rms(MonotoneACE()) < 0.03 * np.ptp(truth)
     assert rms(ACE()) < 0.3 * np.sqrt(np.mean(truth**2))
 
 
