@@ -36,6 +36,9 @@ Measured = Annotated[list[Path], Parameter(name="--with", consume_multiple=True,
 #: what is not a paper's study but the table of all methods on all experiments (X-03)
 CROSS = "cross"
 
+#: columns that the tables of cross need
+TABLE_WIDTH = 120
+
 _console = Console(highlight=False)
 _progress_console = Console(stderr=True)
 _STYLES = {"yes": "green", "no": "bold red", "-": "dim"}
@@ -158,8 +161,10 @@ def _show(study: "Study", seconds: float) -> None:
             if c.finding:
                 _console.print(f"[{_style(c)}]{escape(', '.join(c.ids))}[/] {escape(c.finding)}")
     if study.name == CROSS:
+        # Numbers must not be cut: a narrow terminal wraps whole lines instead.
+        wide = Console(highlight=False, width=max(_console.width, TABLE_WIDTH))
         for t in study.tables:
-            _console.print(_table(t))
+            wide.print(_table(t))
     said = f"{headline(study)}; " if study.claims else ""
     _console.print(f"{escape(said)}{seconds:.0f} s")
 
