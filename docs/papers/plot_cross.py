@@ -1,5 +1,5 @@
 """
-All methods on all experiments
+The methods on all experiments
 ==============================
 
 Each paper tries its own method on its own machine. Here every method is trained on every paper's experiment and judged

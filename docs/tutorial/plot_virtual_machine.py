@@ -11,8 +11,6 @@ ten hours of stop) and looks at what a metrologist would look at.
 # The machine stands still for a night, runs at 2600 1/min while its axes move, and stops. We ask it directly, without
 # sensors, in steps of ten seconds.
 
-import time
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -24,9 +22,7 @@ room = Air(temperature=22.0, stratification=0.5)
 drives = [Drive()] * 4320 + [Drive(2600.0, feed=(600.0, 1000.0, 600.0))] * 2160 + [Drive()] * 3600
 air = np.tile(room.values, (len(drives), 1))
 
-begin = time.perf_counter()
 _, truth = machine.run(machine.init(room), drives, air, dt=10.0)
-speed = len(drives) / (time.perf_counter() - begin)
 print(f"{len(drives)} steps of 10 s; {len(machine.model.one)} states")
 
 hours = (np.arange(len(drives)) - 4319) / 360.0
@@ -87,8 +83,9 @@ plt.show()
 # Position
 # --------
 #
-# A warm ball screw pushes its nut the further, the further away its fixed bearing is: the error of Y depends on Y. One
-# slope describes most of it; that is Chen's observation, and his reason to model a slope instead of a profile.
+# A warm ball screw pushes its nut the further, the further away its fixed bearing is, and a bent column pitches the
+# headstock: the error of Y depends on Y. One slope describes most of it; that is Chen's observation, and his reason to
+# model a slope instead of a profile.
 
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 positions = np.arange(0, 551, 50)

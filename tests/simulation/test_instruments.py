@@ -7,16 +7,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import TEST_POSITION
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.instruments import Touch, displacement, mounting, thermometer
-from thermocomp.simulation.kits import (
-    CENTRE,
-    CHEN_PLACES,
-    HWANG_PLACES,
-    KITS,
-    Kit,
-    cold_profile,
-    labelled,
-    positioning,
-)
+from thermocomp.simulation.kits import CENTRE, CHEN_PLACES, HWANG_PLACES, KITS, Kit, labelled
+from thermocomp.simulation.probes import cold_profile, positioning
 from thermocomp.simulation.toolsystem import RestingTool
 
 

@@ -65,7 +65,7 @@ def papers(
     Parameters
     ----------
     names : list of str
-        Papers; all five if none is named. cross is the table of all methods on all experiments.
+        Papers; all five if none is named. cross is the table of methods on all experiments.
     measured : list of Path
         Recordings on which the methods of cross are judged as well; each is one test.
     mapping : Path

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.axes import AXES, TRAVEL
-from thermocomp.simulation.kits import Kit, Probe, check_labels, touched
+from thermocomp.simulation.kits import Kit, check_labels
 from thermocomp.simulation.machine import Air
+from thermocomp.simulation.probes import Probe, touched
 from thermocomp.simulation.sensors import Sensor
 
 FloatArray = NDArray[np.float64]

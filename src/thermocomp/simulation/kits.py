@@ -7,9 +7,10 @@ from difflib import get_close_matches
 from typing import TypeVar
 
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL
+from thermocomp.simulation.axes import AXES, STATIONS
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.machine import Air
+from thermocomp.simulation.probes import NEST, SPINDLE, Probe, at_position, laser, pitch, station_name
 
 T = TypeVar("T")
 
@@ -60,130 +61,6 @@ USUAL_PLACES = (
     "enclosure",
     "air",
 )
-
-#: distance of the two probes of X, and of Y, along the test bar [m]
-PROBE_DISTANCE = 0.1
-#: cold positioning error of Y in mm, for y in mm: Chen 1996, Eq. 6 (C-22), constant first; X and Z have none
-CHEN_COLD_PROFILE = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
-
-
-def cold_profile(position: float) -> float:
-    """Return the geometric positioning error of Y [um] at a position [mm]."""
-    return 1e3 * sum(c * position**k for k, c in enumerate(CHEN_COLD_PROFILE))
-
-
-@dataclass(frozen=True)
-class Probe:
-    """A displacement probe, a line of a laser, or a touch probe on an artefact.
-
-    Parameters
-    ----------
-    place : str
-        In words.
-    reads : mapping of str to float
-        Weights of the machine's observables in its value; the value is 1 um per um, 1 um per urad and m.
-    cold : float
-        Its value in the state in which the test begins, in its unit.
-    unit : {'um', 'urad'}
-    """
-
-    place: str
-    reads: Mapping[str, float]
-    cold: float = 0.0
-    unit: str = "um"
-
-
-def positioning(axis: str, position: float) -> dict[str, float]:
-    """Return the weights of the observables in the positioning of an axis [um], linear between two stations.
-
-    Parameters
-    ----------
-    axis : {'x', 'y', 'z'}
-    position : float
-        [mm]
-
-    Raises
-    ------
-    SettingError
-        The position is beyond the travel.
-    """
-    return _between(axis, axis, position)
-
-
-def _between(along: str, axis: str, position: float) -> dict[str, float]:
-    """Return the weights of what an axis that stands at a position contributes along an axis."""
-    if not 0.0 <= position <= TRAVEL[axis]:
-        raise SettingError(f"{axis.upper()} = {position:g} mm is beyond the travel from 0 to {TRAVEL[axis]:g} mm")
-    stations = STATIONS[axis]
-    below = max(k for k in range(len(stations) - 1) if stations[k] <= position)
-    low, high = stations[below : below + 2]
-    share = (position - low) / (high - low)
-    return {f"{along}{axis}@{p}": w for p, w in ((low, 1.0 - share), (high, share)) if w}
-
-
-def _at(axis: str, station: int) -> str:
-    return f"{axis}{axis}@{station}"
-
-
-def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
-    """Return the sum of weights, each with its factor."""
-    total: dict[str, float] = {}
-    for factor, weights in parts:
-        for name, w in weights.items():
-            total[name] = total.get(name, 0.0) + factor * w
-    return {name: w for name, w in total.items() if w}
-
-
-def _laser(axis: str, position: float) -> Probe:
-    # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
-    # origin is not in it.
-    reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
-    cold = cold_profile(position) if axis == "y" else 0.0
-    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, cold)
-
-
-def _pitch(position: int) -> Probe:
-    words = f"pitch of Y at {position} mm: turn of the headstock about X, laser"
-    return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
-
-
-def touched(axis: str, point: Mapping[str, float]) -> dict[str, float]:
-    """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
-
-    What Z and X do across themselves is not in it: the machine does not tell.
-
-    Parameters
-    ----------
-    axis : {'x', 'y', 'z'}
-        Along which the deviation is.
-    point : mapping of str to float
-        Positions of the axes [mm]; one that is not named stands at `TEST_POSITION`.
-    """
-    parts = [(1.0, {axis: 1.0})]
-    for moved, lead in ((axis, axis), ("y", "z")) if axis == "z" else ((axis, axis),):
-        if moved in point:
-            parts += [(1.0, _between(lead, moved, point[moved])), (-1.0, _between(lead, moved, TEST_POSITION[moved]))]
-    return _summed(*parts)
-
-
-def _at_position(axis: str, position: float) -> Probe:
-    where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
-    return Probe(where, touched(axis, {axis: position}))
-
-
-#: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L
-_NEST = {
-    "x1": Probe("X at the tip of the test bar", {"x": 1.0}),
-    "x2": Probe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
-    "y1": Probe("Y at the tip of the test bar", {"y": 1.0}),
-    "y2": Probe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
-    "z": Probe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
-}
-#: measured where nothing moves the spindle: in a calculation, or on the spindle itself
-_SPINDLE = {
-    "nose": Probe("axial growth of the spindle nose from the housing's flange", {"nose": 1.0}),
-    "tip": Probe("axial growth of the tool's tip from the housing's flange", {"tip": 1.0}),
-}
 
 
 @dataclass(frozen=True)
@@ -257,12 +134,12 @@ class Kit:
         if name in self.probes:
             return self.probes[name]
         if name in self.nests.get("y_pitch", ()):
-            return _pitch(int(name.rpartition("_")[2]))
+            return pitch(int(name.rpartition("_")[2]))
         found = re.fullmatch(r"([xyz])_(laser|at)_(\d+)", name) if self.top_speed else None
         if not found:
             raise unknown("probe", name, [*self.probes, *self.nests])
         axis, kind, position = found.groups()
-        return (_laser if kind == "laser" else _at_position)(axis, float(position))
+        return (laser if kind == "laser" else at_position)(axis, float(position))
 
 
 def labelled(names: Sequence[str] | Mapping[str, T], sets: Mapping[str, tuple[str, ...]]) -> dict[str, str | T]:
@@ -342,15 +219,15 @@ PLACES: dict[str, str] = {
 CENTRE = Kit(
     places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
     air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
-    probes=_NEST | _SPINDLE,
+    probes=NEST | SPINDLE,
     observables=(
         *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
-        *(_at(a, p) for a in AXES for p in STATIONS[a]),
+        *(station_name(a, p) for a in AXES for p in STATIONS[a]),
         *(f"{what}@{p}" for what in ("zy", "ay") for p in STATIONS["y"]),
     ),
     outfits={"all": tuple(PLACES), "usual": USUAL_PLACES, "chen": CHEN_PLACES, "hwang": HWANG_PLACES},
     nests={
-        "nest": tuple(_NEST),
+        "nest": tuple(NEST),
         **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES},
         "y_pitch": tuple(f"y_pitch_{p}" for p in STATIONS["y"]),
     },
