@@ -9,10 +9,11 @@ from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.machine import Axis, Channel, Machine
 from thermocomp.core.ports import CorrectionSink, TemperatureSource
 from thermocomp.core.reading import Reading
+from thermocomp.core.structure import Structure
 
 
 def test_machine_carries_its_reference_temperature() -> None:
-    machine = Machine("mill", "w X' b Y Z (C1) t", (Axis("X", (0.0, 500.0)),))
+    machine = Machine("mill", Structure.parse("w X' b t"), (Axis("X", (0.0, 500.0)),))
     assert machine.reference_temperature == 20.0
 
 

@@ -28,6 +28,8 @@ class ErrorComponent:
         The axis along whose travel it varies; None for a scalar (C-02).
     description : str
         In words.
+    axes : tuple of str
+        Axes that a machine must have for it to exist.
     """
 
     code: str
@@ -35,6 +37,8 @@ class ErrorComponent:
     unit: Literal["um", "urad"]
     depends_on: str | None
     description: str
+
+    axes: tuple[str, ...] = ()
 
     @property
     def is_scalar(self) -> bool:
@@ -51,17 +55,19 @@ def _axis_components() -> list[ErrorComponent]:
     for axis in _AXES:
         for along in _AXES:
             kind = "positioning" if along == axis else f"straightness in {along}"
-            found.append(ErrorComponent(f"E{along}{axis}", "axis", "um", axis, f"{kind} of {axis}"))
+            found.append(ErrorComponent(f"E{along}{axis}", "axis", "um", axis, f"{kind} of {axis}", (axis,)))
         for about in _AXES:
             code = f"E{_ROTATION[about]}{axis}"
             kind = "roll" if about == axis else f"tilt about {about}"
-            found.append(ErrorComponent(code, "axis", "urad", axis, f"{kind} of {axis}"))
+            found.append(ErrorComponent(code, "axis", "urad", axis, f"{kind} of {axis}", (axis,)))
     return found
 
 
 def _squareness() -> list[ErrorComponent]:
     pairs = (("C0Y", "Y", "X"), ("B0Z", "Z", "X"), ("A0Z", "Z", "Y"))
-    return [ErrorComponent(code, "squareness", "urad", None, f"squareness of {a} to {b}") for code, a, b in pairs]
+    return [
+        ErrorComponent(code, "squareness", "urad", None, f"squareness of {a} to {b}", (a, b)) for code, a, b in pairs
+    ]
 
 
 def _spindle() -> list[ErrorComponent]:
@@ -73,7 +79,7 @@ def _spindle() -> list[ErrorComponent]:
 def _origins() -> list[ErrorComponent]:
     # One axis (here Z) is the reference for the two others: two times three translations (C-01).
     return [
-        ErrorComponent(f"{along}O{axis}", "origin", "um", None, f"shift in {along} of the reference of {axis}")
+        ErrorComponent(f"{along}O{axis}", "origin", "um", None, f"shift in {along} of the reference of {axis}", (axis,))
         for axis in "XY"
         for along in _AXES
     ]

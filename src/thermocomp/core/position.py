@@ -1,0 +1,108 @@
+"""`PositionModel`: an error that varies along an axis and with the thermal state (Chen 1996, Eq. 2 and 3)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, Provenance
+from thermocomp.core.profile import Profile
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionModel:
+    """Frozen model of a position-dependent component: profile + offset + slopes (C-04, C-05).
+
+    ``d(x, y, z, t) = f_g(x, y, z) + k_0(t) + k_1(t) q + k_2(t) q^2 + ...`` with q = (p - reference position) in metres,
+    p being the axis' own position: k_i in um/m^i or urad/m^i (E-C6). Chen has no k_0 and counts p from the axis' zero.
+
+    Parameters
+    ----------
+    target : str
+        Component it models, such as ``EYY``.
+    unit : {'um', 'urad'}
+    axis : {'X', 'Y', 'Z'}
+        Whose position p is.
+    travel : tuple of float
+        From where to where the slopes were measured [mm]; beyond, the value at the end holds.
+    reference_position : float
+        Where q is zero [mm].
+    profile : Profile or None
+        f_g, in the reference state; None: zero.
+    offset : ErrorModel or None
+        k_0 [unit]; None: zero.
+    slopes : tuple of ErrorModel
+        k_1, k_2 ... [unit/m, unit/m^2 ...].
+    provenance : Provenance or None
+    """
+
+    target: str
+    unit: Literal["um", "urad"]
+    axis: str
+    travel: tuple[float, float]
+    reference_position: float = 0.0
+    profile: Profile | None = None
+    offset: ErrorModel | None = None
+    slopes: tuple[ErrorModel, ...] = ()
+    provenance: Provenance | None = None
+
+    def __post_init__(self) -> None:
+        owner = f"model of {self.target}"
+        if self.unit not in ("um", "urad"):
+            raise InputError(f"{owner}: unit {self.unit!r}: expected um or urad")
+        if self.axis not in ("X", "Y", "Z"):
+            raise InputError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
+        if not self.travel[0] < self.travel[1]:
+            raise InputError(f"{owner}: travel {self.travel} mm must rise")
+        for power, model in self._by_power:
+            wanted = slope_unit(self.unit, power)
+            if model.unit != wanted:
+                raise InputError(f"{owner}: k_{power} is in {model.unit}, must be in {wanted}")
+
+    @cached_property
+    def _by_power(self) -> tuple[tuple[int, ErrorModel], ...]:
+        offset = ((0, self.offset),) if self.offset is not None else ()
+        return (*offset, *enumerate(self.slopes, start=1))
+
+    @property
+    def models(self) -> tuple[ErrorModel, ...]:
+        """The models of time: the offset, if there is one, then the slopes."""
+        return tuple(m for _, m in self._by_power)
+
+    @property
+    def powers(self) -> tuple[int, ...]:
+        """The power of q that each of `models` is the factor of."""
+        return tuple(k for k, _ in self._by_power)
+
+    def at(self, points: FloatArray, factors: FloatArray) -> FloatArray:
+        """Return the error at points, in one thermal state.
+
+        Parameters
+        ----------
+        points : ndarray of shape (..., 3)
+            x, y, z [mm].
+        factors : ndarray of shape (n_models,)
+            What `models` say, in their order.
+
+        Returns
+        -------
+        ndarray of shape (...,)
+            [unit]
+        """
+        position = points[..., "XYZ".index(self.axis)]
+        value = np.zeros(position.shape) if self.profile is None else self.profile.at(points)
+        if self.slopes:
+            q = 1e-3 * (np.clip(position, *self.travel) - self.reference_position)
+        for power, factor in zip(self.powers, factors, strict=True):
+            value = value + (factor * q**power if power else factor)
+        return value
+
+
+def slope_unit(unit: str, power: int) -> str:
+    """Return the unit of k_i: um, um/m, um/m^2 ..."""
+    return unit + ("", "/m")[power] if power < 2 else f"{unit}/m^{power}"

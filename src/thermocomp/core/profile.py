@@ -1,0 +1,157 @@
+"""Profiles: how a position-dependent error varies over the work volume in one thermal state (Chen 1996, Eq. 2: f_g)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import check_finite
+
+FloatArray = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolynomialProfile:
+    """Sum of coefficient * u^i v^j w^k, with u = (x - centre_x) / scale_x and so on (C-04, C-06).
+
+    Parameters
+    ----------
+    exponents : tuple of (int, int, int)
+        i, j, k of each term.
+    coefficients : tuple of float
+        Of each term [unit of the error].
+    centre, scale : tuple of float
+        For x, y, z [mm]; a polynomial in mm has centre 0 and scale 1.
+    low, high : tuple of float
+        Where it was measured, x, y, z [mm]; beyond, the value at the border holds.
+    """
+
+    kind: ClassVar[str] = "polynomial"
+
+    exponents: tuple[tuple[int, int, int], ...]
+    coefficients: tuple[float, ...]
+    centre: Vector = (0.0, 0.0, 0.0)
+    scale: Vector = (1.0, 1.0, 1.0)
+    low: Vector
+    high: Vector
+
+    def __post_init__(self) -> None:
+        if len(self.exponents) != len(self.coefficients):
+            raise InputError(f"profile: {len(self.exponents)} terms but {len(self.coefficients)} coefficients")
+        if any(e < 0 for term in self.exponents for e in term):
+            raise InputError("profile: an exponent is negative")
+        if not all(s > 0 for s in self.scale):
+            raise InputError(f"profile: scale {self.scale} must be positive")
+        _check_range(self.low, self.high)
+        check_finite("profile", coefficients=self.coefficients, centre=self.centre, scale=self.scale)
+
+    @cached_property
+    def _axes(self) -> tuple[int, ...]:
+        """Indices of the coordinates that it depends on."""
+        return tuple(a for a in range(3) if any(e[a] for e in self.exponents))
+
+    @cached_property
+    def _along_one(self) -> tuple[int, tuple[float, ...]] | None:
+        """The coordinate and the coefficients by falling degree of a polynomial in one coordinate."""
+        if len(self._axes) > 1:
+            return None
+        axis = self._axes[0] if self._axes else 0
+        by_degree = [0.0] * (1 + max((e[axis] for e in self.exponents), default=0))
+        for e, c in zip(self.exponents, self.coefficients, strict=True):
+            by_degree[e[axis]] += c
+        return axis, tuple(reversed(by_degree))
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return its values.
+
+        Parameters
+        ----------
+        points : ndarray of shape (..., 3)
+            x, y, z [mm].
+
+        Returns
+        -------
+        ndarray of shape (...,)
+        """
+        along = self._along_one
+        if along is not None:
+            axis, coefficients = along
+            u = (np.clip(points[..., axis], self.low[axis], self.high[axis]) - self.centre[axis]) / self.scale[axis]
+            value = np.full(np.shape(u), coefficients[0])
+            for c in coefficients[1:]:
+                value = value * u + c
+            return value
+        u3 = (np.clip(points, self.low, self.high) - np.asarray(self.centre)) / np.asarray(self.scale)
+        total = np.zeros(points.shape[:-1])
+        for e, c in zip(self.exponents, self.coefficients, strict=True):
+            term = np.full(total.shape, c)
+            for axis in self._axes:
+                if e[axis]:
+                    term = term * u3[..., axis] ** e[axis]
+            total += term
+        return total
+
+
+@dataclass(frozen=True, kw_only=True)
+class SplineProfile:
+    """Piecewise cubic along one axis.
+
+    Parameters
+    ----------
+    axis : {'X', 'Y', 'Z'}
+    knots : tuple of float
+        Ends of the pieces, rising [mm]; beyond the first and the last the value there holds.
+    pieces : tuple of (float, float, float, float)
+        One per piece: coefficients of ((p - its first knot) / its length)^0..3 [unit of the error].
+    """
+
+    kind: ClassVar[str] = "spline"
+
+    axis: str
+    knots: tuple[float, ...]
+    pieces: tuple[tuple[float, float, float, float], ...]
+
+    def __post_init__(self) -> None:
+        if self.axis not in ("X", "Y", "Z"):
+            raise InputError(f"profile: axis {self.axis!r}: expected X, Y or Z")
+        if len(self.knots) != len(self.pieces) + 1 or len(self.pieces) < 1:
+            raise InputError(f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces")
+        if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
+            raise InputError("profile: knots must rise")
+        check_finite("profile", knots=self.knots, pieces=self.pieces)
+
+    @cached_property
+    def _arrays(self) -> tuple[FloatArray, FloatArray]:
+        return np.asarray(self.knots, dtype=np.float64), np.asarray(self.pieces, dtype=np.float64)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return its values.
+
+        Parameters
+        ----------
+        points : ndarray of shape (..., 3)
+            x, y, z [mm].
+
+        Returns
+        -------
+        ndarray of shape (...,)
+        """
+        knots, pieces = self._arrays
+        p = np.clip(points[..., "XYZ".index(self.axis)], knots[0], knots[-1])
+        k = np.clip(np.searchsorted(knots, p, side="right") - 1, 0, len(pieces) - 1)
+        u = (p - knots[k]) / (knots[k + 1] - knots[k])
+        c = pieces[k]
+        value: FloatArray = ((c[..., 3] * u + c[..., 2]) * u + c[..., 1]) * u + c[..., 0]
+        return value
+
+
+Profile = PolynomialProfile | SplineProfile
+
+
+def _check_range(low: Vector, high: Vector) -> None:
+    if not all(a <= b for a, b in zip(low, high, strict=True)):
+        raise InputError(f"profile: range from {low} to {high} mm is empty")
