@@ -21,6 +21,8 @@ release = version = version_of("thermocomp")
 
 extensions = [
     "cli_help",
+    "cli_run",
+    "component_table",
     "method_table",
     "requirement_table",
     "myst_parser",

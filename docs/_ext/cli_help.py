@@ -8,6 +8,8 @@ Without a name it is the help of the whole app.
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 from docutils import nodes
@@ -18,17 +20,19 @@ from thermocomp.cli import app, commands
 COLUMNS = 104
 
 
-def help_text(command: str = "") -> str:
-    """Run ``thermocomp COMMAND --help`` on a plain terminal of a fixed width.
+def printed(arguments: Sequence[str], folder: Path | None = None) -> str:
+    """Run the program on a plain terminal of a fixed width and return what it prints.
 
     Raises
     ------
     RuntimeError
         It did not end with exit code 0.
     """
-    line = [sys.executable, "-m", "thermocomp.cli.app", *([command] if command else []), "--help"]
+    line = [sys.executable, "-m", "thermocomp.cli.app", *arguments]
     terminal = {"COLUMNS": str(COLUMNS), "NO_COLOR": "1", "TERM": "dumb", "PYTHONIOENCODING": "utf-8"}
-    done = subprocess.run(line, env=os.environ | terminal, capture_output=True, encoding="utf-8", check=False)
+    done = subprocess.run(
+        line, cwd=folder, env=os.environ | terminal, capture_output=True, encoding="utf-8", check=False
+    )
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(line[1:])} ended with {done.returncode}: {done.stderr.strip()}")
     return "\n".join(row.rstrip() for row in done.stdout.strip().splitlines())
@@ -44,7 +48,7 @@ class CliHelp(SphinxDirective):
         for module in (app, commands):
             self.env.note_dependency(str(module.__file__))
         try:
-            text = help_text(*self.arguments)
+            text = printed([*self.arguments, "--help"])
         except RuntimeError as e:
             raise self.error(str(e)) from e
         block = nodes.literal_block(text, text, language="none", classes=["cli-help"])

@@ -1,15 +1,19 @@
 """Machine, axes, channels, corrections and limits refuse nonsense where they are made."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pytest
 
+from thermocomp.core.components import COMPONENTS
 from thermocomp.core.correction import Correction, Deviation, Limits
-from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.core.machine import Axis, Channel, Machine
+from thermocomp.core.exceptions import InputError, SettingError, UnitError
+from thermocomp.core.machine import Axis, Channel, Machine, Source
 from thermocomp.core.ports import CorrectionSink, TemperatureSource
+from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.structure import Structure
+from volumetricmachine import line
 
 
 def test_machine_carries_its_reference_temperature() -> None:
@@ -22,6 +26,74 @@ def test_axis_refuses_falling_travel_and_other_letters() -> None:
         Axis("X", (500.0, 0.0))
     with pytest.raises(InputError, match="expected X, Y or Z"):
         Axis("U", (0.0, 1.0))
+
+
+def test_axis_refuses_numbers_that_are_none() -> None:
+    nan, inf = float("nan"), float("inf")
+    bad: dict[str, Any] = {
+        "travel": (0.0, inf),
+        "measured_at": (0.0, nan, 0.0),
+        "measured_tool": (0.0, inf, 0.0),
+        "reference_position": nan,
+    }
+    for key, value in bad.items():
+        with pytest.raises(SettingError, match="finite number") as caught:
+            Axis("X", **{"travel": (0.0, 1.0), key: value})
+        assert caught.value.path == (key,)
+
+
+XZ = (Axis("X", (0.0, 500.0)), Axis("Z", (0.0, 300.0)))
+
+
+def profiled(axis: str, unit: str = "um") -> PositionModel:
+    return PositionModel(target="e", unit=unit, axis=axis, travel=(0.0, 1.0))  # type: ignore[arg-type]
+
+
+def test_every_component_may_be_told() -> None:
+    """C-01, C-02: 18 by models of position, 14 by numbers."""
+    axes = (*XZ, Axis("Y", (0.0, 400.0)))
+    sources = {c.code: 1.0 if c.depends_on is None else profiled(c.depends_on, c.unit) for c in COMPONENTS}
+    machine = Machine("mill", Structure.parse("XFZY"), axes, sources)
+    assert len(machine.components) == 32
+    assert sum(isinstance(s, PositionModel) for s in machine.components.values()) == 18
+    assert machine.axis("Y").travel == (0.0, 400.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "source", "message"),
+    [
+        ("EXQ", 1.0, "there is no component 'EXQ'"),
+        ("EXY", 1.0, "the machine has no axis Y"),
+        ("C0Y", 1.0, "squareness of Y to X: the machine has no axis Y"),
+        ("XOY", 1.0, "the machine has no axis Y"),
+        ("EXX", float("nan"), "must be a finite number"),
+        ("EAX", line("EAX", "um", {"t": 1.0}), "the model is in um; roll of X is in urad"),
+        ("EAX", profiled("X"), "the model is in um; roll of X is in urad"),
+        ("B0Z", profiled("Z", "urad"), "does not depend on a position"),
+        ("EXX", profiled("Z"), "the model is one along Z"),
+    ],
+)
+def test_machine_refuses_a_source_that_does_not_fit(code: str, source: Source, message: str) -> None:
+    with pytest.raises(SettingError, match=message) as caught:
+        Machine("mill", Structure.parse("XFZ"), XZ, {"EXZ": 1.0, code: source})
+    assert caught.value.path == ("components", code)
+
+
+def test_machine_refuses_axes_that_are_not_its_structure() -> None:
+    for axes, wrong in (((*XZ, Axis("Y", (0.0, 1.0))), "Y"), (XZ[:1], "Z"), ((*XZ, XZ[0]), "X")):
+        with pytest.raises(SettingError, match=f"axis {wrong} ") as caught:
+            Machine("mill", Structure.parse("XFZ"), axes)
+        assert caught.value.path == ("axes", wrong)
+    with pytest.raises(InputError, match="machine mill: there is no axis 'Y'; there are X, Z"):
+        Machine("mill", Structure.parse("XFZ"), XZ).axis("Y")
+
+
+def test_machine_refuses_numbers_that_are_none() -> None:
+    nan = float("nan")
+    for bad in ({"tool": (0.0, 0.0, nan)}, {"spindle_tool": (nan, 0.0, 0.0)}, {"reference_temperature": nan}):
+        with pytest.raises(SettingError, match="must be finite") as caught:
+            Machine("mill", Structure.parse("XFZ"), XZ, **bad)
+        assert caught.value.path == tuple(bad)
 
 
 def test_channel_refuses_a_unit_that_does_not_measure_its_quantity() -> None:

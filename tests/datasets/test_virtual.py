@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 HOUR, MINUTE = 3600.0, 60.0
 PROMISED = {"chen1996", "chen1996-new", "chen1996-slope", "wessel-fem", "wessel-tool", "wessel-milling", "wessel-sets"}
 PROMISED |= {"hwang", "stepwise2017", "stepwise2017-online", "precompensation", "precompensation-cut"}
-PROMISED |= {"etve", "iso230-spindle", "iso230-axis", "probing", "random", "demo"}
+PROMISED |= {"etve", "iso230-spindle", "iso230-axis", "probing", "random", "demo", "volumetric", "volumetric-new"}
 
 
 @cache

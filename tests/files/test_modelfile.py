@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import HonestError, Input, Provenance, Support
-from thermocomp.files import modelfile
+from thermocomp.files import jsonfile, modelfile
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -113,7 +113,7 @@ def altered(change: dict[str, object]) -> str:
             del entry[key]
         else:
             entry[key] = value
-    content["sha256"] = modelfile._digest(content["models"])
+    content["sha256"] = jsonfile.digest(content["models"])
     return json.dumps(content)
 
 

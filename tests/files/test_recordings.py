@@ -193,7 +193,7 @@ def test_the_time_is_found_and_counted_from_the_first_row(
 
 def test_a_long_file_is_read_in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thermocomp.files.textfile._CHUNK", 3)
-    monkeypatch.setattr("thermocomp.files.recordings._CHUNK", 2)
+    monkeypatch.setattr("thermocomp.files.times._CHUNK", 2)
     rows = [f"2024-05-01T10:00:{k:02d},{k}.5,{k // 4}" for k in range(8)]
 
     recording = read(_csv(tmp_path, "\n".join(["time,t1_C,cycle", *rows])))

@@ -6,9 +6,10 @@ import pytest
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import TEST_POSITION
 from thermocomp.simulation.centre import MachiningCentre
+from thermocomp.simulation.geometry import cold_profile
 from thermocomp.simulation.instruments import Touch, displacement, mounting, thermometer
 from thermocomp.simulation.kits import CENTRE, CHEN_PLACES, HWANG_PLACES, KITS, Kit, labelled
-from thermocomp.simulation.probes import cold_profile, positioning
+from thermocomp.simulation.probes import positioning
 from thermocomp.simulation.toolsystem import RestingTool
 
 
@@ -102,6 +103,39 @@ def test_a_perfect_probe_has_no_errors() -> None:
     assert (sensor.channel.name, sensor.noise, sensor.drift, sensor.resolution) == ("s4_um", 0.0, 0.0, 0.0)
     assert displacement("s4", CENTRE.probe("tip"), perfect=False).sensor.noise > 0.0
     assert CENTRE.probe({"z": 1.0, "zz@200": -1.0}).reads == {"z": 1.0, "zz@200": -1.0}
+
+
+def test_a_laser_of_six_degrees_reads_the_components() -> None:
+    assert len(CENTRE.nests["X_six"]) == 6 * 7
+    assert len(CENTRE.nests["Y_six"]) == 6 * 12
+    assert CENTRE.nests["EXX"] == tuple(f"EXX_{p}" for p in range(0, 601, 100))
+    # a way counts from where the laser was set to zero, again in each profile
+    assert CENTRE.probe("EYY_550").reads == {"EYY@550": 1.0, "EYY@250": -1.0}
+    assert CENTRE.probe("EYY_550").cold == pytest.approx(-18.53 + 2.24, abs=0.01)
+    assert CENTRE.probe("EXX_300").reads == {}
+    # a level keeps its zero: a table that tilts alike wherever it stands is seen
+    assert CENTRE.probe("EAX_300").reads == {"EAX@300": 1.0}
+    assert CENTRE.probe("EAX_300").cold == 0.0
+    assert CENTRE.probe("EBZ_600").reads == {}
+    assert CENTRE.probe("EBZ_600").cold != 0.0
+    between = CENTRE.probe("EAY_75").reads
+    assert sum(between.values()) == pytest.approx(1.0)
+    assert {"EAY@50", "EAY@100"} < set(between)
+    assert CENTRE.probe("EYX_z600_0").reads == CENTRE.probe("EYX_0").reads
+    assert CENTRE.probe("C0Y").cold == 14.0
+    for name, unit, noise in (("EXX_0", "um", 0.3), ("ECX_0", "urad", 0.5), ("A0Z", "urad", 0.5)):
+        sensor = displacement(name, CENTRE.probe(name), perfect=False).sensor
+        assert (sensor.channel.name, sensor.noise) == (f"{name}_{unit}", noise)
+    assert displacement("z", CENTRE.probe("z"), perfect=False).sensor.noise == 0.15
+    for wrong, message in (
+        ("EYY_600", "Y = 600 mm is beyond"),
+        ("EYX_z700_0", "Z = 700 mm is beyond"),
+        ("EXW_0", "no probe 'EXW_0'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            CENTRE.probe(wrong)
+    with pytest.raises(InputError, match="no probe 'EXX_0'"):
+        KITS["tool"].probe("EXX_0")
 
 
 def test_what_is_not_there_is_refused_and_the_nearest_told() -> None:

@@ -45,10 +45,23 @@ class CycleVerdict:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The gate's decision over several cycles."""
+    """The gate's decision over several cycles.
+
+    Parameters
+    ----------
+    cycles : tuple of CycleVerdict
+    level : float
+        Confidence of the bounds.
+    unit : str
+        Of the deviations.
+    least : int
+        Rows that a cycle must have.
+    """
 
     cycles: tuple[CycleVerdict, ...]
     level: float
+    unit: str = "um"
+    least: int = MIN_ROWS
 
     @property
     def accepted(self) -> bool:
@@ -67,8 +80,8 @@ class Verdict:
             return "nothing was judged"
         worst = max(self.cycles, key=lambda c: c.ratio_bound)
         if not np.isfinite(worst.ratio_bound) and not np.isfinite(worst.rms):
-            return f"fewer than {MIN_ROWS} rows of {worst.cycle} to judge on"
-        figures = f"RMS {worst.rms:.2f} um, {worst.none_rms:.2f} um without compensation"
+            return f"fewer than {self.least} rows of {worst.cycle} to judge on"
+        figures = f"RMS {worst.rms:.2f} {self.unit}, {worst.none_rms:.2f} {self.unit} without compensation"
         if self.accepted:
             return f"better than none wherever it was judged; least in {worst.cycle}: {figures}"
         if worst.ratio >= 1:
@@ -87,6 +100,8 @@ def judge(
     level: float = LEVEL,
     draws: int = 1000,
     seed: int = 0,
+    least: int = MIN_ROWS,
+    unit: str = "um",
 ) -> Verdict:
     """Decide whether a model may be used.
 
@@ -107,6 +122,10 @@ def judge(
         Number of bootstrap draws.
     seed : int
         Of the draws.
+    least : int
+        Fewer rows than this say nothing about a cycle.
+    unit : str
+        Of the deviations.
 
     Returns
     -------
@@ -114,7 +133,7 @@ def judge(
     """
     found = []
     for name, rows in segments:
-        if rows.sum() < MIN_ROWS:
+        if rows.sum() < least:
             # said, not skipped: so short a stretch proves nothing, and what is not proven is refused
             found.append(CycleVerdict(name, float("nan"), float("nan"), float("nan"), float("inf")))
             continue
@@ -122,7 +141,7 @@ def judge(
         bound = _ratio_bound(residual, none, level, draws, np.random.default_rng(seed))
         rms, none_rms = float(np.sqrt(residual.mean())), float(np.sqrt(none.mean()))
         found.append(CycleVerdict(name, rms, none_rms, rms / none_rms if none_rms > 0 else np.inf, bound))
-    return Verdict(tuple(found), level)
+    return Verdict(tuple(found), level, unit, least)
 
 
 def _ratio_bound(residual: FloatArray, none: FloatArray, level: float, draws: int, rng: np.random.Generator) -> float:

@@ -66,7 +66,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     for test in np.unique(samples.test[rows]):
         mine = np.flatnonzero(samples.test == test)
         mine = mine[: np.flatnonzero(rows[mine]).max() + 1]
-        state, last = model.init(), samples.time[mine[0]]
+        state, last = model.init(None if samples.zero is None else reference[test]), samples.time[mine[0]]
         for k, needed in zip(mine, _needed(model, usable[mine], rows[mine]), strict=True):
             if needed:
                 reading = values[k] if disturb is None else disturb(values[k], reference[test])

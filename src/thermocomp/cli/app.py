@@ -9,7 +9,10 @@ from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import commands
+from thermocomp.cli.iso230 import iso230
 from thermocomp.cli.papers import papers
+from thermocomp.cli.position import position
+from thermocomp.cli.volumetric import volumetric
 from thermocomp.core.exceptions import ThermocompError
 
 app = App(
@@ -29,6 +32,9 @@ for command in (
     commands.fit,
     commands.assess,
     commands.compare,
+    position,
+    iso230,
+    volumetric,
     papers,
 ):
     app.command(command)

@@ -87,7 +87,7 @@ def show_choices(
     for c in choices:
         for t in c.tables:
             console.print(f"\n[bold]{escape(c.target)}: {escape(t.title)}[/]")
-            _print_table(t, console)
+            print_table(t, console)
         for note in c.notes:
             console.print(f"[dim]note[/] {escape(note)}")
         console.print(
@@ -97,7 +97,7 @@ def show_choices(
         console.print(f"Page: {page}")
 
 
-def _print_table(t: ChoiceTable, console: Console) -> None:
+def print_table(t: ChoiceTable, console: Console) -> None:
     """Print a table; where it is too wide, its lists of names follow below it."""
     lists = [j for j in t.words if any(" " in str(row[j]) for row in t.rows)]
     for below in ([], lists):

@@ -1,5 +1,8 @@
 """The one exception tree: whatever thermocomp raises on purpose is a `ThermocompError`."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class ThermocompError(Exception):
     """Base of all errors thermocomp raises on purpose; its text says what was found and what to do."""
@@ -24,6 +27,26 @@ class SettingError(InputError, ValueError):
     def __init__(self, message: str, path: tuple[str | int, ...] = ()) -> None:
         super().__init__(message)
         self.path = path
+
+
+def unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
+    """Return the error of a name that nobody knows; it tells the nearest ones.
+
+    Parameters
+    ----------
+    what : str
+        What kind of thing was asked for.
+    name : str
+        What was found.
+    known : iterable of str
+        What there is.
+    path : tuple of str or int
+        Where it stands, see `SettingError`.
+    """
+    known = list(known)
+    near = get_close_matches(name, known, n=3, cutoff=0.4)
+    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
+    return SettingError(f"there is no {what} {name!r}; {hint}", path)
 
 
 class RecordingError(InputError):

@@ -112,8 +112,8 @@ class Machine:
     Raises
     ------
     SettingError
-        Axes and structure differ, or a component is unknown, belongs to an axis that is not there, or has a source of
-        another unit or axis.
+        Axes and structure differ, a number is not finite, or a component is unknown, belongs to an axis that is not
+        there, or has a source of another unit or axis.
     """
 
     name: str
@@ -126,6 +126,13 @@ class Machine:
     reference_temperature: float = 20.0
 
     def __post_init__(self) -> None:
+        for key, numbers in (
+            ("spindle_tool", self.spindle_tool),
+            ("tool", self.tool),
+            ("reference_temperature", (self.reference_temperature,)),
+        ):
+            if not all(math.isfinite(v) for v in numbers):
+                raise SettingError(f"{numbers}: must be finite numbers", (key,))
         there = [a.name for a in self.axes]
         for name in there:
             if name not in self.structure.axes:

@@ -1,5 +1,6 @@
 """`PositionModel`: an error that varies along an axis and with the thermal state (Chen 1996, Eq. 2 and 3)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -8,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, Provenance
-from thermocomp.core.profile import Profile
+from thermocomp.core.model import ErrorModel, Provenance, check_finite
+from thermocomp.core.profile import Coordinates, Numbers, Profile, coordinates, held
 
 FloatArray = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ class PositionModel:
             raise InputError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
         if not self.travel[0] < self.travel[1]:
             raise InputError(f"{owner}: travel {self.travel} mm must rise")
+        check_finite(owner, travel=self.travel, reference_position=self.reference_position)
         for power, model in self._by_power:
             wanted = slope_unit(self.unit, power)
             if model.unit != wanted:
@@ -94,13 +96,20 @@ class PositionModel:
         ndarray of shape (...,)
             [unit]
         """
-        position = points[..., "XYZ".index(self.axis)]
-        value = np.zeros(position.shape) if self.profile is None else self.profile.at(points)
-        if self.slopes:
-            q = 1e-3 * (np.clip(position, *self.travel) - self.reference_position)
-        for power, factor in zip(self.powers, factors, strict=True):
-            value = value + (factor * q**power if power else factor)
-        return value
+        values = self.value(coordinates(points), factors.tolist())
+        return np.asarray(values) if points.ndim == 1 else np.broadcast_to(values, points.shape[:-1]).copy()
+
+    def value(self, xyz: Coordinates, factors: Sequence[float]) -> Numbers:
+        """Return the error at what `coordinates` made of points; a float if it is the same everywhere."""
+        k_0, *others = factors if self.offset is not None else (0.0, *factors)
+        value = k_0 if self.profile is None else self.profile.value(xyz) + k_0
+        if not self.slopes:
+            return value
+        q = 1e-3 * (held(xyz["XYZ".index(self.axis)], *self.travel) - self.reference_position)
+        thermal: Numbers = 0.0
+        for _, k in zip(reversed(self.slopes), reversed(others), strict=True):
+            thermal = (thermal + k) * q
+        return value + thermal
 
 
 def slope_unit(unit: str, power: int) -> str:

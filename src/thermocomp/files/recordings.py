@@ -1,7 +1,8 @@
 """Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,30 +13,19 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.core.units import unit
+from thermocomp.core.machine import Channel
 from thermocomp.files.columns import Plan, plan, understand, why_left_out
 from thermocomp.files.draft import draft
-from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
+from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.tables import EMBEDDED, Table, open_parquet, open_xlsx
 from thermocomp.files.textfile import open_csv
+from thermocomp.files.times import read_times
 from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
 
 ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".parquet")
-_CHUNK = 100_000
-# Only what cannot be read in two ways: 06/07/2021 needs a mapping. The last two tell the time of day only.
-_FORMATS = (
-    "ISO8601",
-    "%Y/%m/%d %H:%M:%S",
-    "%Y/%m/%d-%H:%M:%S",
-    "%d.%m.%Y %H:%M:%S",
-    "%d.%m.%Y %H:%M:%S.%f",
-    "%d.%m.%Y %H:%M",
-    "%H:%M:%S",
-    "%H:%M:%S.%f",
-)
 
 
 def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
@@ -63,6 +53,76 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     UnitError
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
+    rows = read_rows(path, mapping)
+    return recorded(rows, rows.time, rows.table, rows.labels)
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a file holds, row by row, in house units.
+
+    Parameters
+    ----------
+    source : str
+        The file.
+    sha256 : str
+        Hash of it.
+    time : ndarray of shape (n_rows,)
+        Seconds since the first row [s].
+    start : str
+        ISO timestamp of the first row, if known.
+    table : DataFrame of shape (n_rows, n_channels)
+    channels : tuple of Channel
+        One per column of `table`.
+    labels : list of object or None
+        Thermal cycle of each row, if the file says.
+    extra : mapping of str to list of object
+        Cells of further columns that were asked for and are there.
+    rule : CycleRule
+    aliases : mapping of str to str
+        Headings and names without unit to channel names.
+    notes : tuple of str
+    place : callable
+        Says where a row stands in the file, such as ``line 7``.
+    """
+
+    source: str
+    sha256: str
+    time: FloatArray
+    start: str
+    table: pd.DataFrame
+    channels: tuple[Channel, ...]
+    labels: list[Any] | None
+    extra: dict[str, list[Any]]
+    rule: CycleRule
+    aliases: dict[str, str]
+    notes: tuple[str, ...]
+    place: Callable[[int], str]
+
+
+def read_rows(
+    path: str | Path, mapping: Mapping | None = None, *, rising: bool = True, extra: Sequence[str] = ()
+) -> Rows:
+    """Read the rows of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+    mapping : Mapping, optional
+    rising : bool
+        False: several rows may have the same time, as in a table with a row per position.
+    extra : sequence of str
+        Headings of columns, whatever they hold, to be read too if they are there.
+
+    Returns
+    -------
+    Rows
+
+    Raises
+    ------
+    RecordingError, UnitError
+        See `read`.
+    """
     source = Path(path)
     mapping = mapping or Mapping()
     table, sha256 = _open(source, mapping.read)
@@ -71,10 +131,13 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     columns = plan(table.headings, mapping, str(source))
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns] + ([] if is_stamp else [columns.time])
-    texts = [k for k in (columns.time if is_stamp else None, columns.date, columns.cycle) if k is not None]
-    cells = table.load(list(dict.fromkeys(numbers)), texts)
+    more = {h: table.headings.index(h) for h in extra if h in table.headings}
+    texts = [
+        k for k in (columns.time if is_stamp else None, columns.date, columns.cycle, *more.values()) if k is not None
+    ]
+    cells = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
     notes = [*table.notes, *columns.notes]
-    time, start = _time(cells, columns, mapping, table, source, is_stamp=is_stamp)
+    time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     if not is_stamp and not columns.time_unit:
         notes.append(f"{table.headings[columns.time]!r} has no unit and is taken as seconds")
     data = {}
@@ -82,25 +145,59 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
         raw = cells[column.index].to_numpy(dtype=np.float64)
         data[column.channel.name], found = column.convert(raw, mapping.read.missing)
         notes.extend(found)
-    numeric = [k for k in columns.left_out if table.is_number(k, empty=False)]
+    left_out = [k for k in columns.left_out if k not in more.values()]
+    numeric = [k for k in left_out if table.is_number(k, empty=False)]
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric)
-    texts_only = [table.headings[k] for k in columns.left_out if k not in numeric]
+    texts_only = [table.headings[k] for k in left_out if k not in numeric]
     if texts_only:
         notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
-    channels = tuple(c.channel for c in columns.columns)
-    recording = Recording(
-        name=source.stem,
-        time=time,
-        table=pd.DataFrame(data, copy=False),
-        channels=channels,
-        cycles=whole(len(time)),
+    return Rows(
         source=str(source),
         sha256=sha256,
+        time=time,
         start=start or mapping.time.start,
+        table=pd.DataFrame(data, copy=False),
+        channels=tuple(c.channel for c in columns.columns),
+        labels=_labels(cells, columns, table, source),
+        extra={h: cells[k].tolist() for h, k in more.items()},
+        rule=mapping.cycles,
         aliases=columns.aliases,
         notes=tuple(notes),
+        place=table.place,
     )
-    return recording.with_cycles(_cycles(recording, cells, columns, mapping, table))
+
+
+def recorded(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
+    """Make a recording of rows, or of what was made of them.
+
+    Parameters
+    ----------
+    rows : Rows
+        As read.
+    time : ndarray of shape (n,)
+        [s]
+    table : DataFrame of shape (n, n_kept)
+        Some of the channels.
+    labels : sequence of object, optional
+        Thermal cycle of each row.
+
+    Returns
+    -------
+    Recording
+    """
+    recording = Recording(
+        name=Path(rows.source).stem,
+        time=time,
+        table=table,
+        channels=tuple(c for c in rows.channels if c.name in table.columns),
+        cycles=whole(len(time)),
+        source=rows.source,
+        sha256=rows.sha256,
+        start=rows.start,
+        aliases=rows.aliases,
+        notes=rows.notes,
+    )
+    return recording.with_cycles(_cycles(recording, labels, rows.rule))
 
 
 def read_all(paths: Sequence[str | Path], mapping: Mapping | None = None) -> list[Recording]:
@@ -200,96 +297,27 @@ def _described(text: str, source: Path) -> Mapping:
         ) from e
 
 
-def _time(
-    cells: pd.DataFrame, columns: Plan, mapping: Mapping, table: Table, source: Path, *, is_stamp: bool
-) -> tuple[FloatArray, str]:
-    """Return seconds since the first row, strictly rising, and the ISO timestamp of the first row if known."""
-    shown = cells[columns.time]
-    start = ""
-    if is_stamp:
-        if columns.date is not None:
-            shown = cells[columns.date].astype(str).str[:10] + " " + shown.astype(str)
-        stamps, start = _timestamps(shown, mapping.time.format, table, source, table.headings[columns.time])
-        time = np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
-    else:
-        raw = shown.to_numpy(dtype=np.float64)
-        time = (raw - raw[0]) * unit(columns.time_unit or "s", "time").scale
-        missing = np.flatnonzero(~np.isfinite(raw))
-        if missing.size:
-            _refuse_missing(table, source, int(missing[0]), table.headings[columns.time])
-    wrong = np.flatnonzero(~(np.diff(time) > 0)) + 1
-    if wrong.size:
-        row = int(wrong[0])
-        what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
-        more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
-        steps = np.diff(time)
-        # a clock that is set back falls by an hour less one interval
-        falls_by_an_hour = abs(steps[row - 1] - np.median(steps) + 3600) < 300
-        if is_stamp and falls_by_an_hour and pd.Timestamp(start).tzinfo is None:
-            more += ", perhaps as the clock was set back (daylight saving): use UTC, or timestamps with an offset"
+def _labels(cells: pd.DataFrame, columns: Plan, table: Table, source: Path) -> list[Any] | None:
+    if columns.cycle is None:
+        return None
+    labels = cells[columns.cycle]
+    if labels.isna().any():
+        row = int(np.flatnonzero(labels.isna())[0])
         raise RecordingError(
-            f"{source}: {table.place(row)}, column {table.headings[columns.time]!r}: time {shown.iloc[row]} {what}, in "
-            f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests"
+            f"{source}: {table.place(row)}, column {table.headings[columns.cycle]!r}: the cycle's label is missing; "
+            "every row belongs to a cycle"
         )
-    return time, start
+    return list(labels.tolist())
 
 
-def _timestamps(
-    cells: "pd.Series[Any]", wanted: str, table: Table, source: Path, heading: str
-) -> tuple["pd.Series[pd.Timestamp]", str]:
-    """Parse timestamps; mixed offsets (summer time) are brought to one clock."""
-    if cells.isna().any():
-        _refuse_missing(table, source, int(np.flatnonzero(cells.isna())[0]), heading)
-    if pd.api.types.is_datetime64_any_dtype(cells.dtype):
-        return cells, cells.iloc[0].isoformat()
-    text = cells.astype(str)
-    first = text.iloc[:1]
-    formats = [wanted] if wanted else _FORMATS
-    fitting = [f for f in formats if pd.to_datetime(first, format=f, utc=True, errors="coerce").notna().all()]
-    if not fitting:
-        hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
-        raise RecordingError(
-            f"{source}: {table.place(0)}, column {heading!r}: {first.iloc[0]!r} {hint}; say how it is written in a "
-            f'mapping: [time] column = "{heading}" and format = "%d/%m/%Y %H:%M:%S"'
-        )
-    # in parts, and without a cache of the texts seen: pandas makes objects of them, far bigger than the times
-    parts = [text.iloc[k : k + _CHUNK] for k in range(0, len(text), _CHUNK)]
-    stamps = pd.concat(pd.to_datetime(p, format=fitting[0], utc=True, errors="coerce", cache=False) for p in parts)
-    bad = np.flatnonzero(stamps.isna())
-    if bad.size:
-        row = int(bad[0])
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a timestamp like "
-            f"{first.iloc[0]!r}; correct or delete the row"
-        )
-    if fitting[0].startswith("%H"):
-        return stamps, ""
-    return stamps, pd.to_datetime(first, format=fitting[0]).iloc[0].isoformat()
-
-
-def _refuse_missing(table: Table, source: Path, row: int, heading: str) -> None:
-    raise RecordingError(
-        f"{source}: {table.place(row)}, column {heading!r}: the time is missing; fill it in or delete the row"
-    )
-
-
-def _cycles(
-    recording: Recording, cells: pd.DataFrame, columns: Plan, mapping: Mapping, table: Table
-) -> Sequence[Cycle]:
-    if columns.cycle is not None:
-        labels = cells[columns.cycle]
-        if labels.isna().any():
-            row = int(np.flatnonzero(labels.isna())[0])
-            raise RecordingError(
-                f"{recording.source}: {table.place(row)}, column {table.headings[columns.cycle]!r}: the cycle's label "
-                "is missing; every row belongs to a cycle"
-            )
+def _cycles(recording: Recording, labels: Sequence[Any] | None, rule: CycleRule) -> Sequence[Cycle]:
+    if labels is not None:
         try:
-            return given_cycles(labels.tolist())
+            return given_cycles(labels)
         except RecordingError as e:
             raise RecordingError(f"{recording.source}: {e}") from e
     speed = recording.speed
     if speed is None:
         return whole(len(recording))
     values = recording.table[speed.name].to_numpy()
-    return find_cycles(recording.time, values, min_run=mapping.cycles.min_run_s, min_stop=mapping.cycles.min_stop_s)
+    return find_cycles(recording.time, values, min_run=rule.min_run_s, min_stop=rule.min_stop_s)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
+from inspect import signature
 from typing import Any, Literal
 
 from thermocomp.core.exceptions import InputError
@@ -123,6 +124,16 @@ def method(name: str) -> Method:
         hint = f"; did you mean {near[0]}?" if near else "."
         raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
     return found
+
+
+def given(estimator: ThermalRegressor) -> Method:
+    """Return what an estimator with settings of its own is as a method: it takes all inputs."""
+    kind = type(estimator)
+    fits: Any = estimator
+    known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
+    takes = tuple(p for p in known if p in signature(fits.fit).parameters)
+    place = kind.__module__.removeprefix("thermocomp.models.")
+    return Method(kind.__name__, "", f"{place}.{kind.__name__}", speed="inputs", takes=takes)
 
 
 def expand(names: Sequence[str]) -> list[str]:

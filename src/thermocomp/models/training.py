@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import clone
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.methods import Method, method
+from thermocomp.models.methods import Method, given, method
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.samples import Samples
 
@@ -43,13 +44,15 @@ class Trained:
     r_squared: float
 
 
-def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support: Support = Support()) -> Trained:
+def train(
+    name: str | ThermalRegressor, samples: Samples, target: int, learn: BoolArray, *, support: Support = Support()
+) -> Trained:
     """Fit a method to some of the rows and freeze it.
 
     Parameters
     ----------
-    name : str
-        Of the method.
+    name : str or ThermalRegressor
+        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself.
     samples : Samples
     target : int
         Index into ``samples.targets``.
@@ -68,18 +71,18 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
     FitError
         Too few rows, or the method cannot be fitted to them.
     """
-    how = method(name)
+    how = method(name) if isinstance(name, str) else given(name)
     columns = [j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed"]
     if not columns:
-        raise FitError(f"{name}: there is no temperature to predict from")
+        raise FitError(f"{how.name}: there is no temperature to predict from")
     channel = samples.targets[target]
     seen = samples.valid & learn & np.isfinite(samples.deviations[:, target])
     if seen.sum() < 3:
         raise FitError(
-            f"{name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
+            f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
         )
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
-    estimator = how.build(speeds)
+    estimator = how.build(speeds) if isinstance(name, str) else clone(name)
     begin = time.perf_counter()
     rows = samples.valid if "dt" in how.takes else seen
     X, learned = samples.frame().iloc[rows, columns], seen[rows]
@@ -90,7 +93,7 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
     try:
         estimator.fit(X, y, **clock, **cycles)
     except ValueError as e:  # what scikit-learn raises for data it cannot use
-        raise FitError(f"{name} cannot be fitted to {channel.name}: {e}") from e
+        raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
     seconds = time.perf_counter() - begin
     r_squared = float(r2_score(y[learned], estimator.predict(X, **clock)[learned]))
     freeze = estimator.unfrozen if isinstance(estimator, UnfrozenRegressor) else estimator.freeze
@@ -101,7 +104,7 @@ def train(name: str, samples: Samples, target: int, learn: BoolArray, *, support
         support=support,
         provenance=_provenance(how, estimator, samples, seen),
     )
-    return Trained(name, estimator, model, seconds, r_squared)
+    return Trained(how.name, estimator, model, seconds, r_squared)
 
 
 def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen: BoolArray) -> Provenance:

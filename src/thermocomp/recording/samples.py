@@ -48,7 +48,9 @@ class Samples:
     hashes : tuple of str
         Fingerprint of each test: SHA-256 of its times and values.
     rezero : bool
-        Temperatures are counted from the first row of each test.
+        Temperatures are counted from the first row of each test, or from `zero`.
+    zero : ndarray of shape (n_tests, n_inputs), optional
+        What they are counted from, if it is not the first complete row of each test.
     """
 
     inputs: tuple[Channel, ...]
@@ -63,6 +65,7 @@ class Samples:
     cycle_names: tuple[str, ...]
     hashes: tuple[str, ...]
     rezero: bool = True
+    zero: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -79,6 +82,8 @@ class Samples:
 
     def reference(self) -> FloatArray:
         """Return what counts as zero, (n_tests, n_inputs): each test's first complete row, or 0 for absolute inputs."""
+        if self.zero is not None:
+            return np.where(self.rezeroed, self.zero, 0.0)
         zero = np.zeros((len(self.test_names), len(self.inputs)))
         for k in range(len(self.test_names)):
             rows = np.flatnonzero((self.test == k) & self.valid)
@@ -113,12 +118,14 @@ class Samples:
             self.cycle_names,
             self.hashes,
             self.rezero,
+            self.zero,
         )
 
     def only(self, names: Sequence[str]) -> "Samples":
         """Return the same rows with some of the inputs, in the order they had."""
         kept = [j for j, c in enumerate(self.inputs) if c.name in names]
-        return replace(self, inputs=tuple(self.inputs[j] for j in kept), values=self.values[:, kept])
+        zero = None if self.zero is None else self.zero[:, kept]
+        return replace(self, inputs=tuple(self.inputs[j] for j in kept), values=self.values[:, kept], zero=zero)
 
     def model_inputs(self, columns: Sequence[int], rows: BoolArray | IntArray) -> tuple[Input, ...]:
         """Describe inputs for a model fitted to `rows`: reference and trained range of each."""

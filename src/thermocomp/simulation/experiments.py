@@ -47,6 +47,9 @@ class SimulatedTest:
         What sensors and probes said; displacements are zero at the start but for the probes' noise.
     truth : ndarray of shape (n_rows, n_displacements)
         The displacements without noise and faults, in the order of their channels [um].
+    observables : ndarray of shape (n_rows, n_observables) or None
+        All that the machine tells of itself, less what it told at the start, if that was asked for: see
+        `thermocomp.simulation.volume`.
     """
 
     name: str
@@ -54,6 +57,7 @@ class SimulatedTest:
     channels: tuple[Channel, ...]
     values: FloatArray
     truth: FloatArray
+    observables: FloatArray | None = None
 
     @property
     def displacements(self) -> tuple[Channel, ...]:
@@ -62,7 +66,12 @@ class SimulatedTest:
 
 
 def simulate(
-    experiment: Experiment, *, seed: int = 0, sensor_noise: float | None = None, faults: Sequence[Fault] = ()
+    experiment: Experiment,
+    *,
+    seed: int = 0,
+    sensor_noise: float | None = None,
+    faults: Sequence[Fault] = (),
+    whole: bool = False,
 ) -> Iterator[SimulatedTest]:
     """Run the tests of an experiment, one after the other.
 
@@ -76,6 +85,8 @@ def simulate(
         not depend on it.
     faults : sequence of Fault
         Befall every test, beside those of the protocol.
+    whole : bool
+        Keep all that the machine tells of itself.
 
     Returns
     -------
@@ -95,7 +106,8 @@ def simulate(
 
     def test(programme: Programme) -> SimulatedTest:
         weather, noise = (np.random.default_rng(stream(seed, programme.name, what)) for what in ("weather", "noise"))
-        return run(machine, experiment.kit, programme, weather, noise, sensor_noise=sensor_noise, faults=faults)
+        options: dict[str, Any] = {"sensor_noise": sensor_noise, "faults": faults, "whole": whole}
+        return run(machine, experiment.kit, programme, weather, noise, **options)
 
     return map(test, experiment.programmes(seed))
 
@@ -109,6 +121,7 @@ def run(
     *,
     sensor_noise: float | None = None,
     faults: Sequence[Fault] = (),
+    whole: bool = False,
 ) -> SimulatedTest:
     """Run one test on a machine.
 
@@ -125,6 +138,8 @@ def run(
         Standard deviation of the temperature noise [degC]; the sensors' own if not given.
     faults : sequence of Fault
         Beside those of the programme.
+    whole : bool
+        Keep all that the machine tells of itself.
 
     Returns
     -------
@@ -146,7 +161,7 @@ def run(
     tick = programme.sampling / every
     drives = [s.drive for s in programme.segments for _ in range(round(s.duration / tick))]
 
-    state, sky, true = _soaked(machine, programme, weights, weather)
+    state, sky, true, at_start = _soaked(machine, programme, weights, weather)
     shift = np.array([i.cold for i in instruments]) - np.where(moves, true, 0.0)
     recorded = np.empty((len(time), len(sensors) + len(channels)))
     recorded[:, len(sensors) :] = driven
@@ -155,6 +170,7 @@ def run(
     felt = true
     recorded[0, : len(sensors)] = read(sensors, (felt + shift)[None], time[:1], noise)
     truth[0] = (true + shift)[moves]
+    told = np.zeros((len(time), len(machine.observables))) if whole else None
     block = max(BLOCK // every, 1) * every
     for first in range(0, len(drives), block):
         part = drives[first : first + block]
@@ -166,6 +182,8 @@ def run(
         rows = slice(1 + first // every, 1 + (first + len(part)) // every)
         recorded[rows, : len(sensors)] = read(sensors, followed[every - 1 :: every] + shift, time[rows], noise)
         truth[rows] = (values[every - 1 :: every] + shift)[:, moves]
+        if told is not None:
+            told[rows] = done.observables[every - 1 :: every] - at_start
 
     if programme.touch:
         idle = ~programme.touch.rows(time, driven[:, 0] == 0.0)
@@ -173,17 +191,20 @@ def run(
     channels = [*(s.channel for s in sensors), *channels]
     if programme.faults or faults:
         recorded = with_faults(time, channels, recorded, [*programme.faults, *faults])
-    return SimulatedTest(programme.name, time, tuple(channels), recorded, truth)
+    return SimulatedTest(programme.name, time, tuple(channels), recorded, truth, told)
 
 
 def _soaked(
     machine: VirtualMachine[S], programme: Programme, weights: FloatArray, weather: np.random.Generator
-) -> tuple[S, FloatArray, FloatArray]:
-    """Return the state in which a test begins, that of the weather, and what is true at each instrument."""
+) -> tuple[S, FloatArray, FloatArray, FloatArray]:
+    """Return the state in which a test begins, that of the weather, what is true at each instrument, and the machine's.
+
+    The last are its observables.
+    """
     climate = programme.climate
     state, sky = machine.init(climate.middle), climate.init(weather)
     begin = -sum(s.duration for s in programme.soak)
-    values = np.empty((1, weights.shape[1]))
+    values, told = np.empty((1, weights.shape[1])), np.empty(0)
     for segment in programme.soak:
         n_ticks = math.ceil(segment.duration / LONGEST_TICK)
         tick = segment.duration / n_ticks
@@ -191,9 +212,9 @@ def _soaked(
             n = min(BLOCK, n_ticks - first)
             sky, air = climate.air(sky, begin + first * tick, tick, n, weather)
             state, truth = machine.run(state, [segment.drive] * n, air, tick)
-            values = _values(truth, air, weights)
+            values, told = _values(truth, air, weights), truth.observables[-1].copy()
         begin += segment.duration
-    return state, sky, values[-1]
+    return state, sky, values[-1], told
 
 
 def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> FloatArray:

@@ -116,7 +116,7 @@ def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
     quantity = "angle" if probe.unit == "urad" else "displacement"
     channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
     drift = float(np.random.default_rng([*label.encode()]).uniform(-0.15, 0.15))
-    sensor = Sensor(channel) if perfect else Sensor(channel, noise=0.15, resolution=0.01, drift=drift)
+    sensor = Sensor(channel) if perfect else Sensor(channel, noise=probe.noise, resolution=0.01, drift=drift)
     return Instrument(sensor, probe.reads, cold=probe.cold)
 
 

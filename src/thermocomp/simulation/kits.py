@@ -8,9 +8,22 @@ from typing import TypeVar
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.simulation.axes import AXES, STATIONS
+from thermocomp.simulation.geometry import SQUARENESS
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.machine import Air
-from thermocomp.simulation.probes import NEST, SPINDLE, Probe, at_position, laser, pitch, station_name
+from thermocomp.simulation.probes import (
+    COMPONENTS,
+    NEST,
+    SPINDLE,
+    Probe,
+    at_position,
+    component,
+    laser,
+    pitch,
+    square,
+    station,
+    station_name,
+)
 
 T = TypeVar("T")
 
@@ -119,7 +132,7 @@ class Kit:
         return known[name]
 
     def probe(self, name: str | Mapping[str, float]) -> Probe:
-        """Return a probe by its name, such as ``z``, ``y_laser_250`` or ``z_at_400``, or by its weights.
+        """Return a probe by its name, such as ``z``, ``y_laser_250``, ``z_at_400`` or ``EXX_0``, or by its weights.
 
         Raises
         ------
@@ -135,6 +148,10 @@ class Kit:
             return self.probes[name]
         if name in self.nests.get("y_pitch", ()):
             return pitch(int(name.rpartition("_")[2]))
+        six = re.fullmatch(r"(E[XYZABC][XYZ])(?:_z(\d+))?_(\d+)", name) if self.top_speed else None
+        if six:
+            code, z, at = six.groups()
+            return component(code, float(at), *([float(z)] if z else []))
         found = re.fullmatch(r"([xyz])_(laser|at)_(\d+)", name) if self.top_speed else None
         if not found:
             raise unknown("probe", name, [*self.probes, *self.nests])
@@ -216,20 +233,31 @@ PLACES: dict[str, str] = {
     "air_floor": "environment, at the floor",
 }
 
+
+def _profile(code: str) -> tuple[str, ...]:
+    """Return the probes of a component at all stations of its axis."""
+    return tuple(f"{code}_{p}" for p in STATIONS[code[2].lower()])
+
+
 CENTRE = Kit(
     places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
     air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
-    probes=NEST | SPINDLE,
+    probes=NEST | SPINDLE | {code: square(code) for code in SQUARENESS},
     observables=(
         *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
         *(station_name(a, p) for a in AXES for p in STATIONS[a]),
         *(f"{what}@{p}" for what in ("zy", "ay") for p in STATIONS["y"]),
+        *(name for code in COMPONENTS for p in STATIONS[code[2].lower()] for name in station(code, p)),
     ),
     outfits={"all": tuple(PLACES), "usual": USUAL_PLACES, "chen": CHEN_PLACES, "hwang": HWANG_PLACES},
     nests={
         "nest": tuple(NEST),
         **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES},
         "y_pitch": tuple(f"y_pitch_{p}" for p in STATIONS["y"]),
+        **{code: _profile(code) for code in COMPONENTS},
+        **{f"EYX_z{z}": tuple(f"EYX_z{z}_{p}" for p in STATIONS["x"]) for z in STATIONS["z"]},
+        **{f"{a.upper()}_six": tuple(n for c in COMPONENTS if c[2] == a.upper() for n in _profile(c)) for a in AXES},
+        "squareness": tuple(SQUARENESS),
     },
     loads={
         "tool_tip": "cutting edge: what of the cutting power goes into the tool",

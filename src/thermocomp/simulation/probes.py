@@ -3,18 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.axes import STATIONS, TEST_POSITION, TRAVEL
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL, between
+from thermocomp.simulation.geometry import SQUARENESS, cold, cold_profile
 
 #: distance of the two probes of X, and of Y, along the test bar [m]
 PROBE_DISTANCE = 0.1
-#: cold positioning error of Y in mm, for y in mm: Chen 1996, Eq. 6 (C-22), constant first; X and Z have none
-CHEN_COLD_PROFILE = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
-
-
-def cold_profile(position: float) -> float:
-    """Return the geometric positioning error of Y [um] at a position [mm]."""
-    return 1e3 * sum(c * position**k for k, c in enumerate(CHEN_COLD_PROFILE))
 
 
 @dataclass(frozen=True)
@@ -30,12 +26,15 @@ class Probe:
     cold : float
         Its value in the state in which the test begins, in its unit.
     unit : {'um', 'urad'}
+    noise : float
+        Standard deviation, in its unit.
     """
 
     place: str
     reads: Mapping[str, float]
     cold: float = 0.0
     unit: str = "um"
+    noise: float = 0.15
 
 
 def positioning(axis: str, position: float) -> dict[str, float]:
@@ -85,8 +84,8 @@ def laser(axis: str, position: float) -> Probe:
     # The reflector stands at the tool point. A laser measures each profile from its first position: the shift of the
     # origin is not in it.
     reads = _summed((1.0, positioning(axis, position)), (-1.0, positioning(axis, 0.0)))
-    cold = cold_profile(position) if axis == "y" else 0.0
-    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, cold)
+    geometry = float(cold_profile(position)) if axis == "y" else 0.0
+    return Probe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
 
 
 def pitch(position: int) -> Probe:
@@ -118,6 +117,71 @@ def at_position(axis: str, position: float) -> Probe:
     """Return a displacement probe at the tip of the test bar, with the axis at a position [mm]."""
     where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
     return Probe(where, touched(axis, {axis: position}))
+
+
+#: what an axis does, along or about which axis; the codes of ISO 230-1 end with the axis
+MOTIONS = {
+    "EX": "motion along X",
+    "EY": "motion along Y",
+    "EZ": "motion along Z",
+    "EA": "turn about X",
+    "EB": "turn about Y",
+    "EC": "turn about Z",
+}
+#: the 18 components of the axes, in the order of ISO 230-1
+COMPONENTS = tuple(f"{motion}{axis.upper()}" for axis in AXES for motion in MOTIONS)
+#: noise of the laser with six degrees of freedom [um, urad]
+SIX_NOISE = {"um": 0.3, "urad": 0.5}
+#: what heat does not do: the bed knows no right and left, and at the test position X turns about X alone
+STILL = frozenset(f"{code}Z@{p}" for code in ("EX", "EB", "EC") for p in STATIONS["z"]) | {"EBX@300", "ECX@300"}
+
+
+def station(code: str, position: int) -> tuple[str, ...]:
+    """Return the name of the observable that is a component at a station [mm]; none if the machine does not do this."""
+    name = f"{code}@{position}"
+    return () if name in STILL else (name,)
+
+
+def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Probe:
+    """Return a component of an axis as a laser with six degrees of freedom, and levels, read it.
+
+    They were set to zero at the test position, when the test began. The tool point is that of the test bar, and the
+    other axes stand at `TEST_POSITION`.
+
+    Parameters
+    ----------
+    code : str
+        Of ISO 230-1, such as ``EYX``.
+    position : float
+        Of its axis [mm].
+    z : float
+        Where Z stands instead [mm]: the bed gives way under the column. What the turns do by the lever is taken off.
+
+    Raises
+    ------
+    SettingError
+        A position is beyond the travel.
+    """
+    axis, unit = code[2].lower(), "um" if code[1] in "XYZ" else "urad"
+    for a, p in ((axis, position), ("z", z)):
+        if not 0.0 <= p <= TRAVEL[a]:
+            raise SettingError(f"{a.upper()} = {p:g} mm is beyond the travel from 0 to {TRAVEL[a]:g} mm")
+    weights = between(axis, [position])[0]
+    if unit == "um":
+        # A laser counts from where it was set to zero, again in each run; a level does not.
+        weights = weights - between(axis, [TEST_POSITION[axis]])[0]
+    found = zip(STATIONS[axis], weights.tolist(), strict=True)
+    reads = {name: w for p, w in found if w for name in station(code, p)}
+    point = np.array([TEST_POSITION["x"], TEST_POSITION["y"], z], dtype=np.float64)
+    point[AXES.index(axis)] = position
+    aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
+    words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
+    return Probe(words, reads, float(cold(code, point)), unit, SIX_NOISE[unit])
+
+
+def square(code: str) -> Probe:
+    """Return the squareness of two axes, by an artefact; the thermal part is in the slopes of the straightness."""
+    return Probe(f"{code}: squareness, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
 
 
 #: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L

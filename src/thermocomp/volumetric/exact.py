@@ -50,7 +50,8 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
     tilt = np.concatenate([values[..., INDEX["A0C"] : INDEX["B0C"] + 1], np.zeros((*shape, 1))], axis=-1)
     chain = chain @ _shifted(np.broadcast_to(spindle - at, (*shape, 3)) + drift) @ _turned(tilt)
     there = chain @ np.append(tip - spindle, 1.0)
-    return np.asarray(1e3 * (there[..., :3] - points - tip))
+    wanted = points * np.array([float(a in machine.structure.axes) for a in "XYZ"]) + tip
+    return np.asarray(1e3 * (there[..., :3] - wanted))
 
 
 def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) -> FloatArray:

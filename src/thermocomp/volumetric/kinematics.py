@@ -6,6 +6,8 @@ an instrument between table and spindle reads. A turn e moves the tool's tip by 
 translations were measured to the tip.
 """
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -80,25 +82,13 @@ class Kinematics:
         tilt : ndarray of shape (..., 3)
             Of the tool about X, Y, Z [urad].
         """
+        # the error is a sum of products: value of a component times 1, x, y or z
         shape = np.broadcast_shapes(values.shape[:-1], points.shape[:-1])
-        error, tilt = np.zeros((*shape, 3)), np.zeros((*shape, 3))
-        for name in self.axes:
-            first = INDEX[f"EX{name}"]
-            self._add(error, tilt, values[..., first : first + 6], self.lever(name, points, tool))
-            if name != "Z":
-                origin = INDEX[f"XO{name}"]
-                error += values[..., origin : origin + 3]
-        spindle = INDEX["X0C"]
-        error += values[..., spindle : spindle + 3]
-        turn = np.zeros((*values.shape[:-1], 3))
-        turn[..., :2] = values[..., INDEX["A0C"] : INDEX["B0C"] + 1]
-        tilt += turn
-        error += _LEVER * np.cross(turn, self._tool(tool) - np.asarray(self.machine.spindle_tool))
-        for code, along, towards, sign in (("C0Y", "Y", 0, -1.0), ("B0Z", "Z", 0, 1.0), ("A0Z", "Z", 1, -1.0)):
-            if along in self.axes:
-                way = points[..., "XYZ".index(along)] - self.axes[along].reference_position
-                error[..., towards] += sign * _LEVER * values[..., INDEX[code]] * way
-        return error, tilt
+        parts = values @ self._at_tool(tool).transpose(1, 0, 2).reshape(len(COMPONENTS), 12)
+        error = np.broadcast_to(parts[..., :3], (*shape, 3)).copy()
+        for k in range(3):
+            error += points[..., k : k + 1] * parts[..., 3 * k + 3 : 3 * k + 6]
+        return error, np.broadcast_to(values @ _TILT, (*shape, 3)).copy()
 
     def sensitivity(self, point: ArrayLike, tool: ArrayLike | None = None) -> FloatArray:
         """Return what one um or one urad of each component does to the tool's tip.
@@ -115,18 +105,58 @@ class Kinematics:
         ndarray of shape (32, 3)
             [um per um, um per urad]
         """
-        return self.synthesize(np.eye(len(COMPONENTS)), np.asarray(point, dtype=np.float64), tool)[0]
+        return np.asarray(np.tensordot([1.0, *np.asarray(point, dtype=np.float64)], self._at_tool(tool), 1))
+
+    def _at_tool(self, tool: ArrayLike | None) -> FloatArray:
+        """Return what a component does to the tip, per 1, x, y and z, of shape (4, 32, 3) [um per um, urad, mm]."""
+        if tool is None:
+            return self._own
+        maps = self._maps[:4].copy()
+        maps[0] += np.tensordot(np.asarray(tool, dtype=np.float64), self._maps[4:], 1)
+        return maps
+
+    @cached_property
+    def _own(self) -> FloatArray:
+        return self._at_tool(self.machine.tool)
+
+    @cached_property
+    def _maps(self) -> FloatArray:
+        """What a component does to the tip, per 1, x, y, z and the three coordinates of the tool: (7, 32, 3)."""
+        maps = np.zeros((7, len(COMPONENTS), 3))
+        once, position, tool = maps[0], maps[1:4], maps[4:]
+        for name in self.axes:
+            shift, turn = INDEX[f"EX{name}"], INDEX[f"EA{name}"]
+            once[shift : shift + 3] = np.eye(3)
+            once[turn : turn + 3] = _turning(-self.reference(name))
+            for k, unit in enumerate(np.eye(3)):
+                tool[k, turn : turn + 3] = _turning(unit)
+                if "XYZ"[k] in self.structure.beyond(name):
+                    position[k, turn : turn + 3] = _turning(unit)
+            if name != "Z":
+                once[INDEX[f"XO{name}"] : INDEX[f"XO{name}"] + 3] = np.eye(3)
+        once[INDEX["X0C"] : INDEX["X0C"] + 3] = np.eye(3)
+        once[INDEX["A0C"] : INDEX["B0C"] + 1] = _turning(-np.asarray(self.machine.spindle_tool))[:2]
+        for k, unit in enumerate(np.eye(3)):
+            tool[k, INDEX["A0C"] : INDEX["B0C"] + 1] = _turning(unit)[:2]
+        for code, along, towards, sign in (("C0Y", "Y", 0, -1.0), ("B0Z", "Z", 0, 1.0), ("A0Z", "Z", 1, -1.0)):
+            if along in self.axes:
+                position["XYZ".index(along), INDEX[code], towards] = sign * _LEVER
+                once[INDEX[code], towards] = -sign * _LEVER * self.axes[along].reference_position
+        return maps
 
     def _tool(self, tool: ArrayLike | None) -> FloatArray:
         return np.asarray(self.machine.tool if tool is None else tool, dtype=np.float64)
 
-    @staticmethod
-    def _add(error: FloatArray, tilt: FloatArray, six: FloatArray, lever: FloatArray) -> None:
-        """Add what an axis does: three translations, three turns with their levers."""
-        error += six[..., :3]
-        tilt += six[..., 3:]
-        a, b, c = (_LEVER * six[..., k] for k in (3, 4, 5))
-        x, y, z = (lever[..., k] for k in range(3))
-        error[..., 0] += b * z - c * y
-        error[..., 1] += c * x - a * z
-        error[..., 2] += a * y - b * x
+
+def _turning(lever: FloatArray) -> FloatArray:
+    """Return what 1 urad about X, Y and Z does at the end of a lever [um], one row each."""
+    return np.asarray(_LEVER * np.cross(np.eye(3), lever))
+
+
+#: what a component turns the tool by about X, Y and Z; a squareness moves a guide and turns nothing
+_TILT = np.array(
+    [
+        [float(c.unit == "urad" and c.group != "squareness" and letter in c.code[:2]) for letter in "ABC"]
+        for c in COMPONENTS
+    ]
+)

@@ -7,7 +7,7 @@ a point by ``-a z`` in y and ``a y`` in z, ``b`` about Y by ``b z`` in x, ``c`` 
 points to -Z, right is +X, up is +Y; all is tool minus workpiece [um, urad] for 1 K or 1 K/m.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -23,6 +23,8 @@ from thermocomp.simulation.fem.materials import data, material
 from thermocomp.simulation.fem.part import Part
 
 FloatArray = NDArray[np.float64]
+#: from a place x, y, z [m] to the displacement there [um]
+Displacement = Callable[[FloatArray], FloatArray]
 
 TABLE = data("centre.toml")
 COLUMN, BED, LENGTHS = TABLE["column"], TABLE["bed"], TABLE["lengths"]
@@ -268,3 +270,99 @@ def test_a_warm_spindle_grows_out_of_its_flange_towards_the_workpiece(machine: M
     assert found["nose"] == pytest.approx(nose, rel=0.02)
     assert found["tip"] == pytest.approx(tip, rel=0.02)
     expect(found, {"z": -found["tip"], "tip": found["tip"], "nose": found["nose"]}, rel=1e-9)
+
+
+def shifted(u: Displacement, at: FloatArray, d: float = 1e-4) -> tuple[FloatArray, FloatArray]:
+    """Return a guide's displacement and its turn: slopes of its height along Z and X, and of its line along X."""
+    grad = np.array([(u(at + d * e) - u(at - d * e)) / (2.0 * d) for e in np.eye(3)])  # grad[j, i] = du_i / dx_j
+    return u(at), np.array([-grad[2, 1], -grad[0, 2], grad[0, 1]])
+
+
+def crowned(r: FloatArray) -> FloatArray:
+    """T = y from the middle of the bed's height; the mounts stay."""
+    x, z, y = r[0], r[2], r[1] - BED["height"] / 2.0
+    held = BED["mount"] ** 2 - (BED["height"] / 2.0) ** 2
+    return IRON * np.array([x * y, (y**2 - x**2 - z**2 + held) / 2.0, z * y])
+
+
+def bowed(r: FloatArray) -> FloatArray:
+    """T = z."""
+    x, y, z = r
+    return IRON * np.array([x * z, y * z, (z**2 - x**2 - y**2) / 2.0])
+
+
+@pytest.mark.parametrize("u", [crowned, bowed])
+def test_the_table_rides_on_guides_that_bend(machine: Machine, u: Displacement) -> None:
+    rise = machine.bed_y - BED["height"] / 2.0 if u is crowned else machine.bed_z
+    found = machine.moved(bed=rise)
+    middle = np.array([0.0, BED["height"], MIDDLE])
+    for p in STATIONS["x"]:
+        # the table's middle is on the left while X is beyond its middle; the workpiece is always before the tool
+        table = middle - [(p - TEST_POSITION["x"]) / 1e3, 0.0, 0.0]
+        (_, up, back), turn = shifted(u, table)
+        screw = u(middle + np.array([LENGTHS["bearing_x"], 0.0, 0.0]))[0]
+        workpiece = np.array([middle[0] - table[0], HEIGHT, LENGTHS["table"]])
+        moved = np.array([screw, up, back]) + np.cross(turn, workpiece)
+        expected = dict(zip("XYZ", -moved, strict=True)) | dict(zip("ABC", -turn, strict=True))
+        # two lines of carriages before and behind its middle
+        expected["Y"] += IRON / 2.0 * TABLE_GUIDE**2 if u is crowned else 0.0
+        # what the table's guides do along Z is in the way from them to the screw of Z
+        expected["Z"] += back - _bow(table[0], u)
+        for motion, value in expected.items():
+            assert found.get(f"E{motion}X@{p}", 0.0) == pytest.approx(value, rel=1e-2, abs=0.02), motion
+
+
+def _bow(x: float, u: Displacement) -> float:
+    """Displacement along Z of the table's guides against that in their middle."""
+    middle = np.array([0.0, BED["height"], MIDDLE])
+    return float(u(middle + np.array([x, 0.0, 0.0]))[2] - u(middle)[2])
+
+
+def test_the_column_rides_on_guides_that_bend(machine: Machine) -> None:
+    found = machine.moved(bed=machine.bed_y - BED["height"] / 2.0)
+    for p in STATIONS["z"]:
+        foot = FOOT + (p - TEST_POSITION["z"]) / 1e3
+        tilt = IRON * foot
+        assert found[f"EAZ@{p}"] == pytest.approx(tilt, rel=1e-2)
+        assert found[f"EZZ@{p}"] - found["EZZ@300"] == pytest.approx(HEIGHT * IRON * (foot - FOOT), rel=1e-2, abs=1e-6)
+        lower = IRON / 2.0 * (foot**2 - FOOT**2)
+        assert found[f"EYZ@{p}"] - found["EYZ@300"] == pytest.approx(
+            OVERHANG * IRON * (foot - FOOT) - lower, rel=1e-2, abs=2e-2
+        )
+    assert not any(name.startswith(("EXZ", "EBZ", "ECZ")) for name in found)
+
+
+def test_the_headstock_rides_on_a_column_that_bends_and_twists(machine: Machine) -> None:
+    front, right = machine.moved(column=-machine.column_z), machine.moved(column=machine.right)
+    for p in STATIONS["y"]:
+        at = COLUMN["first"] + p / 1e3
+        assert front[f"EAY@{p}"] == pytest.approx(IRON * at, rel=1e-2)
+        lift = IRON * FRONT * COLUMN["bearing"]
+        assert front[f"EYY@{p}"] == pytest.approx(lift + REACH * IRON * at, rel=1e-2)
+        bent = IRON / 2.0 * (at**2 - COLUMN["test"] ** 2) + MOUNT * IRON * (at - COLUMN["test"])
+        assert front[f"EZY@{p}"] - front["EZY@250"] == pytest.approx(bent, rel=1e-2, abs=1e-2)
+        assert right[f"ECY@{p}"] == pytest.approx(IRON * at, rel=1e-2)
+        assert right[f"EBY@{p}"] == pytest.approx(IRON * FRONT, rel=1e-2)
+        aside = -IRON * at**2 / 2.0 - IRON * at * MOUNT - IRON * FRONT * REACH
+        assert right[f"EXY@{p}"] == pytest.approx(aside, rel=1e-2)
+        assert [front[f"E{m}Y@{p}"] for m in "XBC"] == pytest.approx([0.0] * 3, abs=1e-6)
+        assert [right[f"E{m}Y@{p}"] for m in "YZA"] == pytest.approx([0.0] * 3, abs=1e-6)
+
+
+def test_at_the_test_position_the_axes_and_the_spindle_make_the_tool_point(machine: Machine) -> None:
+    rng = np.random.default_rng(0)
+    fields: dict[str, FloatArray | float] = {"bed": rng.normal(size=machine.bed_y.size), "table": 1.3}
+    fields |= {f"{axis}_screw": float(rng.normal()) for axis in "xyz"}
+
+    def axes(found: dict[str, float], motion: str) -> float:
+        return sum(found.get(f"E{motion}{a.upper()}@{p}", 0.0) for a, p in TEST_POSITION.items())
+
+    # neither headstock nor spindle is warm, nor the column's guide
+    found = machine.moved(**fields)
+    assert [axes(found, m) for m in "XYZAB"] == pytest.approx([found[n] for n in "xyzab"], abs=1e-8)
+    found = machine.moved(column=rng.normal(size=machine.right.size))
+    assert [axes(found, m) for m in "YZAB"] == pytest.approx([found[n] for n in "yzab"], abs=1e-8)
+    # what is left is the spindle's own
+    found = machine.moved(headstock_front=1.0, spindle=0.7)
+    assert [axes(found, m) for m in "XYZAB"] == [0.0] * 5
+    assert found["z"] != 0.0

@@ -1,7 +1,8 @@
 """The bed as a sheet in plane stress on levelling mounts: warmer on top, it crowns and lets the column lean."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,13 +61,15 @@ class Bed:
     shoe: float
     cells: tuple[int, int] = (28, 5)
 
-    def part(self, name: str, material: Material) -> Part:
+    def part(self, name: str, material: Material, feet: Mapping[int, float] = MappingProxyType({})) -> Part:
         """Cut the bed into finite elements.
 
         Parameters
         ----------
         name : str
         material : Material
+        feet : mapping of int to float
+            z of the column's middle with the Z axis at each position [mm: m].
 
         Returns
         -------
@@ -74,9 +77,10 @@ class Bed:
             Surfaces: ``outside`` (sides, front, rear, and the top from the column on, to the room), ``work`` (top in
             front of the column, to the work space), ``bottom`` (to the floor). Patches: ``front rear`` (top under table
             and column), ``table shoe_front shoe_rear`` (guides), ``bearing`` (of Z), ``mount_front mount_rear``,
-            ``hydraulics``. Observables against the mounts [um, urad]: ``z`` (bearing of Z away from the table), ``y``
-            (column's carriages above the table's guides), ``a_foot a_table`` (tilt about X there), ``foot`` (growth
-            from the column's front carriage to its rear one).
+            ``hydraulics``, ``under`` (underside below the table). Observables against the mounts [um, urad]: ``z``
+            (bearing of Z away from the table), ``y`` (column's carriages above the table's guides), ``a_foot a_table``
+            (tilt about X there), ``foot`` (growth from the column's front carriage to its rear one), ``y_table`` (lift
+            of the table's guides), ``yz@P az@P`` (lift and tilt of the column's carriages with Z at P mm).
         """
         space = self.space()
         front = self._front()
@@ -128,6 +132,7 @@ class Bed:
                 "hydraulics": space.edge_mean(
                     lambda x: x[0] > self.length / 2.0 - 1e-9, spot(1, self.height / 2.0 + self.hydraulics, 0.2)
                 ),
+                "under": under(self.table),
             },
             body.observables(
                 {
@@ -136,6 +141,9 @@ class Bed:
                     "a_foot": tilt(self.foot, self.shoe),
                     "a_table": tilt(self.table, _GUIDE),
                     "foot": body.row(top(self.foot + self.shoe, on=sheet) - top(self.foot - self.shoe, on=sheet), 0),
+                    "y_table": lift(self.table, _GUIDE),
+                    **{f"yz@{p}": lift(at, self.shoe) for p, at in feet.items()},
+                    **{f"az@{p}": tilt(at, self.shoe) for p, at in feet.items()},
                 },
                 [
                     Tie(body.row(under(-self.mount, sheet), 1)),

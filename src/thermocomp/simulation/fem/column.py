@@ -87,8 +87,8 @@ class Column:
             (carriages of Z; both), ``bearing`` (of Y), ``cabinet`` (rear wall). Observables [um, urad] against the
             carriages of Z and the nut of Z between them: at the headstock's guide ``z a`` (bending, tilt about X: mean
             of the sheets) and ``x c b`` (bending to the right, roll about Z, yaw about Y), ``lift`` (the bearing of Y),
-            ``foot`` (growth from the front carriage to the rear one), ``zy@P ay@P`` (``z`` and ``a`` with the headstock
-            at Y = P mm).
+            ``foot`` (growth from the front carriage to the rear one), ``zy@P ay@P xy@P by@P cy@P`` (``z a x b c`` with
+            the headstock at Y = P mm).
 
         Notes
         -----
@@ -227,21 +227,30 @@ class Column:
             """Return the lift of the sections, integrated up the sheet with a weight."""
             return body.row(sheet.load(lambda x: on(side)(x) * weight(x)) / section, 1)
 
-        at_test = spot(1, self.test, 2.0 * cell)
+        def roll(at: float) -> FloatArray:
+            near = spot(1, at, 2.0 * cell)
+            return unlike(lambda s: lifted(s, lambda x: near(x) / (2.0 * cell)))
+
+        def aside(at: float) -> FloatArray:
+            # The step at that height is spread over an element: a jump within an element cannot be integrated.
+            return -unlike(lambda s: lifted(s, lambda x: np.clip((at - x[1]) / cell + 0.5, 0.0, 1.0)))
+
         rows = {
             "z": both(lambda s: guide(s, self.test)[0]),
             "a": both(lambda s: guide(s, self.test)[1]),
             "b": -unlike(lambda s: guide(s, self.test)[0]),
-            "c": unlike(lambda s: lifted(s, lambda x: at_test(x) / (2.0 * cell))),
-            # The step at the test's height is spread over an element: a jump within an element cannot be integrated.
-            "x": -unlike(lambda s: lifted(s, lambda x: np.clip((self.test - x[1]) / cell + 0.5, 0.0, 1.0))),
+            "c": roll(self.test),
+            "x": aside(self.test),
             "lift": both(lambda s: body.row(front(s, self.bearing), 1)),
             "foot": both(lambda s: body.row(self._shoe(s, self.shoe, sheet) - self._shoe(s, -self.shoe, sheet), 0)),
         }
         for p in positions:
-            (right, tilt_right), (left, tilt_left) = (guide(s, self.first + p / 1000.0) for s in _SHEETS)
+            at = self.first + p / 1000.0
+            (right, tilt_right), (left, tilt_left) = (guide(s, at) for s in _SHEETS)
             rows[f"zy@{p}"] = (right + left) / 2.0
             rows[f"ay@{p}"] = (tilt_right + tilt_left) / 2.0
+            rows[f"xy@{p}"], rows[f"cy@{p}"] = aside(at), roll(at)
+            rows[f"by@{p}"] = -(right - left) / self.width
         ties = []
         for s in _SHEETS:
             ties += [Tie(body.row(self._shoe(s, at, sheet), 1)) for at in (self.shoe, -self.shoe)]

@@ -11,7 +11,7 @@ from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, Link, 
 from thermocomp.simulation.fem.bed import Bed
 from thermocomp.simulation.fem.column import Column
 from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.reduction import reduce
+from thermocomp.simulation.fem.reduction import basis, project, reduce
 from thermocomp.simulation.fem.screw import Screw
 from thermocomp.simulation.fem.spindle import spindle
 from thermocomp.simulation.fem.toolholder import toolholder
@@ -38,7 +38,8 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
         (``a b``: tilt of the spindle about X and Y against the table); ``nose tip`` (growth of the spindle out of its
         flange); ``xx@P yy@P zz@P`` (what an axis at P mm contributes to the tool point along itself: its drive, for Y
         with the pitch of its guide); ``zy@P`` (what Y at P mm contributes to z); ``ay@P`` (pitch of the headstock with
-        Y at P mm); ``slide`` (how far the column's foot grows against the bed).
+        Y at P mm); ``slide`` (how far the column's foot grows against the bed); then the components of the axes,
+        ``EXX@P`` ..., see `_components`.
     """
     table = data("centre.toml") if table is None else table
     lengths = table["lengths"]
@@ -52,7 +53,11 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
         [
             spindle(),
             column.part("column", material(table["column"]["material"]), STATIONS["y"]),
-            bed.part("bed", material(table["bed"]["material"])),
+            bed.part(
+                "bed",
+                material(table["bed"]["material"]),
+                {p: table["bed"]["bearing"] - screws["z"].distance(p) for p in STATIONS["z"]},
+            ),
             *(
                 screw.part(f"{axis}_screw", material(table["screw"][axis]["material"]), STATIONS[axis])
                 for axis, screw in screws.items()
@@ -66,7 +71,7 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
         [Link(a, b, value) for a, others in table["link"].items() for b, value in others.items()],
         table["input"] | hats,
         table["place"],
-        _observables(parts, table, column, foot - tool),
+        _observables(parts, table, column, foot - tool) | _components(parts, table, column, bed),
         THETAS,
     )
 
@@ -108,7 +113,11 @@ def reduced_centre() -> ReducedModel:
         | {f"{axis}_screw_{k}": mix["screws"] for axis in STATIONS for k in range(N_HATS) if "screws" in mix}
         for mix in settings["mix"]
     ]
-    return reduce(centre(), settings["size"], mixes, settings["regime"])
+    full = centre()
+    # The basis answers for what is measured at the test position; the components of the axes are sums of the same
+    # displacements elsewhere, and take it as it is.
+    main = replace(full, observables={name: row for name, row in full.observables.items() if name[0] != "E"})
+    return project(full, basis(main, settings["size"], mixes, settings["regime"]))
 
 
 def reduced_tool() -> ReducedModel:
@@ -192,3 +201,55 @@ def _observables(parts: Assembly, table: dict[str, Any], column: Column, overhan
         **{f"ay@{p}": of("column", f"ay@{p}") for p in STATIONS["y"]},
         "slide": of("column", "foot") - of("bed", "foot"),
     }
+
+
+def _components(parts: Assembly, table: dict[str, Any], column: Column, bed: Bed) -> dict[str, FloatArray]:
+    """Compose what each axis does where it stands: its six components, tool's side against workpiece's side.
+
+    They hold at the tip of the test bar while the other axes stand at `TEST_POSITION`: what an axis turns about there.
+    Z has three, in the plane of the bed: that sheet knows no right and left. X turns at `TEST_POSITION` about X alone.
+    """
+    lengths = table["lengths"]
+    iron = 1e6 * material(table["column"]["material"]).expansion
+
+    def of(part: str, name: str) -> FloatArray:
+        return parts.observable(part, name)
+
+    high, behind = lengths["mount"], lengths["table"]
+    overhang = bed.foot - bed.table - behind
+    height, reach = column.test + high, overhang - column.depth / 2.0
+    under, workpiece = of("bed", "a_table"), parts.place("table")
+    bearing_x = iron * lengths["bearing_x"] * parts.place("bed.table")
+    # The bed bends as a free beam across: warm on top it crowns along X, warm at its rear its guides of X are bowed.
+    crown = iron / bed.height * (parts.place("bed.front") - parts.place("bed.under"))
+    bow = iron / (bed.foot - bed.table) * (parts.place("bed.rear") - parts.place("bed.front"))
+    rows: dict[str, FloatArray] = {}
+    for p in STATIONS["x"]:
+        # The table is on the other side of the middle, and the workpiece where the tool is.
+        q = (p - TEST_POSITION["x"]) / 1000.0
+        rows |= {
+            f"EXX@{p}": of("x_screw", f"at@{p}") - bearing_x + q * (height * crown + behind * bow),
+            f"EYX@{p}": behind * under - of("bed", "y_table") - iron * height * workpiece - q**2 / 2.0 * crown,
+            f"EZX@{p}": -height * under - iron * behind * workpiece - q**2 / 2.0 * bow,
+            f"EAX@{p}": -under,
+        }
+        if q:
+            rows |= {f"EBX@{p}": q * bow, f"ECX@{p}": -q * crown}
+    for p in STATIONS["y"]:
+        a, b, c = (of("column", f"{turn}y@{p}") for turn in "abc")
+        rows |= {
+            f"EXY@{p}": of("column", f"xy@{p}") - high * c - reach * b,
+            f"EYY@{p}": of("column", "lift") - of("y_screw", f"at@{p}") + reach * a,
+            f"EZY@{p}": of("column", f"zy@{p}") + high * a,
+            f"EAY@{p}": a,
+            f"EBY@{p}": b,
+            f"ECY@{p}": c,
+        }
+    for p in STATIONS["z"]:
+        foot = of("bed", f"az@{p}")
+        rows |= {
+            f"EYZ@{p}": of("bed", f"yz@{p}") + overhang * foot,
+            f"EZZ@{p}": of("bed", "z") - of("z_screw", f"at@{p}") + height * foot,
+            f"EAZ@{p}": foot,
+        }
+    return rows

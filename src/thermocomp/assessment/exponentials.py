@@ -1,0 +1,149 @@
+"""One or two exponentials through a curve that settles, by least squares."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from thermocomp.models.numerics.leastsquares import effective_sample_size
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """One term of a fit: ``amplitude (1 - exp(-t / tau))``.
+
+    Parameters
+    ----------
+    amplitude, tau : float
+        [unit of the channel], [s].
+    amplitude_error, tau_error : float
+        Their standard errors.
+    """
+
+    amplitude: float
+    tau: float
+    amplitude_error: float
+    tau_error: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A curve of one or two exponentials.
+
+    Parameters
+    ----------
+    start : float
+        Value at the start [unit].
+    terms : tuple of Exponential
+        The faster first.
+    r_squared : float
+    rms : float
+        Of the residual [unit].
+    duration : float
+        Of what it was fitted to [s].
+    """
+
+    start: float
+    terms: tuple[Exponential, ...]
+    r_squared: float
+    rms: float
+    duration: float
+
+    def __call__(self, t: FloatArray) -> FloatArray:
+        """Return the curve at times since the start [s]."""
+        return np.asarray(self.start + sum(e.amplitude * -np.expm1(-t / e.tau) for e in self.terms))
+
+    @property
+    def final(self) -> float:
+        """Value it tends to [unit]."""
+        return self.start + sum(e.amplitude for e in self.terms)
+
+    @property
+    def reliable(self) -> bool:
+        """True if no time constant is longer than the phase, and none less sure than half of itself."""
+        return all(e.tau <= self.duration and e.tau_error <= 0.5 * e.tau for e in self.terms)
+
+
+def fit(t: FloatArray, y: FloatArray) -> tuple[Fit | None, Fit | None]:
+    """Fit one and two exponentials by least squares.
+
+    Time constants are sought between the shortest interval and ten times the duration; amplitudes follow from them
+    (they are linear), so that the search has one or two unknowns and cannot get lost. Standard errors count the
+    residual as so many independent rows as its autocorrelation leaves: neighbouring rows of a drift are almost the
+    same.
+
+    Parameters
+    ----------
+    t : ndarray of shape (n_rows,)
+        Since the start, rising [s].
+    y : ndarray of shape (n_rows,)
+
+    Returns
+    -------
+    one : Fit or None
+    two : Fit or None
+        None if the second exponential is not called for: BIC does not fall by it, or the two time constants are nearer
+        than a factor of two, or an amplitude is below twice its standard error.
+    """
+    bounds = (float(np.log(np.diff(t).min())), float(np.log(10.0 * t[-1])))
+    grid = np.linspace(*bounds, 16)
+    one = _least_squares(t, y, [(g,) for g in grid], bounds)
+    if one is None or one.r_squared > 1.0 - 1e-12:
+        return one, None
+    two = _least_squares(t, y, list(combinations(grid[::2], 2)), bounds)
+    if two is None:
+        return one, None
+    fast, slow = two.terms
+    n = effective_sample_size(y - two(t))
+    called_for = n * 2.0 * np.log(one.rms / max(two.rms, 1e-300)) > 2.0 * np.log(n)
+    apart = slow.tau > 2.0 * fast.tau
+    sure = all(abs(e.amplitude) > 2.0 * e.amplitude_error for e in two.terms)
+    return one, two if called_for and apart and sure else None
+
+
+def _least_squares(
+    t: FloatArray, y: FloatArray, starts: list[tuple[float, ...]], bounds: tuple[float, float]
+) -> Fit | None:
+    """Fit as many exponentials as a start has logarithms of time constants."""
+    k = len(starts[0])
+    if len(y) < 2 * k + 3:
+        return None
+    residual = _residual(t, y)
+    best = min(starts, key=lambda s: float(np.sum(residual(np.array(s)) ** 2)))
+    low, high = bounds
+    found = least_squares(
+        residual, np.clip(best, low + 1e-9, high - 1e-9), bounds=bounds, x_scale=1.0, xtol=1e-13, ftol=1e-13, gtol=None
+    )
+    tau = np.exp(np.sort(found.x))
+    decay = np.exp(-t[:, None] / tau)
+    design = np.column_stack([np.ones(len(t)), 1.0 - decay])
+    level, *amplitudes = np.linalg.lstsq(design, y, rcond=None)[0]
+    left = y - design @ [level, *amplitudes]
+    # rows that depend on each other count for fewer: the sum of squares is shared among the independent ones
+    variance = float(left @ left) / max(effective_sample_size(left) - 2 * k - 1, 1.0)
+    jacobian = np.column_stack([design, -np.array(amplitudes) * decay * t[:, None] / tau**2])
+    size = np.linalg.norm(jacobian, axis=0)
+    errors = np.full(2 * k + 1, np.inf)
+    if (size > 0).all() and np.linalg.cond(jacobian / size) < 1e10:
+        scaled = jacobian / size
+        errors = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)) * variance) / size
+    terms = (
+        Exponential(float(a), float(tau[j]), float(errors[1 + j]), float(errors[1 + k + j]))
+        for j, a in enumerate(amplitudes)
+    )
+    total = float(np.sum((y - y.mean()) ** 2))
+    share = 1.0 - float(left @ left) / total if total > 0 else float("nan")
+    return Fit(float(level), tuple(terms), share, float(np.sqrt(np.mean(left**2))), float(t[-1]))
+
+
+def _residual(t: FloatArray, y: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    def residual(log_tau: FloatArray) -> FloatArray:
+        design = np.column_stack([np.ones(len(t)), -np.expm1(-t[:, None] / np.exp(log_tau))])
+        return np.asarray(y - design @ np.linalg.lstsq(design, y, rcond=None)[0])
+
+    return residual

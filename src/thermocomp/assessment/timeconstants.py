@@ -1,0 +1,261 @@
+"""Time constants: how fast each channel settles after the drives start or stop.
+
+Three answers to one question, so that they check each other: the times to 63 % and 90 % are read from the curve itself,
+without a model; then one and two exponentials are fitted. None of it is prescribed by ISO 230-3: all symbols are ours.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from thermocomp.assessment.exponentials import Fit, fit
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+Kind = Literal["warm-up", "cool-down"]
+#: a shorter stop does not end a warm-up (the speed spectrum of a spindle test has some), a shorter run starts none [s]
+INTERRUPTION = 1200.0
+#: a curve is settled if it stays this near to its last value over the last quarter, as a share of its whole change
+SETTLED = 0.05
+#: a channel has to change by so many times its noise before its times are told
+MOVES = 8.0
+_ROWS = 8  # fewer are not fitted
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A warm-up or a cool-down.
+
+    Parameters
+    ----------
+    kind : {'warm-up', 'cool-down'}
+    number : int
+        Of its kind, from 1.
+    start, end : int
+        Row of the state it begins in, and its last row.
+    """
+
+    kind: Kind
+    number: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How a channel goes from one state to the next in a phase.
+
+    Parameters
+    ----------
+    channel, unit : str
+    phase : Phase
+    change : float
+        Last value minus first [unit].
+    noise : float
+        Standard deviation from row to row [unit].
+    moves : bool
+        It changes by at least `MOVES` times its noise; if not, there is nothing to read and nothing is fitted.
+    returns : bool
+        It ends nearer to its start than to its extreme: there is no one time that describes it.
+    settled : bool
+        Over the last quarter of the phase it stays within `SETTLED` of its change from its last value, and a straight
+        line through it rises by no more; noise is allowed for. An exponential is settled by this rule from 3.3 time
+        constants on, 4 % before its final value.
+    t63, t90 : float
+        When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
+        channel has not settled, the true ones are later.
+    one, two : Fit or None
+        None if it could not be fitted; `two` also if a second exponential is not called for.
+    """
+
+    channel: str
+    unit: str
+    phase: Phase
+    change: float
+    noise: float
+    moves: bool
+    returns: bool
+    settled: bool
+    t63: float
+    t90: float
+    one: Fit | None
+    two: Fit | None
+
+    @property
+    def words(self) -> str:
+        """Say what a reader must know of it; empty if there is nothing."""
+        if not self.moves:
+            return "does not move"
+        if self.returns:
+            return "comes back"
+        if not self.settled:
+            return "not settled"
+        return ""
+
+
+def drive(recording: Recording) -> BoolArray | None:
+    """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if nothing was recorded of it.
+
+    On is: above 2 % of the highest speed or feed. A row without a value counts as the one before it.
+    """
+    channels = (*recording.of_quantity("spindle_speed"), *recording.of_quantity("feed"))
+    if not channels:
+        return None
+    on = np.zeros(len(recording), dtype=np.bool_)
+    for values in np.abs(recording.values(channels)).T:
+        known = np.isfinite(values)
+        if known.any():
+            last = np.maximum.accumulate(np.where(known, np.arange(len(values)), 0))
+            filled = np.nan_to_num(values[last])
+            on |= filled > 0.02 * filled.max()
+    return on
+
+
+def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tuple[Phase, ...]:
+    """Split a recording into warm-ups and cool-downs.
+
+    A row tells what led to it: a phase begins in the row before the drives start or stop. What comes before the first
+    start belongs to no phase. Shorter stops than `interruption` do not end a warm-up, shorter runs do not start one.
+
+    Parameters
+    ----------
+    recording : Recording
+    interruption : float
+        [s]
+
+    Returns
+    -------
+    tuple of Phase
+        Empty if the drives never run, or nothing was recorded of them.
+    """
+    on = drive(recording)
+    if on is None or not on.any():
+        return ()
+    time = recording.time
+    for state in (False, True):  # short stops first: a spectrum of speeds is one warm-up
+        edges = [0, *(np.flatnonzero(np.diff(on)) + 1).tolist(), len(on)]
+        for k in range(1 if state is False else 0, len(edges) - 1):
+            a, b = edges[k], edges[k + 1]
+            inside = state or b < len(on)  # the stop at the end is a cool-down, however short
+            if on[a] == state and inside and time[b - 1] - time[max(a - 1, 0)] < interruption:
+                on[a:b] = not state
+    edges = [0, *(np.flatnonzero(np.diff(on)) + 1).tolist(), len(on)]
+    found: list[Phase] = []
+    for a, b in pairwise(edges):
+        kind: Kind = "warm-up" if on[a] else "cool-down"
+        if kind == "warm-up" or found:
+            number = 1 + sum(p.kind == kind for p in found)
+            found.append(Phase(kind, number, max(a - 1, 0), b - 1))
+    return tuple(found)
+
+
+def time_constants(recording: Recording, phases: tuple[Phase, ...] | None = None) -> tuple[Settling, ...]:
+    """Read and fit the time constants of every temperature, displacement and angle in every phase.
+
+    Parameters
+    ----------
+    recording : Recording
+    phases : tuple of Phase, optional
+        Those of `find_phases` if not given.
+
+    Returns
+    -------
+    tuple of Settling
+        Phase by phase, channel by channel.
+    """
+    phases = find_phases(recording) if phases is None else phases
+    channels = [c for c in recording.channels if c.quantity in ("temperature", "displacement", "angle")]
+    values = recording.values(channels)
+    return tuple(
+        settle(recording.time[p.start : p.end + 1], values[p.start : p.end + 1, k], c.name, c.unit, p)
+        for p in phases
+        for k, c in enumerate(channels)
+    )
+
+
+def settle(time: FloatArray, values: FloatArray, channel: str, unit: str, phase: Phase) -> Settling:
+    """Read and fit the time constants of one channel in one phase.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    values : ndarray of shape (n_rows,)
+        nan where missing; such rows are passed over.
+    channel, unit : str
+    phase : Phase
+
+    Returns
+    -------
+    Settling
+    """
+    there = np.isfinite(values)
+    t, y = time[there] - time[0], values[there]
+    nan = float("nan")
+    if len(y) < _ROWS:
+        return Settling(channel, unit, phase, nan, nan, False, False, False, nan, nan, None, None)
+    # a median over five rows takes single outliers away and leaves a monotone curve as it is
+    calm = median_filter(y, size=5, mode="nearest")
+    sigma = noise(y)
+    change, span = float(calm[-1] - calm[0]), float(np.ptp(calm))
+    moves = span > max(MOVES * sigma, 1e-9)
+    returns = moves and abs(change) < 0.5 * span
+    last = t >= 0.75 * t[-1]
+    settled = moves and _rests(t[last], y[last], calm[last], SETTLED * abs(change), sigma)
+    reads = moves and not returns
+    return Settling(
+        channel,
+        unit,
+        phase,
+        change,
+        sigma,
+        moves,
+        returns,
+        settled,
+        _reached(t, calm, 1.0 - np.exp(-1.0)) if reads else nan,
+        _reached(t, calm, 0.9) if reads else nan,
+        *(fit(t, y) if moves else (None, None)),
+    )
+
+
+def noise(values: FloatArray) -> float:
+    """Return the standard deviation from row to row, whatever the course: that of second differences, robustly.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_rows,)
+        nan where missing; at least three there.
+
+    Returns
+    -------
+    float
+        nan if there are fewer than three values.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 3:
+        return float("nan")
+    return float(1.4826 / np.sqrt(6.0) * np.median(np.abs(np.diff(known, 2))))
+
+
+def _rests(t: FloatArray, y: FloatArray, calm: FloatArray, limit: float, noise: float) -> bool:
+    """Return whether a curve neither leaves its last value nor creeps on, by more than a limit."""
+    if len(t) < 2:
+        return False
+    rise = float(np.polyfit(t - t.mean(), y, 1)[0] * (t[-1] - t[0]))
+    creeps = abs(rise) > max(limit, 2.0 * noise * np.sqrt(12.0 / len(t)))
+    return not creeps and float(np.abs(calm - calm[-1]).max()) <= limit + 3.0 * noise
+
+
+def _reached(t: FloatArray, y: FloatArray, share: float) -> float:
+    """Return when a share of the change was first reached, linear between two rows [s]."""
+    done = (y - y[0]) / (y[-1] - y[0])
+    k = int(np.argmax(done >= share))
+    if k == 0:
+        return 0.0
+    return float(t[k - 1] + (share - done[k - 1]) / (done[k] - done[k - 1]) * (t[k] - t[k - 1]))

@@ -1,0 +1,189 @@
+"""`Stack`: many frozen models stepped at once, as the 32 components of a machine are."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import BoolArray, ErrorModel, FloatArray, Input, State
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Term, TermTable, Variable
+
+IndexArray = NDArray[np.intp]
+# an input as one model sees it: with that model's zero, bounds, margin and fading
+Tap = tuple[Input, float, float]
+
+
+class StackState(NamedTuple):
+    """All that a stack remembers between two steps; leading axes, if any, are a batch of independent runs."""
+
+    reference: FloatArray  #: (..., n_taps), what counts as zero
+    memory: FloatArray | None  #: (..., n_lags); None before the first reading
+    deviation: FloatArray  #: (..., n_models), last deviations given
+    outside: BoolArray  #: (..., n_taps), inputs beyond the trained range
+    others: tuple[State, ...]  #: of the models that are stepped one by one
+
+
+class Stack:
+    """Several models behind one `init` and one `step`; each says what it says alone, to rounding.
+
+    A `Polynomial` is a `LinearDynamic` without lags: models of the two families share one table of terms, one bank of
+    lags and one read-out, in which an input, variable or term that several of them use is evaluated once. The models of
+    the other families are stepped one by one.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+
+    Attributes
+    ----------
+    models : tuple of ErrorModel
+    inputs : tuple of str
+        Names of the inputs of all models, in the order of their first use.
+
+    Raises
+    ------
+    InputError
+        Two models take an input of the same name for different quantities.
+    """
+
+    def __init__(self, models: Sequence[ErrorModel]) -> None:
+        self.models = tuple(models)
+        measured: dict[str, tuple[str, str]] = {}
+        for i in (i for m in self.models for i in m.inputs):
+            if measured.setdefault(i.name, (i.quantity, i.unit)) != (i.quantity, i.unit):
+                first = " in ".join(measured[i.name])
+                raise InputError(f"input {i.name}: {first} for one model, {i.quantity} in {i.unit} for another")
+        self.inputs = tuple(measured)
+        self._others = [
+            (k, m, np.array([self.inputs.index(i.name) for i in m.inputs], dtype=np.intp))
+            for k, m in enumerate(self.models)
+            if not isinstance(m, Polynomial | LinearDynamic)
+        ]
+        self._lay([(k, m) for k, m in enumerate(self.models) if isinstance(m, Polynomial | LinearDynamic)])
+
+    def _lay(self, linear: Sequence[tuple[int, Polynomial | LinearDynamic]]) -> None:
+        """Lay the models of the two linear families beside each other."""
+        # what is in one of these dicts already is not laid again: it gets the place that it has
+        taps: dict[Tap, int] = {}
+        variables: dict[tuple[tuple[int, float], ...], int] = {}
+        terms: dict[Term, int] = {}
+        bounds: list[list[float]] = []  # of each tap: zero, low, high, span of fading
+        read_out: list[tuple[int, int, float]] = []  # term, model, factor
+        lags: list[tuple[int, float, int, float]] = []  # term, time constant, model, factor
+        used: dict[int, list[int]] = {}  # taps by model
+        for k, m in linear:
+            mine = used[k] = []
+            for i, *row in zip(m.inputs, m._reference, *m._bounds, m._fade_span, strict=True):
+                mine.append(taps.setdefault((i, m.support.margin, m.support.fade_over), len(taps)))
+                bounds += [row] if len(bounds) < len(taps) else []
+            mixed = []
+            for v in m._table.variables:
+                weights = tuple((mine[i], w) for i, w in v.weights)
+                mixed.append(variables.setdefault(weights, len(variables)))
+            at = [terms.setdefault(tuple(mixed[v] for v in t), len(terms)) for t in m._table.terms]
+            if isinstance(m, Polynomial):
+                read_out += [(t, k, c) for t, c in zip(at, m.coefficients, strict=True)]
+            else:
+                read_out += [(t, k, c) for t, c in zip(at, m.direct, strict=True)]
+                follows = (at[s] for s in m.lag_signals)
+                lags += [(t, tau, k, c) for t, tau, c in zip(follows, m.time_constants, m.lagged, strict=True)]
+        self._tap_names = tuple(i.name for i, _, _ in taps)
+        self._columns = np.array([self.inputs.index(name) for name in self._tap_names], dtype=np.intp)
+        self._zero, self._low, self._high, self._span = np.array(bounds, dtype=np.float64).reshape(-1, 4).T
+        self._table = TermTable(len(taps), tuple(Variable("", w) for w in variables), tuple(terms))
+        self._follows = np.array([t for t, _, _, _ in lags], dtype=np.intp)
+        self._tau = np.array([tau for _, tau, _, _ in lags], dtype=np.float64)
+        n = len(self.models)
+        self._direct, self._lagged = np.zeros((len(terms), n)), np.zeros((len(lags), n))
+        for t, k, c in read_out:
+            self._direct[t, k] += c
+        for lag, (_, _, k, c) in enumerate(lags):
+            self._lagged[lag, k] = c
+        self._intercept = np.zeros(n)
+        for k, m in linear:
+            self._intercept[k] = m.intercept
+        self._held, self._faded = (
+            _padded({k: used[k] for k, m in linear if m.support.policy == policy and m.inputs})
+            for policy in ("hold", "fade")
+        )
+
+    def init(self) -> StackState:
+        """Return the state of a machine that has just been zeroed: see `ErrorModel.init`."""
+        return StackState(
+            self._zero.copy(),
+            None,
+            np.zeros(len(self.models)),
+            np.zeros(len(self._zero), dtype=np.bool_),
+            tuple(m.init() for _, m, _ in self._others),
+        )
+
+    def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
+        """Take one reading in and give the deviations at its instant.
+
+        Parameters
+        ----------
+        state : StackState
+            From `init` or the previous `step`.
+        values : ndarray of shape (..., n_inputs)
+            In the order of `inputs` [their units]. Leading axes are a batch of independent runs.
+        dt : float
+            Time since the previous reading [s]; without meaning in the first step.
+
+        Returns
+        -------
+        state : StackState
+        deviations : ndarray of shape (..., n_models)
+            One per model [its unit].
+
+        Raises
+        ------
+        ReadingError
+            An input is not finite, or `dt` is negative or not finite.
+        """
+        if not np.isfinite(values).all() or not 0.0 <= dt < np.inf:
+            raise ReadingError(f"inputs {values} of {', '.join(self.inputs)} or time step {dt} s not finite")
+        seen, reference, memory = values[..., self._columns], state.reference, state.memory
+        if memory is None:
+            reference = np.where(np.isnan(reference), seen, reference)
+        change = seen - reference
+        clipped = np.minimum(np.maximum(change, self._low), self._high)
+        outside = clipped != change
+        terms = self._table.evaluate(clipped)
+        signals = terms[..., self._follows]
+        memory = signals if memory is None else lagbank.advance(memory, signals, dt, self._tau)
+        deviation = np.asarray(terms @ self._direct + memory @ self._lagged + self._intercept)
+        if outside.any():
+            models, taps = self._faded
+            if models.size:
+                excess = (np.abs(change - clipped) / self._span)[..., taps].max(axis=-1)
+                deviation[..., models] *= np.clip(1.0 - excess, 0.0, 1.0)
+            models, taps = self._held
+            if models.size:
+                last, now = state.deviation[..., models], deviation[..., models]
+                deviation[..., models] = np.where(outside[..., taps].any(axis=-1), last, now)
+        others = []
+        for (k, model, columns), before in zip(self._others, state.others, strict=True):
+            after, deviation[..., k] = model.step(before, values[..., columns], dt)
+            others.append(after)
+        return StackState(reference, memory, deviation, outside, tuple(others)), deviation
+
+    def outside(self, state: StackState) -> tuple[str, ...]:
+        """Return the names of the inputs that were outside the trained range of a model in the last step."""
+        found = {
+            name for name, out in zip(self._tap_names, np.moveaxis(state.outside, -1, 0), strict=True) if out.any()
+        }
+        for (_, model, _), s in zip(self._others, state.others, strict=True):
+            found |= {i.name for i, out in zip(model.inputs, np.moveaxis(s.outside, -1, 0), strict=True) if out.any()}
+        return tuple(name for name in self.inputs if name in found)
+
+
+def _padded(taps: dict[int, list[int]]) -> tuple[IndexArray, IndexArray]:
+    """Return models (n,) and their taps (n, most taps); a model with fewer has its first one several times."""
+    widest = max((len(t) for t in taps.values()), default=0)
+    rows = [t + t[:1] * (widest - len(t)) for t in taps.values()]
+    return np.array(list(taps), dtype=np.intp), np.array(rows, dtype=np.intp).reshape(len(taps), widest)

@@ -1,0 +1,323 @@
+"""Machine files: axes, lengths and what is known of the 32 components, written as TOML; see :doc:`/machine_file`."""
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from thermocomp.core.components import BY_CODE, ErrorComponent
+from thermocomp.core.exceptions import InputError, SettingError, UnitError, unknown
+from thermocomp.core.machine import Axis, Machine, Source
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
+from thermocomp.core.profile import SplineProfile
+from thermocomp.core.structure import Structure
+from thermocomp.core.units import unit
+from thermocomp.files import jsonfile, modelfile, positionfile
+
+Keys = tuple[str | int, ...]
+#: turns what stands under a key into house units; gets the key's path for its error
+Convert = Callable[[Any, Keys], Any]
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?)?\s*")
+#: what a value with a unit is called, and an example of it
+_SAID = {
+    "position": ("length", "600 mm"),
+    "displacement": ("length", "12 um"),
+    "angle": ("angle", "12 urad"),
+    "temperature": ("temperature", "20 degC"),
+}
+_QUANTITY = {"um": "displacement", "urad": "angle"}
+
+
+def read_machine(path: str | Path) -> Machine:
+    """Read a machine TOML.
+
+    Every value with a dimension is a text with its unit: a bare number is refused. Model files are looked for beside
+    the machine file. A model that was refused when it was judged is refused here too, as it is everywhere else.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Machine
+
+    Raises
+    ------
+    InputError
+        No such file, not TOML, a key or value that is not understood, an axis or component that is not there, or a
+        model file that cannot be used; the message names the file and the key's path.
+
+    Examples
+    --------
+    A bed-type mill whose Y axis was measured by a laser, and whose spindle drift has a model::
+
+        structure = "w X' b Z Y (C1) t"
+        tool = ["0 mm", "0 mm", "-150 mm"]
+
+        [axes.X]
+        travel = ["0 mm", "600 mm"]
+        [axes.Y]
+        travel = ["0 mm", "400 mm"]
+        [axes.Z]
+        travel = ["0 mm", "500 mm"]
+
+        [components]
+        C0Y = "12 urad"
+        EYY = {model = "eyy.json"}
+        EXX = {profile = [["0 mm", "0 um"], ["300 mm", "1.5 um"], ["600 mm", "2 um"]]}
+        Z0C = {model = "drift.json", target = "z"}
+    """
+    source = Path(path)
+    try:
+        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError as e:
+        raise InputError(f"{source}: no such machine file") from e
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{source}: cannot be read as a machine file: {e}") from e
+    except tomllib.TOMLDecodeError as e:
+        raise InputError(f"{source}: not valid TOML: {e}") from e
+    try:
+        return _machine(content, source)
+    except SettingError as e:
+        keys = ".".join(str(key) for key in e.path)
+        raise InputError(": ".join(part for part in (str(source), keys, str(e)) if part)) from e
+
+
+def _machine(content: dict[str, Any], source: Path) -> Machine:
+    given = _table(content, _MACHINE, ())
+    given.setdefault("name", source.stem)
+    if "structure" not in given:
+        raise SettingError('is missing: write the axes from the workpiece to the tool, such as "XFZY"', ("structure",))
+    structure: Structure = given["structure"]
+    tables = given.pop("axes", {})
+    for name in tables:
+        if name not in structure.axes:
+            raise SettingError(f"there is no axis {name!r} in the structure {structure.code!r}", ("axes", name))
+    for name in structure.axes:
+        if name not in tables:
+            raise SettingError(
+                f"is missing: the structure {structure.code!r} has an axis {name}; write a table [axes.{name}] "
+                "with its travel",
+                ("axes", name),
+            )
+    axes = tuple(_axis(name, tables[name]) for name in structure.axes)
+    spindle, components = given.pop("spindle", {}), given.pop("components", {})
+    reader = _Sources(source.parent, {a.name: a for a in axes})
+    return Machine(
+        **given,
+        axes=axes,
+        spindle_tool=spindle.get("measured_tool", (0.0, 0.0, 0.0)),
+        components={code: reader.read(code, value) for code, value in components.items()},
+    )
+
+
+def _axis(name: str, table: Mapping[str, Any]) -> Axis:
+    where: Keys = ("axes", name)
+    if "travel" not in table:
+        raise SettingError('is missing: write from where to where it goes, such as ["0 mm", "600 mm"]', where + _TRAVEL)
+    try:
+        return Axis(name, **table)
+    except SettingError as e:
+        raise SettingError(str(e), where + e.path) from e
+
+
+class _Sources:
+    """Reads what tells the values of components.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the files of models are.
+    axes : mapping of str to Axis
+    """
+
+    def __init__(self, folder: Path, axes: Mapping[str, Axis]) -> None:
+        self.folder, self.axes = folder, axes
+        self._files: dict[Path, Sequence[ErrorModel | PositionModel]] = {}
+
+    def read(self, code: str, value: Any) -> Source:
+        """Return what stands under ``components.CODE``."""
+        where: Keys = ("components", code)
+        if code not in BY_CODE:
+            raise unknown("component", code, BY_CODE, where)
+        component = BY_CODE[code]
+        for name in component.axes:
+            if name not in self.axes:
+                raise SettingError(f"{component.description}: the machine has no axis {name}", where)
+        if not isinstance(value, dict):
+            return float(_measure(_QUANTITY[component.unit])(value, where))
+        table = _table(value, _COMPONENT, where)
+        if ("model" in table) == ("profile" in table):
+            raise SettingError('write either {model = "file.json"} or {profile = [["0 mm", "0 um"], ...]}', where)
+        if "profile" in table:
+            if "target" in table:
+                raise SettingError("belongs to a model file, not to a profile", (*where, "target"))
+            return self._profile(component, table["profile"], (*where, "profile"))
+        return self._model(component, table["model"], table.get("target"), where)
+
+    def _profile(self, component: ErrorComponent, rows: Sequence[Any], where: Keys) -> PositionModel:
+        if component.depends_on is None:
+            raise SettingError(f"{component.description} does not depend on a position: write one value", where)
+        axis = self.axes[component.depends_on]
+        length, error = _measure("position"), _measure(_QUANTITY[component.unit])
+        points = []
+        for row in rows:
+            if not isinstance(row, list) or len(row) != 2:
+                raise SettingError(
+                    f'{row!r}: want position and error, such as ["300 mm", "1.5 {component.unit}"]', where
+                )
+            points.append((length(row[0], where), error(row[1], where)))
+        if len(points) < 2:
+            raise SettingError(f"has {len(points)} points: want at least two", where)
+        for (before, _), (p, _) in pairwise(points):
+            if not p > before:
+                raise SettingError(f"{p:g} mm stands behind {before:g} mm: positions must rise", where)
+        pieces = tuple((a, b - a, 0.0, 0.0) for (_, a), (_, b) in pairwise(points))
+        return PositionModel(
+            target=component.code,
+            unit=component.unit,
+            axis=axis.name,
+            travel=axis.travel,
+            reference_position=axis.reference_position,
+            profile=SplineProfile(axis=axis.name, knots=tuple(p for p, _ in points), pieces=pieces),
+        )
+
+    def _model(self, component: ErrorComponent, name: str, target: str | None, where: Keys) -> Source:
+        here = (*where, "model")
+        path = self.folder / name
+        if path not in self._files:
+            try:
+                self._files[path] = _open(path)
+            except InputError as e:
+                raise SettingError(str(e), here) from e
+        models = {m.target: m for m in self._files[path]}
+        if target is not None and target not in models:
+            raise unknown(f"model in {path} of", target, models, (*where, "target"))
+        wanted = target or (component.code if component.code in models else None)
+        if wanted is None and len(models) > 1:
+            raise SettingError(f"{path} holds models of {', '.join(models)}: say which by target", where)
+        model = models[wanted] if wanted is not None else next(iter(models.values()))
+        if target is None and model.target in BY_CODE and model.target != component.code:
+            raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)
+        for part in model.models if isinstance(model, PositionModel) else (model,):
+            if part.honest_error is not None and part.honest_error.verdict == "refused":
+                raise SettingError(
+                    f"the model of {part.target} in {path} was refused when it was judged: {part.honest_error.reason}; "
+                    f"fit a better one, or leave {component.code} out",
+                    here,
+                )
+        return model
+
+
+def _open(path: Path) -> Sequence[ErrorModel | PositionModel]:
+    """Read models of time, or of time and position."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        content = None  # the reader of model files tells what is wrong
+    if isinstance(content, dict) and content.get("format") == jsonfile.POSITION_MODELS.name:
+        return positionfile.read(path)
+    return modelfile.read(path)
+
+
+def _table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
+    """Return a table in house units."""
+    if not isinstance(value, dict):
+        raise SettingError(f"{value!r}: must be a table", where)
+    found = {}
+    for key, inner in value.items():
+        if key not in known:
+            raise unknown("key", key, known, (*where, key))
+        found[key] = known[key](inner, (*where, key))
+    return found
+
+
+def _measure(quantity: str) -> Convert:
+    """Return what reads a text with a number and a unit."""
+    what, example = _SAID[quantity]
+
+    def convert(value: Any, where: Keys) -> float:
+        found = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+        if not found or found[2] is None:
+            shown = json.dumps(value) if isinstance(value, str | float | int) else repr(value)
+            raise SettingError(
+                f'{shown}: write a{"n" * (what[0] in "a")} {what} with its unit, such as "{example}"', where
+            )
+        try:
+            known = unit(found[2], quantity)
+        except UnitError as e:
+            raise SettingError(f'"{value}": {e}', where) from e
+        number = known.scale * float(found[1]) + known.shift
+        if not math.isfinite(number):
+            raise SettingError(f'"{value}": is no finite number', where)
+        return number
+
+    return convert
+
+
+def _several(convert: Convert, n: int, example: str) -> Convert:
+    """Return what reads a list of n values."""
+
+    def converted(value: Any, where: Keys) -> tuple[Any, ...]:
+        if not isinstance(value, list) or len(value) != n:
+            raise SettingError(f"{value!r}: write {n} values, such as {example}", where)
+        return tuple(convert(v, where) for v in value)
+
+    return converted
+
+
+def _text(value: Any, where: Keys) -> str:
+    if not isinstance(value, str) or not value:
+        raise SettingError(f"{value!r}: must be a text in quotes", where)
+    return value
+
+
+def _structure(value: Any, where: Keys) -> Structure:
+    try:
+        return Structure.parse(_text(value, where))
+    except SettingError as e:
+        raise SettingError(str(e), where) from e
+
+
+def _rows(value: Any, where: Keys) -> list[Any]:
+    if not isinstance(value, list):
+        raise SettingError('must be a list of points, such as [["0 mm", "0 um"], ["600 mm", "2 um"]]', where)
+    return value
+
+
+def _same(value: Any, where: Keys) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise SettingError(f"{value!r}: must be a table", where)
+    return value
+
+
+def _axes(value: Any, where: Keys) -> dict[str, Any]:
+    return {name: _table(inner, _AXIS, (*where, name)) for name, inner in _same(value, where).items()}
+
+
+_TRAVEL: Keys = ("travel",)
+_LENGTH = _measure("position")
+_VECTOR = _several(_LENGTH, 3, '["0 mm", "0 mm", "-150 mm"]')
+_AXIS: dict[str, Convert] = {
+    "travel": _several(_LENGTH, 2, '["0 mm", "600 mm"]'),
+    "reference_position": _LENGTH,
+    "measured_at": _VECTOR,
+    "measured_tool": _VECTOR,
+}
+_COMPONENT: dict[str, Convert] = {"model": _text, "target": _text, "profile": _rows}
+_MACHINE: dict[str, Convert] = {
+    "name": _text,
+    "structure": _structure,
+    "reference_temperature": _measure("temperature"),
+    "tool": _VECTOR,
+    "axes": _axes,
+    "spindle": lambda value, where: _table(value, {"measured_tool": _VECTOR}, where),
+    "components": _same,
+}

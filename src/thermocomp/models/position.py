@@ -1,0 +1,337 @@
+"""Position-dependent errors: cold profile, thermal slopes, and the models of both (Chen 1996, sections 2.2, 3.3)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError, RecordingError
+from thermocomp.core.machine import Channel
+from thermocomp.core.model import ErrorModel, Provenance, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.position import PositionModel, slope_unit
+from thermocomp.core.terms import TermTable
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.geometric import Kind, Order, ProfileFit, fit_profile
+from thermocomp.models.training import Trained, train
+from thermocomp.recording.profiles import QUANTITY, Profiles, Slopes
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: powers whose remainder is told (C-05)
+POWERS = (1, 2, 3)
+#: one more power is worth it if it takes away this share of what is left, and this share of the thermal part
+WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionOptions:
+    """How a position-dependent error is modelled.
+
+    Parameters
+    ----------
+    method : str or ThermalRegressor
+        Of the slopes: any method of `thermocomp.models.methods`, or an estimator with settings of its own.
+    inputs : sequence of str, optional
+        Channels to predict the slopes from; all temperatures and the spindle speed if not given.
+    slopes : int
+        m, the highest power of the position; Chen finds 1 enough (C-05).
+    offset : bool
+        Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
+    profile : {'polynomial', 'spline'}
+    order : int, (int, int) or 'auto'
+        Of the profile; see `thermocomp.models.geometric.fit_profile`.
+    coordinates : str, optional
+        Axes the profile may depend on (C-06).
+    reference : int or sequence of int
+        States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
+    reference_position : float, optional
+        Where q is zero [mm]. If not given: the axis' zero, or the end of the measured travel that is next to it.
+    rezero : bool
+        False: temperatures are taken as they are.
+    support : Support
+        What the models of the slopes do outside their trained range.
+    """
+
+    method: str | ThermalRegressor = "mra"
+    inputs: Sequence[str] | None = None
+    slopes: int = 1
+    offset: bool = False
+    profile: Kind = "polynomial"
+    order: int | Order | Literal["auto"] = "auto"
+    coordinates: str | None = None
+    reference: int | Sequence[int] = 0
+    reference_position: float | None = None
+    rezero: bool = True
+    support: Support = Support()
+
+
+@dataclass(frozen=True, eq=False)
+class PositionFit:
+    """A position model, and what it was made of.
+
+    Parameters
+    ----------
+    model : PositionModel
+        Frozen.
+    profile : ProfileFit
+        The cold profile: order and the errors at points left out.
+    slopes : tuple of Slopes
+        Factors of the thermal parts that were measured, one per test.
+    samples : Samples
+        Inputs, and the factors as targets ``k0``, ``k1`` ...; one row per state.
+    trained : tuple of Trained
+        One per factor.
+    coefficient_errors : tuple of mapping of str to float
+        Standard error of each coefficient of the factors' models, where they are polynomials of temperatures. Rows are
+        taken as independent but for the noise of the cold profile, which all of them share; terms as given, though they
+        were selected (E-C12).
+    remainders : mapping of int to float
+        What powers up to m leave of the thermal part, RMS per degree of freedom, by m [unit] (C-05).
+    offset_remainder : float
+        What the powers of the model leave with an offset k_0 [unit].
+    thermal_rms : float
+        The thermal part itself, RMS over all states but the reference [unit].
+    """
+
+    model: PositionModel
+    profile: ProfileFit
+    slopes: tuple[Slopes, ...]
+    samples: Samples
+    trained: tuple[Trained, ...]
+    coefficient_errors: tuple[Mapping[str, float], ...]
+    remainders: Mapping[int, float]
+    offset_remainder: float
+    thermal_rms: float
+
+    @property
+    def enough(self) -> int:
+        """The smallest m to which a higher one adds little: a tenth of the rest, or a twentieth of the thermal part."""
+        known = {m: rest for m, rest in self.remainders.items() if np.isfinite(rest)}
+        return next((m for m in known if not self._worth(known[m], min(known[k] for k in known if k >= m))), 1)
+
+    @property
+    def shifts(self) -> bool:
+        """True if an offset would take away more than that: the profiles turn about another position, or shift."""
+        rest = self.remainders.get(len(self.model.slopes), np.nan)
+        return self.model.offset is None and self._worth(rest, self.offset_remainder)
+
+    def _worth(self, before: float, after: float) -> bool:
+        return before - after > max(WORTH_OF_REST * before, WORTH_OF_THERMAL * self.thermal_rms)
+
+
+def fit_position(
+    profiles: Profiles | Sequence[Profiles],
+    options: PositionOptions = PositionOptions(),
+    *,
+    learn: BoolArray | None = None,
+) -> PositionFit:
+    """Fit d = f_g(x, y, z) + k_0(t) + k_1(t) q + k_2(t) q^2 ... (C-04, C-05, C-07).
+
+    f_g is fitted to the cold profiles; the factors are fitted to each profile minus the cold one of its test, and are
+    then a target like any other: the method learns them from the temperatures.
+
+    Parameters
+    ----------
+    profiles : Profiles or sequence of Profiles
+        Of one component, one per test.
+    options : PositionOptions
+    learn : ndarray of bool of shape (n_states,), optional
+        States that may be learned from, over all tests; all if not given. The reference states of a test are used
+        wherever one of its states is.
+
+    Returns
+    -------
+    PositionFit
+
+    Raises
+    ------
+    InputError
+        The tests are not of one component, or an option cannot be.
+    FitError
+        There is too little to fit to.
+    """
+    tests = (profiles,) if isinstance(profiles, Profiles) else tuple(profiles)
+    samples, slopes = slope_samples(tests, options)
+    seen = np.ones(len(samples), dtype=np.bool_) if learn is None else learn
+    used = [test for k, test in enumerate(tests) if seen[samples.test == k].any()]
+    if not used:
+        raise FitError(f"{tests[0].target}: no state is left to learn from")
+    points = np.concatenate([test.points for test in used])
+    position = np.concatenate([test.position for test in used])
+    cold = np.concatenate([test.cold(options.reference) for test in used])
+    _refuse_unreached(position, cold, tests[0])
+    geometric = fit_profile(
+        points,
+        cold,
+        tests[0].axis,
+        kind=options.profile,
+        order=options.order,
+        coordinates=options.coordinates,
+    )
+    unit, powers = tests[0].unit, slopes[0].powers
+    trained = [train(options.method, samples, j, seen, support=options.support) for j in range(len(powers))]
+    models = [replace(t.model, unit=slope_unit(unit, k)) for t, k in zip(trained, powers, strict=True)]
+    warm = [np.delete(t.thermal(options.reference), t.reference_rows(options.reference), axis=0) for t in used]
+    thermal = np.concatenate([w[np.isfinite(w)] for w in warm])
+    return PositionFit(
+        model=PositionModel(
+            target=tests[0].target,
+            unit=unit,
+            axis=tests[0].axis,
+            travel=(float(position.min()), float(position.max())),
+            reference_position=reference_position(tests, options),
+            profile=geometric.profile,
+            offset=models[0] if options.offset else None,
+            slopes=tuple(models[1:] if options.offset else models),
+            provenance=_provenance(models[0].provenance, geometric, options),
+        ),
+        profile=geometric,
+        slopes=slopes,
+        samples=samples,
+        trained=tuple(replace(t, model=m) for t, m in zip(trained, models, strict=True)),
+        coefficient_errors=tuple(_coefficient_errors(m, samples, j, seen, slopes) for j, m in enumerate(models)),
+        remainders={m: _remainder(tests, options, m) for m in POWERS},
+        offset_remainder=_remainder(tests, replace(options, offset=True), options.slopes),
+        thermal_rms=float(np.sqrt(np.mean(thermal**2))) if thermal.size else 0.0,
+    )
+
+
+def slope_samples(tests: Sequence[Profiles], options: PositionOptions) -> tuple[Samples, tuple[Slopes, ...]]:
+    """Return what the factors are learned from: one row per state, the measured factors as targets.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+
+    Returns
+    -------
+    samples : Samples
+        Counted from the reference states. Units of its targets are those of the error, not per metre.
+    slopes : tuple of Slopes
+        One per test.
+
+    Raises
+    ------
+    InputError
+        The tests are not of one component, or there is nothing to predict from.
+    """
+    first = tests[0]
+    for test in tests[1:]:
+        if (test.target, test.unit, test.axis) != (first.target, first.unit, first.axis):
+            raise InputError(f"profiles of {first.target} and of {test.target}: fit one component at a time")
+    zero_at = reference_position(tests, options)
+    slopes = tuple(
+        test.slopes(options.slopes, offset=options.offset, reference=options.reference, reference_position=zero_at)
+        for test in tests
+    )
+    names = [f"{first.target}_k{k}" for k in slopes[0].powers]
+    recordings = [_with_factors(test, s, names) for test, s in zip(tests, slopes, strict=True)]
+    samples = stack(recordings, names, options.inputs, rezero=options.rezero)
+    zero = np.stack(
+        [
+            _cold_inputs(samples, np.flatnonzero(samples.test == k)[test.reference_rows(options.reference)])
+            for k, test in enumerate(tests)
+        ]
+    )
+    return replace(samples, zero=zero, hashes=tuple(test.fingerprint for test in tests)), slopes
+
+
+def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
+    """Return where q is zero [mm]: see `PositionOptions`.
+
+    Parameters
+    ----------
+    tests : sequence of Profiles
+    options : PositionOptions
+    """
+    if options.reference_position is not None:
+        return options.reference_position
+    low, high = min(t.position.min() for t in tests), max(t.position.max() for t in tests)
+    return float(min(max(0.0, low), high))
+
+
+def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) -> None:
+    """Refuse a cold profile that ends before the others: beyond its ends it would be taken as constant."""
+    there = position[np.isfinite(cold)]
+    for end in (position.min(), position.max()):
+        if end not in there:
+            raise FitError(
+                f"{test.target}: the cold profile has no value at {end:g} mm, where others have: name more reference "
+                "states, or leave that position out"
+            )
+
+
+def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str]) -> Recording:
+    """Return the thermal states with the factors as channels; a factor counts as an error at 1 m."""
+    channels = tuple(Channel(name, QUANTITY[test.unit], test.unit) for name in names)
+    table = test.states.table.assign(**dict(zip(names, slopes.factors.T, strict=True)))
+    return replace(test.states, table=table, channels=(*test.states.channels, *channels))
+
+
+def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
+    """Return what the inputs are counted from."""
+    values = samples.values[rows]
+    there = np.isfinite(values)
+    missing = np.flatnonzero(samples.rezeroed & ~there.any(axis=0))
+    if missing.size:
+        raise RecordingError(
+            f"{samples.test_names[int(samples.test[rows[0]])]}: {samples.inputs[missing[0]].name} has no value in the "
+            "reference state: take another state, or leave the channel out"
+        )
+    return np.asarray(np.where(there, values, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1))
+
+
+def _remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
+    """Return what powers up to m leave; nan if there are not enough positions."""
+    turn = reference_position(tests, options)
+    try:
+        fits = [t.slopes(m, offset=options.offset, reference=options.reference, reference_position=turn) for t in tests]
+    except InputError:
+        return float("nan")
+    return float(np.sqrt(np.mean([f.remainder**2 for f in fits])))
+
+
+def _coefficient_errors(
+    model: ErrorModel, samples: Samples, target: int, seen: BoolArray, slopes: Sequence[Slopes]
+) -> dict[str, float]:
+    """Return standard errors of coefficients that came by least squares; nothing for any others."""
+    if not isinstance(model, Polynomial):
+        return {}
+    y = samples.deviations[:, target]
+    rows = seen & samples.valid & np.isfinite(y)
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    X = TermTable(len(columns), model.variables, model.terms).evaluate(samples.change()[rows][:, columns])
+    residual = y[rows] - X @ np.array(model.coefficients) - model.intercept
+    if model.intercept:
+        X = np.column_stack([X, np.ones(len(X))])
+    n_rows, n_terms = X.shape
+    slant = np.abs(X.T @ residual) / (np.linalg.norm(X, axis=0) * max(float(np.linalg.norm(residual)), 1e-300))
+    if n_rows <= n_terms or not n_terms or slant.max() > 1e-6:
+        return {}
+    inverse = np.linalg.pinv(X)
+    variance = float(residual @ residual) / (n_rows - n_terms) * (inverse**2).sum(axis=1)
+    for k, s in enumerate(slopes):
+        # the noise of the cold profile shifts all factors of its test alike
+        common = s.shared * float(np.nanmean(s.errors[:, target] ** 2))
+        variance = variance + common * inverse[:, samples.test[rows] == k].sum(axis=1) ** 2
+    return dict(zip(model.coefficients_by_name(), np.sqrt(variance).tolist(), strict=False))
+
+
+def _provenance(made: Provenance | None, geometric: ProfileFit, options: PositionOptions) -> Provenance | None:
+    if made is None:
+        return None
+    more = {
+        "profile": options.profile,
+        "order": repr(geometric.order),
+        "slopes": repr(options.slopes),
+        "offset": repr(options.offset),
+        "reference": repr(options.reference),
+    }
+    return replace(made, parameters={**made.parameters, **more})

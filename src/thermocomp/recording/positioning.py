@@ -1,0 +1,75 @@
+"""`Positioning`: deviations of an axis at its targets, approached from one or both directions, again and again."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Positioning:
+    """A positioning test of one axis in one thermal state.
+
+    Parameters
+    ----------
+    axis : str
+        Such as ``Y``; empty if unknown.
+    state : str
+        Thermal state, such as ``cold`` or ``after 4 h``; empty if there is only one.
+    unit : {'um', 'urad'}
+        Of the deviations.
+    positions : ndarray of shape (n_targets,)
+        Target positions, rising [mm].
+    up : ndarray of shape (n_runs, n_targets)
+        Deviations, actual minus target, approached in the positive direction [unit].
+    down : ndarray of shape (n_runs, n_targets) or None
+        The same in the negative direction; None for a unidirectional test. A unidirectional test in the negative
+        direction has `up` None.
+    source : str
+        File it was read from.
+
+    Raises
+    ------
+    InputError
+        Fewer than two targets or two runs, targets that do not rise, arrays that do not fit, or a number that is not
+        finite.
+    """
+
+    axis: str
+    state: str
+    unit: str
+    positions: FloatArray
+    up: FloatArray | None
+    down: FloatArray | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        where = ": ".join(part for part in (self.source, self.axis, self.state) if part) or "positioning"
+        if len(self.positions) < 2:
+            raise InputError(f"{where}: {len(self.positions)} target; positioning needs at least 2, ISO 230-2 wants 5")
+        if not (np.diff(self.positions) > 0).all():
+            raise InputError(f"{where}: target positions must rise and differ, found {self.positions.tolist()} mm")
+        if not self.directions:
+            raise InputError(f"{where}: no deviations")
+        for name, deviations in self.directions.items():
+            if deviations.ndim != 2 or deviations.shape[1] != len(self.positions):
+                raise InputError(
+                    f"{where}: deviations in direction {name} have the shape {deviations.shape}; want (runs, "
+                    f"{len(self.positions)} targets)"
+                )
+            if len(deviations) < 2:
+                raise InputError(
+                    f"{where}: {len(deviations)} run in direction {name}; repeatability needs at least 2 runs, "
+                    "ISO 230-2 wants 5"
+                )
+            if not np.isfinite(deviations).all():
+                raise InputError(f"{where}: a deviation in direction {name} is not a finite number")
+
+    @property
+    def directions(self) -> dict[str, FloatArray]:
+        """Deviations by direction, ``+`` and ``-``, of those that were measured."""
+        return {name: d for name, d in (("+", self.up), ("-", self.down)) if d is not None}

@@ -1,0 +1,72 @@
+"""Thermal tests (ISO 230-3), positioning (ISO 230-2) and time constants as one offline page."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from thermocomp import __version__
+from thermocomp.assessment import iso230_tables as tables
+from thermocomp.assessment.iso230_2 import PositioningResult
+from thermocomp.assessment.thermaltest import TITLES, ThermalTest
+from thermocomp.assessment.timeconstants import Settling
+from thermocomp.recording.recording import Recording
+from thermocomp.report import iso230figures as figures
+from thermocomp.report.html import environment
+
+#: recordings with the time constants of their channels
+Settlings = Sequence[tuple[Recording, Sequence[Settling]]]
+
+
+def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Sequence[PositioningResult]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    thermal : sequence of ThermalTest
+    settlings : sequence of (Recording, sequence of Settling)
+    positioned : sequence of PositioningResult
+
+    Returns
+    -------
+    str
+    """
+    names = [t.name for t in thermal] + list(dict.fromkeys(Path(r.test.source).name for r in positioned))
+    return (
+        environment()
+        .get_template("iso230.html")
+        .render(
+            version=__version__,
+            names=names,
+            thermal=[
+                {
+                    "title": TITLES[t.kind],
+                    "test": t,
+                    "figure": figures.thermal(t),
+                    "profiles": [figures.profiles(t, k) for k in range(len(t.targets))],
+                    "tables": tables.thermal_tables(t),
+                }
+                for t in thermal
+            ],
+            settlings=[
+                {"name": r.name, "figure": figures.time_constants(mine), "tables": tables.time_constant_tables(mine)}
+                for r, mine in settlings
+                if mine
+            ],
+            positioned=[(r, figures.positioning(r)) for r in positioned],
+            positioning_tables=tables.positioning_tables(positioned),
+        )
+    )
+
+
+def write(
+    thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Sequence[PositioningResult], path: Path
+) -> None:
+    """Write the page; an existing file is replaced.
+
+    Parameters
+    ----------
+    thermal : sequence of ThermalTest
+    settlings : sequence of (Recording, sequence of Settling)
+    positioned : sequence of PositioningResult
+    path : Path
+    """
+    path.write_text(render(thermal, settlings, positioned), encoding="utf-8")

@@ -1,0 +1,157 @@
+"""Straight lines: what a controller that knows K0 + tanb (P - P0) per axis can correct, and what it leaves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.correction import Correction, Deviation
+from thermocomp.core.machine import Vector
+from thermocomp.volumetric.field import ErrorField
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large an error is over some points.
+
+    Parameters
+    ----------
+    rms : float
+        Root of the mean square [um].
+    largest : float
+        Largest magnitude [um].
+    """
+
+    rms: float
+    largest: float
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> "Size":
+        """Return the size of errors of any shape [um]."""
+        return cls(float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()))
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """The best straight line of one axis: least squares of the error along the axis over its travel.
+
+    Parameters
+    ----------
+    axis : {'X', 'Y', 'Z'}
+    deviation : Deviation
+        The line; its reference position is that of the axis.
+    along : Size
+        What it leaves of the error along this axis, on the line that it was laid through.
+    volume : Size
+        The same over the work volume, when every axis is corrected by its own line.
+    """
+
+    axis: str
+    deviation: Deviation
+    along: Size
+    volume: Size
+
+    @property
+    def correction(self) -> Correction:
+        """What the controller has to add along this axis."""
+        return Correction.opposing(self.deviation)
+
+
+@dataclass(frozen=True)
+class StraightLines:
+    """The best straight line of every axis, and what they leave together.
+
+    Parameters
+    ----------
+    at : tuple of float
+        Where the other axes stood [mm].
+    lines : tuple of StraightLine
+        One per axis of the machine, X first.
+    before, after : Size
+        Length of the error vector over the work volume, without and with all lines.
+    """
+
+    at: Vector
+    lines: tuple[StraightLine, ...]
+    before: Size
+    after: Size
+
+
+def straight_lines(
+    field: ErrorField,
+    at: ArrayLike,
+    tool: ArrayLike | None = None,
+    *,
+    stations: int = 41,
+    grid: int = 9,
+    exact: bool = False,
+) -> StraightLines:
+    """Lay the best straight line through the error of every axis.
+
+    Parameters
+    ----------
+    field : ErrorField
+        The machine in one thermal state.
+    at : array-like of shape (3,)
+        Where the other axes stand while one moves [mm].
+    tool : array-like of shape (3,), optional
+        From the gauge point to the tip [mm]; the machine's own if not given.
+    stations : int
+        Positions per axis, evenly over its travel, both ends included; at least 2.
+    grid : int
+        Points per axis of the grid over the work volume, borders included; at least 2.
+    exact : bool
+        By homogeneous transforms instead of to first order in the angles.
+
+    Returns
+    -------
+    StraightLines
+
+    Notes
+    -----
+    What a correction c leaves at a position P is e(P + c) + c: the machine errs as it does where it then stands.
+    """
+    machine = field.kinematics.machine
+    place = np.asarray(at, dtype=np.float64)
+    axes = [(k, machine.axis(name)) for k, name in enumerate("XYZ") if name in machine.structure.axes]
+
+    sides = [np.array([p]) for p in place]
+    found: list[tuple[int, str, Deviation, Size]] = []
+    corrections: dict[int, Correction] = {}
+    for k, axis in axes:
+        sides[k] = np.linspace(*axis.travel, grid)
+        points = np.tile(place, (stations, 1))
+        points[:, k] = np.linspace(*axis.travel, stations)
+        deviation = _best(points[:, k], field.error(points, tool, exact=exact)[:, k], axis.reference_position)
+        corrections[k] = Correction.opposing(deviation)
+        left = _left(field, points, {k: corrections[k]}, tool, exact)
+        found.append((k, axis.name, deviation, Size.of(left[:, k])))
+
+    volume = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
+    before, after = field.error(volume, tool, exact=exact), _left(field, volume, corrections, tool, exact)
+    return StraightLines(
+        at=(float(place[0]), float(place[1]), float(place[2])),
+        lines=tuple(StraightLine(name, d, along, Size.of(after[:, k])) for k, name, d, along in found),
+        before=Size.of(np.linalg.norm(before, axis=-1)),
+        after=Size.of(np.linalg.norm(after, axis=-1)),
+    )
+
+
+def _best(positions: FloatArray, errors: FloatArray, reference: float) -> Deviation:
+    """Return the line of least squares through errors [um] at positions [mm]."""
+    middle, mean = positions.mean(), errors.mean()
+    way = 1e-3 * (positions - middle)
+    slope = float(way @ (errors - mean) / (way @ way))
+    return Deviation(float(mean + slope * 1e-3 * (reference - middle)), slope, reference)
+
+
+def _left(
+    field: ErrorField, points: FloatArray, corrections: dict[int, Correction], tool: ArrayLike | None, exact: bool
+) -> FloatArray:
+    """Return the error that is left at points (n, 3) after the corrections of some axes, of shape (n, 3) [um]."""
+    added = np.zeros(points.shape)
+    for k, correction in corrections.items():
+        added[:, k] = [correction.at(p) for p in points[:, k].tolist()]
+    return field.error(points + 1e-3 * added, tool, exact=exact) + added

@@ -1,0 +1,302 @@
+"""ISO 230-3: closed forms exactly, the virtual machine plausibly, and a model before and after."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from thermocomp.assessment.iso230_3 import assess, detect, find_ambient, find_pairs
+from thermocomp.assessment.iso230_tables import thermal_content, thermal_tables
+from thermocomp.assessment.thermaltest import Curve, Pair, ThermalTest, figures
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.core.model import HonestError, Input, Provenance
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.datasets.virtual import record
+from thermocomp.recording.cycles import whole
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+MIN = 60.0
+UNITS = {"C": ("temperature", "degC"), "um": ("displacement", "um"), "rpm": ("spindle_speed", "1/min")}
+UNITS |= {"urad": ("angle", "urad"), "min": ("feed", "mm/min")}
+
+
+def recorded(columns: dict[str, FloatArray], step: float = MIN) -> Recording:
+    table = pd.DataFrame(columns)
+    channels = tuple(Channel(n, *UNITS[n.rsplit("_", 1)[1]]) for n in columns)
+    return Recording("test", np.arange(0.0, step * len(table), step), table, channels, whole(len(table)))
+
+
+def spindle_test(tau: float = 30 * MIN) -> Recording:
+    """Rest of 5 min, run of 4 h, stop of 2 h; y1 rises to 24 um, y2 to 20 um, z falls to -50 um: first order."""
+    time = np.arange(0.0, 366 * MIN, MIN)
+    run = np.clip(time - 5 * MIN, 0, 240 * MIN)
+    level = (1 - np.exp(-run / tau)) * np.exp(-np.clip(time - 245 * MIN, 0, None) / tau)
+    speed = np.where((time > 5 * MIN) & (time <= 245 * MIN), 2600.0, 0.0)
+    return recorded(
+        {
+            "t_room_C": 20 + time / 3600,
+            "t_head_C": 21 + 10 * level,
+            "x1_um": np.zeros_like(time),
+            "y1_um": 3 + 24 * level,
+            "y2_um": 20 * level,
+            "z_um": -50 * level,
+            "s_rpm": speed,
+        }
+    )
+
+
+def of(test: ThermalTest, name: str) -> Curve:
+    return next(c for c in test.all_curves if c.name == name)
+
+
+# -- closed forms -------------------------------------------------------------------------------------------------
+
+
+def test_an_exponential_gives_what_its_formula_says() -> None:
+    tau = 30 * MIN
+    recording = spindle_test(tau)
+    (test,) = assess(recording, pairs=find_pairs(recording, 80.0))
+
+    assert test.kind == "spindle"
+    assert test.load == "spindle at 2600 1/min"
+    assert test.running == 240 * MIN
+    assert test.time[-1] == 360 * MIN
+    f = of(test, "z_um").figures
+    at_60, at_end = -50 * (1 - np.exp(-2.0)), -50 * (1 - np.exp(-8.0))
+    assert f.at_60 == pytest.approx(at_60)
+    assert f.range_60 == pytest.approx(-at_60)
+    assert f.at_end == pytest.approx(at_end)
+    assert f.largest == pytest.approx(at_end)
+    assert f.range_run == f.range_all == pytest.approx(-at_end)
+    assert f.cool_down == pytest.approx(-at_end * (1 - np.exp(-4.0)))
+    settling = of(test, "z_um").settling
+    assert settling is not None
+    assert settling.settled
+    # chords between the rows of a minute: a second late at most
+    assert settling.t90 == pytest.approx(-tau * np.log(1 - 0.9 * (1 - np.exp(-8.0))), abs=1.0)
+    assert settling.one is not None
+    assert settling.one.terms[0].tau == pytest.approx(tau, rel=1e-6)
+    # counted from the start of the test, whatever the probe read there
+    assert of(test, "y1_um").figures.at_end == pytest.approx(24 * (1 - np.exp(-8.0)))
+
+
+def test_tilt_has_the_sign_of_the_house() -> None:
+    """A = (y1 - y2) / L, B = (x2 - x1) / L, 1 at the tip; 4 um over 80 mm are 50 urad."""
+    recording = spindle_test()
+    (test,) = assess(recording, pairs=find_pairs(recording, 80.0))
+    a = of(test, "A").figures
+    assert a.at_end == pytest.approx(50 * (1 - np.exp(-8.0)))
+    assert Pair("x1_um", "x2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [20.0]
+    assert Pair("y1_um", "y2_um", 100.0).angle(np.array([1.0]), np.array([3.0])).tolist() == [-20.0]
+    assert (
+        "no tilt is told: the distance between the probes y1_um and y2_um was not given" in assess(recording)[0].notes
+    )
+
+
+def test_ranges_of_a_step_and_a_peak() -> None:
+    time = np.arange(0.0, 7201.0, 600.0)
+    step = np.where(time > 3600, 5.0, 0.0)
+    assert figures(time, step, len(time) - 1).range_60 == 0
+    assert figures(time, step, len(time) - 1).range_run == 5
+    peak = np.where(time == 1800, -7.0, 0.0)
+    f = figures(time, peak, 9)
+    assert (f.range_60, f.largest, f.at_60, f.at_end, f.cool_down) == (7, -7, 0, 0, 0)
+    # 60 min between two rows: linear
+    assert figures(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).at_60 == 15
+    assert figures(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).range_60 == 15
+    # a probing cycle now and then
+    holes = np.array([0.0, np.nan, np.nan, np.nan, np.nan, np.nan, 3.0, *[np.nan] * 5, 4.0])
+    assert figures(time, holes, 12).at_60 == 3
+    assert np.isnan(figures(time, np.full(13, np.nan), 12).range_all)
+    short = figures(time[:4], step[:4], 3)
+    assert np.isnan(short.range_60)
+    assert np.isnan(short.at_60)
+
+
+def test_an_axis_grows() -> None:
+    time = np.arange(0.0, 181 * MIN, 10 * MIN)
+    growth = 1 - np.exp(-np.minimum(time, 120 * MIN) / (20 * MIN))
+    columns = {f"x_laser_{p}_um": p * 0.1 * growth + 2.0 for p in (0, 250, 500)}
+    recording = recorded({**columns, "feed_mm_min": np.where((time > 0) & (time <= 7200), 6000.0, 0.0)}, 10 * MIN)
+    (test,) = assess(recording)
+    assert test.kind == "axis"
+    (targets,) = test.targets
+    assert targets.axis == "X"
+    assert targets.positions.tolist() == [0, 250, 500]
+    assert targets.length.figures.at_end == pytest.approx(50 * (1 - np.exp(-6.0)))
+    assert targets.length.name == "length X 0-500 mm"
+    assert test.curves == ()
+    expansion = thermal_tables(test)[-1]
+    assert expansion.rows[0][2] == pytest.approx(100 * (1 - np.exp(-6.0)), abs=0.006)
+    positions = {c["name"]: c["position_mm"] for c in thermal_content(test)["curves"]}
+    assert positions == {"x_laser_0_um": 0, "x_laser_250_um": 250, "x_laser_500_um": 500, "length X 0-500 mm": None}
+
+
+def test_several_runs_are_several_tests() -> None:
+    once = spindle_test()
+    table = pd.concat([once.table, once.table], ignore_index=True)
+    time = np.arange(0.0, MIN * len(table), MIN)
+    first, second = assess(replace(once, time=time, table=table, cycles=whole(len(table))))
+    assert (first.name, second.name) == ("test, 1", "test, 2")
+    assert second.recording.time[second.start] == (366 + 5) * MIN
+    assert second.running == first.running
+    assert "the machine had run before" in " ".join(second.notes)
+
+
+# -- what a recording is ------------------------------------------------------------------------------------------
+
+
+def test_detection_and_ambient() -> None:
+    quiet = {"z_um": np.arange(30.0), "t_a_C": np.ones(30)}
+    assert detect(recorded(quiet)) == "etve"
+    assert detect(recorded({**quiet, "s_rpm": np.zeros(30), "feed_min": np.ones(30)})) == "axis"
+    assert detect(recorded({**quiet, "s_rpm": np.full(30, 100.0), "feed_min": np.ones(30)})) == "spindle"
+    assert find_ambient(recorded(quiet)) is None
+    assert find_ambient(recorded({**quiet, "t_chair_C": np.ones(30)})) is None
+    found = find_ambient(recorded({**quiet, "t_Room_C": np.ones(30)}))
+    assert found is not None
+    assert found.name == "t_Room_C"
+    (test,) = assess(recorded(quiet), ambient="t_a_C")
+    assert test.ambient_range == (1.0, 1.0)
+
+
+def test_what_falls_short_is_said() -> None:
+    (test,) = assess(recorded({"z_um": np.arange(30.0), "s_rpm": np.full(30, 100.0)}), "etve")
+    notes = " | ".join(test.notes)
+    assert "it ran for 29 min only" in notes
+    assert "the spindle or an axis moves" in notes
+    assert "it is 0.5 h long" in notes
+    assert "no temperature is known to be that of the surroundings" in notes
+    (unrecorded,) = assess(recorded({"z_um": np.arange(90.0)}), "axis")
+    notes = " | ".join(unrecorded.notes)
+    assert "the whole recording counts as warm-up; record the feed rate" in notes
+    assert "no channel is a target of an axis" in notes
+    assert "the cool-down was not recorded" in notes
+    assert unrecorded.load == "feed rate not recorded"
+
+
+def test_refusals() -> None:
+    only_heat = recorded({"t_C": np.ones(30)})
+    with pytest.raises(InputError, match="no displacement"):
+        assess(only_heat)
+    with pytest.raises(InputError, match="has one row"):
+        assess(recorded({"z_um": np.ones(1)}))
+    with pytest.raises(InputError, match="the ambient channel is a temperature"):
+        assess(spindle_test(), ambient="z_um")
+    with pytest.raises(InputError, match="no channel is named 'nope'"):
+        assess(spindle_test(), ambient="nope")
+    with pytest.raises(InputError, match="probes measure displacements"):
+        assess(recorded({"y1_um": np.ones(30), "y_C": np.ones(30)}), pairs=[Pair("y1_um", "y_C", 100.0)])
+    for wrong in (("x1", "x1", 100.0), ("x1", "y2", 100.0), ("z1", "z2", 100.0)):
+        with pytest.raises(InputError, match="two different probes along X"):
+            Pair(*wrong)
+    with pytest.raises(InputError, match="must be positive"):
+        Pair("x1", "x2", 0.0)
+
+
+# -- a model, before and after ------------------------------------------------------------------------------------
+
+
+def model(
+    target: str, coefficient: float, *, provenance: Provenance | None = None, honest: HonestError | None = None
+) -> Polynomial:
+    """Return a model that follows t_head_C."""
+    head = Input("t_head_C", "temperature", "degC", 21.0, True, -1.0, 11.0)
+    return Polynomial(
+        target=target,
+        unit="um",
+        inputs=(head,),
+        variables=(Variable.single("t_head_C", 0),),
+        terms=((0,),),
+        coefficients=(coefficient,),
+        provenance=provenance,
+        honest_error=honest,
+    )
+
+
+def test_what_a_model_leaves() -> None:
+    recording = spindle_test()
+    pairs = find_pairs(recording, 80.0)
+    models = [model("z_um", -4.0), model("y1_um", 2.4), model("y2_um", 2.0)]
+    (test,) = assess(recording, pairs=pairs, models=models)
+    z = of(test, "z_um")
+    assert z.after is not None
+    assert z.after_figures is not None
+    assert z.after_figures.at_end == pytest.approx(z.figures.at_end * 0.2)
+    assert z.after_figures.range_60 == pytest.approx(z.figures.range_60 * 0.2)
+    tilt = of(test, "A").after_figures
+    assert tilt is not None
+    assert tilt.range_all == pytest.approx(0, abs=1e-9)
+    assert of(test, "x1_um").after is None
+    table = thermal_tables(test)[0]
+    assert [row[0] for row in table.rows][-2:] == ["z_um", "z_um, with model"]
+    # a tilt takes both its probes
+    (half,) = assess(recording, pairs=pairs, models=models[:2])
+    assert of(half, "A").after is None
+
+
+def test_what_must_be_said_of_a_model() -> None:
+    recording = spindle_test()
+    learned = Provenance("ols", data_sha256=(recording.fingerprint,))
+    refused = HonestError("p", 1, 1, 1, 1, 1, {}, "refused", "worse than none")
+    worse = model("z_um", 4.0, provenance=learned, honest=refused)
+    (test,) = assess(recording, models=[worse, model("nothing_um", 1.0)])
+    notes = " | ".join(test.notes)
+    assert "was fitted to this very recording" in notes
+    assert "refused when it was fitted: worse than none" in notes
+    assert "z_um: with the model its range grows, from 50 to 90 um" in notes
+    assert "the model of nothing_um has nothing to do here" in notes
+    with pytest.raises(InputError, match="none of them a channel here"):
+        assess(recording, models=[model("nothing_um", 1.0)])
+
+
+# -- the virtual machine ------------------------------------------------------------------------------------------
+
+
+def test_etve_of_the_virtual_machine() -> None:
+    (recording,) = record("etve")
+    (test,) = assess(recording, pairs=find_pairs(recording, 100.0))
+    assert test.kind == "etve"
+    assert test.running == 24 * 3600
+    assert test.ambient is not None
+    assert test.ambient.name == "t_air_C"
+    low, high = test.ambient_range
+    assert 1 < high - low < 6
+    for name in ("x1_um", "y1_um", "z_um"):
+        assert 1 < of(test, name).figures.range_all < 30
+        assert of(test, name).figures.range_60 < of(test, name).figures.range_all
+    assert [c.name for c in test.tilts] == ["A", "B"]
+
+
+def test_spindle_tests_of_the_virtual_machine() -> None:
+    constant, spectrum = record("iso230-spindle")
+    (test,) = assess(constant, pairs=find_pairs(constant, 100.0))
+    z = of(test, "z_um").figures
+    assert z.largest < -20  # the tool nears the workpiece
+    assert z.range_60 > 0.5 * z.range_run  # most of it within an hour
+    assert z.cool_down > 0.5 * z.range_run
+    assert test.running == 4 * 3600
+    (other,) = assess(spectrum)
+    assert other.load.startswith("spindle at 875 to 3500 1/min")
+    assert other.running == pytest.approx(4 * 3600 - 360)  # it ends in a stop of 6 min
+    assert of(other, "z_um").figures.largest < -10
+
+
+def test_axis_tests_of_the_virtual_machine() -> None:
+    for recording, axis in zip(record("iso230-axis"), "XYZ", strict=True):
+        (test,) = assess(recording)
+        (targets,) = test.targets
+        assert targets.axis == axis
+        assert test.kind == "axis"
+        growth = targets.length.figures
+        expansion = 1e3 * growth.at_end / targets.distance
+        assert 20 < expansion < 300  # um/m: a screw that is 2 to 25 K warmer
+        assert growth.cool_down < -0.3 * growth.at_end
+        first, last = targets.curves[0].figures, targets.curves[-1].figures
+        assert abs(first.at_end) < 1 < abs(last.at_end)

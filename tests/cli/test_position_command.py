@@ -1,0 +1,129 @@
+"""``thermocomp position``: from profiles to a file that the machine's model can use."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from profilemachine import profiles
+from thermocomp.cli.app import run
+from thermocomp.files import positionfile
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    made = profiles(noise=0.1)
+    table = made.states.table.copy()
+    table.insert(0, "time_s", made.states.time)
+    table = table.assign(**{f"y_laser_{p:g}_um": v for p, v in zip(made.position, made.values.T, strict=True)})
+    path = tmp_path / "wide.csv"
+    table.assign(cycle=[c.name for c in made.states.cycles for _ in range(len(c))]).to_csv(path, index=False)
+    return path
+
+
+def test_a_table_for_people(wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "eyy.json"
+    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "EYY: 72 profiles of 12 points along Y, 0 to 550 mm" in said
+    assert "Cold profile: polynomial of order 5" in said
+    assert "k1 [um/m] = " in said
+    assert "standard errors: t1_C 0.0" in said
+    assert "leave one thermal cycle out (3 cycles)" in said
+    for day in ("day 1", "day 2", "day 3"):
+        assert day in said
+    assert "accepted EYY" in said
+    (model,) = positionfile.read(output)
+    assert model.target == "EYY"
+    assert model.slopes[0].accepted
+    assert model.slopes[0].coefficients_by_name()["t1_C"] == pytest.approx(3.0, abs=0.1)
+
+
+def test_numbers_for_machines(wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "eyy.json"
+    arguments = ["position", str(wide), "--component", "EYY", "--columns", "y_laser_*", "--model", "ols"]
+    options = ["--inputs", "t1_C", "t2_C", "--slopes", "2", "--offset", "--order", "4", "--reference", "0", "1"]
+    assert run([*arguments, *options, "-o", str(output), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [f["power"] for f in told["factors"]] == [0, 1, 2]
+    assert [f["unit"] for f in told["factors"]] == ["um", "um/m", "um/m^2"]
+    assert told["profile"] == {"kind": "polynomial", "order": [4, 0], "tried": []}
+    assert told["enough"] == 1
+    assert told["overall"]["none_rms"] > 5.0
+    assert told["file"] == str(output)
+    assert told["verdict"] == "accepted"
+    assert positionfile.read(output)[0].powers == (0, 1, 2)
+
+
+def test_long_tables_splines_and_another_judging(
+    wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = pd.read_csv(wide)
+    tall = table.melt([c for c in map(str, table) if "laser" not in c], var_name="y_mm", value_name="error_um")
+    tall["y_mm"] = tall["y_mm"].str.extract(r"_(\d+)_").astype(float)
+    path = tmp_path / "long.csv"
+    tall.sort_values(["time_s", "y_mm"]).to_csv(path, index=False)
+    arguments = ["position", str(path), "--component", "EYY", "--model", "ols", "--json"]
+    assert run([*arguments, "--layout", "long", "--profile", "spline"]) == 0
+    spline = json.loads(capsys.readouterr().out)
+    assert spline["profile"]["kind"] == "spline"
+    assert run([*arguments, "--split", "0.7/0.3"]) == 0
+    assert "first 70% of the rows" in json.loads(capsys.readouterr().out)["judging"]
+
+
+def test_a_refused_model_is_written_with_its_refusal(
+    wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = pd.read_csv(wide)
+    day = table["cycle"] == "day 2"
+    for name in (c for c in map(str, table) if "laser" in c):
+        table[name] = table[name].where(~day, 2 * table[name].iloc[0] - table[name])
+    table.to_csv(wide, index=False)
+    output = tmp_path / "eyy.json"
+    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output)]) == 1
+    assert "refused EYY" in " ".join(capsys.readouterr().out.split())
+    assert not positionfile.read(output)[0].slopes[0].accepted
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--component", "EXX"], "seem to be of Y, not of EXX"),
+        (["--component", "EAY"], "no column is like y_laser_250_urad"),
+        (["--component", "E"], "E: it is no component's code; name a component such as EYY"),
+        (["--component", "EYY", "--columns", "x_*"], "no column is called 'x_*'"),
+        (["--component", "EYY", "--model", "gp"], "gp cannot be frozen"),
+        (["--component", "EYY", "--model", "magic"], "magic"),
+        (["--component", "EYY", "--reference", "99"], "no reference state [99]; there are 0 to 71"),
+        (["--component", "EYY", "--slopes", "12"], "12 factors cannot be fitted to 11 positions"),
+        (["--component", "EYY", "--inputs", "t9_C"], "no channel is named 't9_C'"),
+        (["--component", "EYY", "--positions", "none.toml"], "none.toml: no such file of positions"),
+        (["--component", "EYY", "--leave-one-file-out"], "needs at least two recordings"),
+    ],
+)
+def test_what_cannot_be_used(
+    options: list[str], message: str, wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "eyy.json"
+    assert run(["position", str(wide), *options, "-o", str(output)]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not output.exists()
+
+
+def test_nothing_is_written_over(wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "eyy.json"
+    output.write_text("precious", encoding="utf-8")
+    assert run(["position", str(wide), "--component", "EYY", "-o", str(output)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert run(["position", str(wide), "--component", "EYY", "-o", str(wide), "--overwrite"]) == 2
+    assert "is also an input" in capsys.readouterr().err
+    assert output.read_text(encoding="utf-8") == "precious"
+
+
+def test_the_help_is_the_docstring(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["position", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    for option in ("--component", "--columns", "--layout", "--slopes", "--reference", "--json"):
+        assert option in said
+    assert "States of each test that count as cold" in said

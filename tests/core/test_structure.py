@@ -1,0 +1,75 @@
+"""Structure codes: both notations, and what is refused."""
+
+from itertools import permutations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.exceptions import SettingError
+from thermocomp.core.structure import Structure
+
+
+@pytest.mark.parametrize(
+    ("code", "workpiece", "tool"),
+    [
+        ("w X' b Z Y (C1) t", "X", "ZY"),
+        ("w X' b Y Z (C1) t", "X", "YZ"),
+        ("w X' Y' b Z t", "XY", "Z"),
+        ("w X1' Y1' b Z1 (C1) t", "XY", "Z"),
+        ("  w Z' Y' X' b (C) t ", "ZYX", ""),
+        ("w b X Y Z C1 t", "", "XYZ"),
+        ("w X’ b Z Y (C1) t", "X", "ZY"),  # a typographic apostrophe
+        ("w X′ b Z t", "X", "Z"),  # a prime
+        ("XFZY", "X", "ZY"),
+        ("FXYZ", "", "XYZ"),
+        ("XYZ", "", "XYZ"),
+        ("XYZF", "XYZ", ""),
+        ("XY FZ", "XY", "Z"),
+        ("ZF", "Z", ""),
+    ],
+)
+def test_codes(code: str, workpiece: str, tool: str) -> None:
+    found = Structure.parse(code)
+    assert found.workpiece == tuple(workpiece)
+    assert found.tool == tuple(tool)
+    assert found.axes == tuple(workpiece + tool)
+
+
+@given(st.sampled_from(list(permutations("XYZ"))), st.integers(1, 3), st.integers(0, 3))
+def test_a_written_code_is_read_as_it_was(axes: tuple[str, ...], count: int, split: int) -> None:
+    structure = Structure(axes[:count][:split], axes[:count][split:])
+    assert Structure.parse(structure.code) == structure
+    assert Structure.parse("".join(structure.workpiece) + "F" + "".join(structure.tool)) == structure
+
+
+def test_beyond_an_axis_is_what_moves_the_tool_against_it() -> None:
+    """On a table-moving machine too: seen from the X slide of the table, Y and Z move the tool."""
+    structure = Structure.parse("w X' Y' b Z (C1) t")
+    assert structure.beyond("X") == ("Y", "Z")
+    assert structure.beyond("Y") == ("Z",)
+    assert structure.beyond("Z") == ()
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("", "is no structure code"),
+        ("mill", "is no structure code"),
+        ("XFZF", "is no structure code"),
+        ("w X' Z t", "is no structure code"),
+        ("w X' b Z", "is no structure code"),
+        ("F", "has no axis"),
+        ("w b t", "has no axis"),
+        ("XFXY", "axis X is there twice"),
+        ("w X' b X t", "axis X is there twice"),
+        ("w X b Z t", "'X' .* stands on the workpiece's side and needs a prime: X'"),
+        ("w X' b Z' Y t", "\"Z'\" .* stands on the tool's side and has no prime: Z"),
+        ("w C' X' b Y Z t", "axis C: only the linear axes"),
+        ("XFZYB", "axis B: only the linear axes"),
+        ("w x' b Z t", "is no axis: want X, Y or Z"),
+    ],
+)
+def test_codes_that_are_none(code: str, message: str) -> None:
+    with pytest.raises(SettingError, match=message):
+        Structure.parse(code)
