@@ -24,8 +24,8 @@ def simulated(experiment: str, seed: int = 0) -> tuple[SimulatedTest, ...]:
     return tuple(simulate(EXPERIMENTS[experiment], seed=seed))
 
 
-def columns(test: SimulatedTest, quantity: str) -> FloatArray:
-    return test.values[:, [k for k, c in enumerate(test.channels) if c.quantity == quantity]]
+def columns(test: SimulatedTest, *quantities: str) -> FloatArray:
+    return test.values[:, [k for k, c in enumerate(test.channels) if c.quantity in quantities]]
 
 
 def column(test: SimulatedTest, name: str) -> FloatArray:
@@ -59,7 +59,7 @@ def test_every_experiment_is_well_formed(experiment: str) -> None:
         assert temperatures.min() > 10.0
         assert temperatures.max() < 75.0
         # the probes say the truth but for their noise and drift
-        errors = np.hstack([columns(test, "displacement"), columns(test, "angle")]) - test.truth
+        errors = columns(test, "displacement", "angle") - test.truth
         said = np.isfinite(errors)
         assert said.all() == (experiment != "probing")
         assert np.abs(errors[said]).max() < 2.5

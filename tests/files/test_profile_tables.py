@@ -176,9 +176,42 @@ def test_an_angle_among_displacements_is_refused(tmp_path: Path) -> None:
     said = "column 'y_laser_50_urad' measures angle in urad among displacements in um: leave it out, or"
     with pytest.raises(UnitError, match=said):
         read(tmp_path / "mixed.csv", ProfileOptions(target="EYY", columns="y_laser_*"))
+    with pytest.raises(UnitError, match=said):
+        read(tmp_path / "mixed.csv", "EYY")
+    rest = read(tmp_path / "mixed.csv", ProfileOptions(target="EYY", columns="y_laser_*_um"))
+    assert len(rest.points) == len(made().points) - 1
+    swapped = {f"y_laser_{p}_um": f"y_laser_{p}_urad" for p in (50, 100)}
+    wide(made()).rename(columns=swapped).to_csv(tmp_path / "two.csv", index=False)
+    said = "each of the columns 'y_laser_50_urad', 'y_laser_100_urad' measures angle in urad among displacements in um:"
+    with pytest.raises(UnitError, match=said):
+        read(tmp_path / "two.csv", "EYY")
     long(made()).to_csv(tmp_path / "long.csv", index=False)
     with pytest.raises(UnitError, match="column 'error_um' measures displacement, no angle in urad"):
         read(tmp_path / "long.csv", ProfileOptions(target="EAY", columns="error_um"))
+
+
+def test_two_profiles_of_one_name_are_told_apart_by_their_units(tmp_path: Path) -> None:
+    found = made()
+    table = wide(found)
+    twins = {c.replace("_um", "_urad"): 0.5 for c in map(str, table) if c.startswith("y_laser")}
+    table.assign(**twins).to_csv(tmp_path / "both.csv", index=False)
+    np.testing.assert_array_equal(read(tmp_path / "both.csv", "EYY").values, found.values)
+    assert (read(tmp_path / "both.csv", "EAY").values == 0.5).all()
+    long(found).assign(error_urad=0.5).to_csv(tmp_path / "long.csv", index=False)
+    np.testing.assert_array_equal(read(tmp_path / "long.csv", "EYY").values, found.values)
+
+
+def test_a_long_profile_in_two_units_is_refused(tmp_path: Path) -> None:
+    table = long(made())
+    there = table["y_mm"] == 50.0
+    table["error_urad"] = table["error_um"].where(there)
+    table["error_um"] = table["error_um"].where(~there)
+    table.to_csv(tmp_path / "mixed.csv", index=False)
+    line = int(np.flatnonzero(there)[0]) + 2
+    with pytest.raises(UnitError, match=f"line {line}: there is a value in 'error_urad' and none in 'error_um': corr"):
+        read(tmp_path / "mixed.csv", "EYY")
+    meant = read(tmp_path / "mixed.csv", ProfileOptions(target="EYY", columns="error_um"))
+    assert np.isnan(meant.values[:, meant.position == 50.0]).all()
 
 
 def test_columns_out_of_order_and_too_few(tmp_path: Path) -> None:

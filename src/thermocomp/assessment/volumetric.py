@@ -113,12 +113,8 @@ class Moment:
         return self._left(points, correction)
 
     def after_all(self, points: FloatArray) -> FloatArray:
-        """Return what is left behind the whole correction, a vector at every point, of shape (..., 3) [um].
-
-        An axis that the machine does not have corrects nothing.
-        """
-        there = np.array([float(a in self.field.kinematics.machine.structure.axes) for a in "XYZ"])
-        return self._left(points, there * self.field.correction(points, self.tool))
+        """Return what is left behind the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        return self._left(points, self.field.correction(points, self.tool))
 
     def _left(self, points: FloatArray, correction: FloatArray) -> FloatArray:
         """Return the error where the axes stand once they are corrected, and the correction itself."""

@@ -97,7 +97,7 @@ def simulate(
     experiment : str
         A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-new, chen1996-slope, demo,
         etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing, random, stepwise2017,
-        stepwise2017-online, wessel-fem, wessel-milling, wessel-sets, wessel-tool.
+        stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets, wessel-tool.
     output : Path
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     seed : int

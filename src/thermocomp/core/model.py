@@ -260,13 +260,13 @@ class ErrorModel(ABC):
         ReadingError
             An input is not finite, or `dt` is negative or not finite.
         """
+        if not np.isfinite(inputs).all() or not 0.0 <= dt < np.inf:
+            raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
         reference = state.reference
         memory = state.memory
         if memory is None:
             reference = np.where(np.isnan(reference), inputs, reference)
         change = inputs - reference
-        if not np.isfinite(change).all() or not 0.0 <= dt < np.inf:
-            raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
         low, high = self._bounds
         clipped = np.minimum(np.maximum(change, low), high)
         outside = clipped != change

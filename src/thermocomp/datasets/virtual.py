@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, unknown
 from thermocomp.files.protocols import read_protocol
 from thermocomp.recording.cycles import find_cycles, whole
 from thermocomp.recording.recording import Recording
 from thermocomp.simulation.experiments import SimulatedTest, simulate
-from thermocomp.simulation.kits import unknown
 from thermocomp.simulation.protocol import Experiment
 from thermocomp.simulation.sensors import Fault
 
@@ -94,12 +93,13 @@ def record(
     found = experiment if isinstance(experiment, Experiment) else find(experiment)
     recordings = []
     for test in simulate(found, seed=seed, sensor_noise=sensor_noise, faults=faults):
-        recordings.append(_recording(test))
+        recordings.append(recording(test))
         progress(test.name)
     return recordings
 
 
-def _recording(test: SimulatedTest) -> Recording:
+def recording(test: SimulatedTest) -> Recording:
+    """Return a simulated test as a recording, split into its thermal cycles."""
     table = pd.DataFrame(test.values, columns=[c.name for c in test.channels])
     speeds = [c.name for c in test.channels if c.quantity == "spindle_speed"]
     cycles = find_cycles(test.time, table[speeds[0]].to_numpy()) if speeds else whole(len(table))

@@ -116,7 +116,22 @@ def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:
     if len(names) != 1:
         said = f"there are {', '.join(names)}: say which" if names else f"there is none: name one like error_{unit}"
         raise RecordingError(f"{owner}: want one column of {QUANTITY[unit]}s; {said}")
+    _refuse_mixed(rows, names[0], unit, owner)
     return names[0]
+
+
+def _refuse_mixed(rows: Rows, column: str, unit: str, owner: str) -> None:
+    """Refuse a twin of the column in the other unit that goes on where the column itself has no value."""
+    other = "urad" if unit == "um" else "um"
+    twin = f"{column.removesuffix(f'_{unit}')}_{other}"
+    if twin not in rows.table:
+        return
+    gaps = np.flatnonzero(rows.table[column].isna() & rows.table[twin].notna())
+    if gaps.size:
+        raise UnitError(
+            f"{owner}: {rows.place(int(gaps[0]))}: there is a value in {twin!r} and none in {column!r}: correct the "
+            f"unit, or say that {column!r} is meant"
+        )
 
 
 def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str, str]:

@@ -168,12 +168,14 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
             "with a row per position as a long one. There are "
             + ", ".join(c.name for c in recording.channels if c.quantity in QUANTITY.values())
         )
+    mixed = [c for c, _ in found if c.quantity != QUANTITY[unit]]
+    if mixed:
+        one, it, its = ("column", "it", "its") if len(mixed) == 1 else ("each of the columns", "them", "their")
+        raise UnitError(
+            f"{owner}: {one} {', '.join(repr(c.name) for c in mixed)} measures {mixed[0].quantity} in {mixed[0].unit} "
+            f"among {QUANTITY[unit]}s in {unit}: leave {it} out, or correct {its} unit"
+        )
     for channel, place in found:
-        if channel.quantity != QUANTITY[unit]:
-            raise UnitError(
-                f"{owner}: column {channel.name!r} measures {channel.quantity} in {channel.unit} among "
-                f"{QUANTITY[unit]}s in {unit}: leave it out, or correct its unit"
-            )
         if axis not in place:
             raise InputError(f"{owner}: column {channel.name!r}: its place does not tell the position of {axis}")
     points = np.array([[place.get(a, 0.0) for a in "XYZ"] for _, place in found])
@@ -252,15 +254,21 @@ def _matching(recording: Recording, pattern: str) -> list[tuple[Channel, float]]
 
 
 def _by_name(recording: Recording, quantity: str, owner: str) -> list[tuple[Channel, float]]:
-    """Return the channels of a quantity that have a position in their name; all must be called alike."""
-    found = [(c, m) for c in recording.of_quantity(quantity) if (m := _PLACED.fullmatch(c.name))]
+    """Return the channels of a quantity that have a position in their name; all must be called alike.
+
+    With them come those of another quantity that are called like them and go on where they end: a wrong unit.
+    """
+    placed = [(c, m) for c in recording.channels if (m := _PLACED.fullmatch(c.name))]
+    found = [(c, m) for c, m in placed if c.quantity == quantity]
     bases = list(dict.fromkeys(m["base"] for _, m in found))
     if len(bases) > 1:
         raise RecordingError(
             f"{owner}: there are profiles called {', '.join(f'{b}_*' for b in bases)}; say which columns to take, such "
             f"as '{bases[0]}_*'"
         )
-    return [(c, float(m["position"])) for c, m in found]
+    there = {m["position"] for _, m in found}
+    strange = [(c, m) for c, m in placed if m["base"] in bases and m["position"] not in there]
+    return [(c, float(m["position"])) for c, m in (*found, *strange)]
 
 
 def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, Place]], owner: str) -> None:

@@ -10,11 +10,10 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
-from thermocomp.core.exceptions import InputError, SettingError, UnitError
+from thermocomp.core.exceptions import InputError, SettingError, UnitError, unknown
 from thermocomp.core.units import unit
 from thermocomp.simulation.climate import CLIMATES, Climate
 from thermocomp.simulation.instruments import Touch
-from thermocomp.simulation.kits import unknown
 from thermocomp.simulation.protocol import Experiment, Plan
 from thermocomp.simulation.segments import Feed, Lot, Stretch, Stroke
 from thermocomp.simulation.segments import Path as Keys

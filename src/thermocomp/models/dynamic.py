@@ -44,6 +44,10 @@ SPEED_LAGS: tuple[tuple[float, ...], ...] = (
 #: ridge strengths that are tried, per row and in units of each feature's mean square
 STRENGTHS: tuple[float, ...] = tuple(float(10.0 ** (k / 2)) for k in range(-12, 5))
 
+#: A lag of the temperatures that is shorter than this many times between two rows is not tried: these rows say nothing
+#: of it, and a model that runs at another rate would do what nobody has seen.
+SHORTEST_LAG = 2.0
+
 _CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
 
 
@@ -63,7 +67,8 @@ class DynamicRidge(ThermalRegressor):
     the speed; both are linear again in first-order lags of the temperatures, of the speed and of its square. Strength
     of the ridge and the set of time constants are chosen by leaving out whole thermal cycles, one after the other,
     inside the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
-    RMS is within one standard error of the smallest (the one-standard-error rule of Breiman et al. 1984).
+    RMS is within one standard error of the smallest (the one-standard-error rule of Breiman et al. 1984). A set with a
+    lag of the temperatures below `SHORTEST_LAG` times the time between two rows is not tried.
 
     Without `dt`, every row is taken to be a machine at rest in that state: all lags equal their signals.
 
@@ -154,7 +159,7 @@ class DynamicRidge(ThermalRegressor):
         learned = rows[folds >= 0]
         self.data_min_, self.data_max_ = learned.min(axis=0), learned.max(axis=0)
         self._split_columns()
-        candidates = self._candidates()
+        candidates = self._candidates(steps)
         moments = self._moments(rows, checked[1], steps, folds)
         chosen, self.strength_, self.cv_rms_ = self._choose(candidates, moments)
         self.temperature_lags_, self.speed_lags_ = chosen.temperature_lags, chosen.speed_lags
@@ -246,10 +251,12 @@ class DynamicRidge(ThermalRegressor):
         self._t_taus = tuple(sorted({float(t) for lags in self.temperature_lags for t in lags}))
         self._n_taus = tuple(sorted({float(t) for lags in self.speed_lags for t in lags})) if speeds else ()
 
-    def _candidates(self) -> list[_Candidate]:
+    def _candidates(self, dt: FloatArray) -> list[_Candidate]:
         n_t, n_n = len(self._temperatures), len(self._speeds) * len(self.speed_powers)
+        between = dt[np.isfinite(dt) & (dt > 0)]
+        shortest = SHORTEST_LAG * float(np.median(between)) if len(between) else 0.0
         found = []
-        for t_lags in self.temperature_lags if n_t else [()]:
+        for t_lags in [lags for lags in self.temperature_lags if n_t and min(lags, default=np.inf) >= shortest] or [()]:
             for n_lags in self.speed_lags if n_n else [()]:
                 columns = list(range(n_t))
                 for tau in sorted(t_lags):

@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline, PPoly
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.profile import PolynomialProfile, Profile, SplineProfile
+from thermocomp.recording.profiles import MIN_POSITIONS
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["polynomial", "spline"]
@@ -18,6 +19,8 @@ Order = tuple[int, int]
 
 #: beyond these no profile is told from noise
 HIGHEST, HIGHEST_OTHER, MOST_KNOTS = 9, 3, 12
+#: so many positions between the ends are needed to judge by them alone
+FEW = 3
 
 
 @dataclass(frozen=True)
@@ -73,10 +76,11 @@ def fit_profile(
 ) -> ProfileFit:
     """Fit the geometric profile f_g(x, y, z) by least squares (C-04, C-06, C-22).
 
-    Without an order, those with fewer terms than points are tried: every point between the ends of the axis' travel is
-    left out in turn, with all values that were measured there, and told from the others; of the orders whose mean
-    square is within one standard error of the smallest, the one with the fewest terms is taken. The ends are not left
-    out: a profile is never used beyond them, and what an order does there would decide alone.
+    Without an order, those are tried that leave a third of the points to spare: every point between the ends of the
+    axis' travel is left out in turn, with all values that were measured there, and told from the others; of the orders
+    whose mean square is within one standard error of the smallest, the one with the fewest terms is taken. The ends are
+    not left out: a profile is never used beyond them, and what an order does there would decide alone. Only where there
+    are fewer than three positions between them, too few to judge by, they are left out too.
 
     Parameters
     ----------
@@ -108,15 +112,18 @@ def fit_profile(
     points, values = points[there], values[there]
     varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
     used = varying if coordinates is None else coordinates
+    if axis not in varying:
+        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
     if kind not in ("polynomial", "spline"):
         raise InputError(f"profile {kind!r}: choose polynomial or spline")
     if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
         raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
-    if axis not in varying:
-        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
     others = "".join(a for a in used if a != axis and a in varying)
     if kind == "spline" and others and coordinates is not None:
         raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
+    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
+    if n_own < MIN_POSITIONS:
+        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
     place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
     shape = _Spline(points, axis) if kind == "spline" else _Polynomial(points, axis, others)
     tried: list[Tried] = []
@@ -154,14 +161,15 @@ def _try(
     residual = values - Q @ (Q.T @ values)
     own = points[:, "XYZ".index(axis)]
     squares = []
-    for k in np.unique(place[(own > own.min()) & (own < own.max())]):
+    inside = (own > own.min()) & (own < own.max())
+    if len(np.unique(own[inside])) < FEW:
+        inside[:] = True
+    for k in np.unique(place[inside]):
         rows = np.flatnonzero(place == k)
         free = np.eye(len(rows)) - Q[rows] @ Q[rows].T
         if np.linalg.cond(free) > 1e10:
             return Tried(order, columns.shape[1], np.inf, np.inf)
         squares.append(float(np.mean(np.linalg.solve(free, residual[rows]) ** 2)))
-    if len(squares) < 2:
-        return Tried(order, columns.shape[1], float(np.sqrt(np.mean(squares))) if squares else np.inf, 0.0)
     margin = float(np.std(squares, ddof=1) / np.sqrt(len(squares)))
     return Tried(order, columns.shape[1], float(np.sqrt(np.mean(squares))), margin)
 
@@ -180,14 +188,14 @@ class _Polynomial:
         self.distinct = [len(np.unique(points[:, a])) for a in range(3)]
 
     def orders(self, n_places: int) -> Iterator[Order]:
-        """Give the orders that leave two points to spare, and no degree more than its coordinate can tell."""
+        """Give the orders that leave a third of the points to spare, and no degree that a coordinate cannot tell."""
         # Least squares on equidistant positions swings between them where the degree is above 2 sqrt(n).
         n_own = self.distinct[self.own]
         highest = min(n_own - 2, int(2 * n_own**0.5), HIGHEST)
         other = min(max((self.distinct[a] - 1 for a in self.others), default=0), HIGHEST_OTHER)
         for i in range(highest + 1):
             for j in range(min(other, i) + 1 if i else 1):
-                if len(self.exponents((i, j))) <= n_places - 2:
+                if 3 * len(self.exponents((i, j))) <= 2 * n_places:
                     yield i, j
 
     def exponents(self, order: Order) -> list[tuple[int, int, int]]:

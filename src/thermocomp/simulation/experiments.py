@@ -8,11 +8,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, unknown
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.instruments import Instrument
-from thermocomp.simulation.kits import Kit, unknown
+from thermocomp.simulation.kits import Kit
 from thermocomp.simulation.machine import Truth, VirtualMachine
 from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Programme, stream
 from thermocomp.simulation.sensors import Fault, follow, read, with_faults

@@ -3,10 +3,9 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import TypeVar
 
-from thermocomp.core.exceptions import SettingError
+from thermocomp.core.exceptions import SettingError, unknown
 from thermocomp.simulation.axes import AXES, STATIONS
 from thermocomp.simulation.geometry import SQUARENESS
 from thermocomp.simulation.heat import HeatSources
@@ -180,26 +179,6 @@ def check_labels(labels: Iterable[str]) -> None:
     for label in labels:
         if not re.fullmatch(r"[A-Za-z0-9_]+", label):
             raise SettingError(f"{label!r} cannot name a channel: use letters, digits and underscores")
-
-
-def unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
-    """Return the error of a name that nobody knows; it tells the nearest ones.
-
-    Parameters
-    ----------
-    what : str
-        What kind of thing was asked for.
-    name : str
-        What was found.
-    known : iterable of str
-        What there is.
-    path : tuple of str or int
-        Where it stands, see `SettingError`.
-    """
-    known = list(known)
-    near = get_close_matches(name, known, n=3, cutoff=0.4)
-    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
-    return SettingError(f"there is no {what} {name!r}; {hint}", path)
 
 
 _COLUMN = {

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from thermocomp.core.exceptions import SettingError
+from thermocomp.core.exceptions import SettingError, unknown
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.climate import Climate
 from thermocomp.simulation.instruments import Instrument, Touch, displacement, thermometer
-from thermocomp.simulation.kits import KITS, Kit, labelled, unknown
+from thermocomp.simulation.kits import KITS, Kit, labelled
 from thermocomp.simulation.segments import Path, Segment, Stretch, values
 from thermocomp.simulation.sensors import Fault
 

@@ -101,6 +101,8 @@ class ErrorField:
     def correction(self, points: ArrayLike, tool: ArrayLike | None = None, *, tolerance: float = 0.01) -> FloatArray:
         """Return what to add to the commanded position so that the tip is where it should be.
 
+        Only axes that the machine has are corrected.
+
         Parameters
         ----------
         points : array-like of shape (..., 3)
@@ -113,7 +115,7 @@ class ErrorField:
         Returns
         -------
         ndarray of shape (..., 3)
-            Along X, Y, Z [um].
+            Along X, Y, Z; zero along an axis that is not there [um].
 
         Raises
         ------
@@ -123,16 +125,19 @@ class ErrorField:
         Notes
         -----
         Moved by c the machine errs by e(P + c), not by e(P): c = -e(P + c), by exact transforms, solved by inserting.
+        Along an axis that is not there nothing moves: c is zero in each step, and what is left is e(P + c).
         """
         places = np.asarray(points, dtype=np.float64)
-        found = 0.0 - self.error(places, tool)
+        machine = self.kinematics.machine
+        there = np.array([float(a in machine.structure.axes) for a in "XYZ"])
+        found = 0.0 - there * self.error(places, tool)
         for _ in range(_STEPS):
-            before, found = found, 0.0 - self.error(places + 1e-3 * found, tool, exact=True)
+            before, found = found, 0.0 - there * self.error(places + 1e-3 * found, tool, exact=True)
             change = float(np.abs(found - before).max(initial=0.0))
             if change <= tolerance:
                 return found
         raise InputError(
-            f"machine {self.kinematics.machine.name}: the correction still changes by {change:.3g} um after {_STEPS} "
+            f"machine {machine.name}: the correction still changes by {change:.3g} um after {_STEPS} "
             "steps: check the units of the components"
         )
 

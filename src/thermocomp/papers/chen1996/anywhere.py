@@ -1,0 +1,281 @@
+"""Chen, Yuan, Ni 1996, headline: the error anywhere in the work volume, compensated.
+
+The synthesis itself is in the paper's ref. 6; here it is that of `thermocomp.volumetric`. What is compensated is judged
+by `thermocomp.simulation.volume`, which knows the machine and nothing of that synthesis.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.components import COMPONENTS
+from thermocomp.datasets import virtual
+from thermocomp.models.position import PositionFit
+from thermocomp.papers.chen1996.setup import TENFOLD
+from thermocomp.papers.chen1996.volume import Learned
+from thermocomp.papers.common import Errors, judged, shown
+from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
+from thermocomp.simulation.centre import MachiningCentre
+from thermocomp.simulation.experiments import SimulatedTest, simulate
+from thermocomp.simulation.geometry import cold
+from thermocomp.simulation.volume import VolumetricTruth
+from thermocomp.volumetric.kinematics import INDEX, Kinematics
+from thermocomp.volumetric.model import VolumetricModel
+from thermocomp.volumetric.straight import straight_lines
+
+FloatArray = NDArray[np.float64]
+
+#: points in the work volume, each in a thermal state of its own (C-35)
+POINTS = 1000
+#: what first order may cost against exact transforms [um]
+CLOSED = 0.1
+#: share of the points that the error's upper bound is told for [%]
+MOST = 95
+WITHOUT, WITH, LINES = "no compensation", "all components", "one straight line per axis"
+#: where what is left comes from
+SPINDLE, THERMAL, GEOMETRY = "drifts of the spindle", "thermal part of the axes", "cold profiles and squareness"
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """What compensation leaves at random points of the work volume, in random thermal states of unseen tests.
+
+    Parameters
+    ----------
+    learned : Learned
+    errors : mapping of str to ndarray of shape (n, 3)
+        By what was compensated [um].
+    causes : mapping of str to ndarray of shape (n, 3)
+        What is left with all components, by what was not told [um].
+    by_component : mapping of str to float
+        RMS of what each component's error does to the tool point [um].
+    closure : float
+        Largest difference between the error of first order, from the true components, and the true error [um].
+    """
+
+    learned: Learned
+    errors: Mapping[str, FloatArray]
+    causes: Mapping[str, FloatArray]
+    by_component: Mapping[str, float]
+    closure: float
+
+    @cached_property
+    def sizes(self) -> dict[str, FloatArray]:
+        """Lengths of the error vectors, each of shape (n,) [um]."""
+        return {name: np.linalg.norm(e, axis=1) for name, e in self.errors.items()}
+
+    def gain(self, what: str = WITH) -> float:
+        """Return how many times smaller the error is, by its RMS."""
+        return Errors.of(self.sizes[WITHOUT]).rms / Errors.of(self.sizes[what]).rms
+
+
+class _Part(NamedTuple):
+    """What one test tells; see `Volume`."""
+
+    points: FloatArray
+    errors: dict[str, FloatArray]
+    missed: FloatArray  #: true minus predicted components, (n, 32)
+    causes: dict[str, FloatArray]
+    closure: float
+
+
+def judge(learned: Learned, seed: int) -> Volume:
+    """Compensate experiment ``volumetric-new`` at random points of the volume and in random rows of its tests.
+
+    Parameters
+    ----------
+    learned : Learned
+    seed : int
+        Of weather, noise, points and rows; another one than what was learned from.
+
+    Returns
+    -------
+    Volume
+    """
+    rng = np.random.default_rng(seed)
+    tests = list(simulate(virtual.find("volumetric-new"), seed=seed, whole=True))
+    share = -(-POINTS // len(tests))
+    parts = [_judge(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
+    errors = {k: np.vstack([p.errors[k] for p in parts]) for k in parts[0].errors}
+    causes = {k: np.vstack([p.causes[k] for p in parts]) for k in parts[0].causes}
+    missed, points = np.vstack([p.missed for p in parts]), np.vstack([p.points for p in parts])
+    kinematics = Kinematics(learned.machine)
+    by_component = {}
+    for c in COMPONENTS:
+        alone = np.zeros(missed.shape)
+        alone[:, INDEX[c.code]] = missed[:, INDEX[c.code]]
+        by_component[c.code] = Errors.of(np.linalg.norm(kinematics.synthesize(alone, points)[0], axis=1)).rms
+    return Volume(learned, errors, causes, by_component, max(p.closure for p in parts))
+
+
+def _judge(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Part:
+    model, kinematics = VolumetricModel(learned.machine), Kinematics(learned.machine)
+    recording = virtual.recording(test)
+    states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
+    rows = rng.integers(0, len(recording), n)
+    points = rng.uniform(size=(n, 3)) * [TRAVEL[a] for a in AXES]
+    assert test.observables is not None
+    observables = test.observables[rows]
+
+    full, lines, told = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(COMPONENTS)))
+    middle = [float(TEST_POSITION[a]) for a in AXES]
+    for row in np.unique(rows):
+        here, field = rows == row, states[int(row)]
+        full[here] = field.correction(points[here])
+        told[here] = field.components(points[here])
+        straight = straight_lines(field, middle, grid=2).lines
+        lines[here] = [[line.correction.at(p[k]) for k, line in enumerate(straight)] for p in points[here].tolist()]
+    names = MachiningCentre().observables
+    truth, heat = VolumetricTruth(names), VolumetricTruth(names, geometry=False)
+    errors = {
+        name: truth.error(observables, points + 1e-3 * added) + added
+        for name, added in ((WITHOUT, np.zeros((n, 3))), (LINES, lines), (WITH, full))
+    }
+    told_cold = model.field(np.zeros(states.deviations.shape[1])).components(points)
+    true_warm = _as_measured(heat, observables, points)
+    true_cold = _as_measured(truth, np.zeros_like(observables), points)
+    missed = true_cold + true_warm - told
+    thermal = true_warm - (told - told_cold)
+    spindle = np.zeros_like(thermal)
+    drifts = [INDEX[c.code] for c in COMPONENTS if c.group == "spindle"]
+    spindle[:, drifts] = thermal[:, drifts]
+    causes = {
+        name: kinematics.synthesize(part, points)[0]
+        for name, part in ((SPINDLE, spindle), (THERMAL, thermal - spindle), (GEOMETRY, true_cold - told_cold))
+    }
+    first = kinematics.synthesize(true_cold + true_warm, points)[0]
+    return _Part(points, errors, missed, causes, float(np.abs(first - errors[WITHOUT]).max()))
+
+
+def _as_measured(truth: VolumetricTruth, observables: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the true components as instruments tell them, of shape (n, 32).
+
+    Lasers count the translations of an axis from the test position; what it does there is in the nest of probes.
+    """
+    test = np.tile([float(TEST_POSITION[a]) for a in AXES], (len(points), 1))
+    there, here = truth.components(observables, test), truth.components(observables, points)
+    values = np.zeros((len(points), len(COMPONENTS)))
+    for code, value in here.items():
+        values[:, INDEX[code]] += value
+        if code[0] == "E" and code[1] in "XYZ":
+            values[:, INDEX[code]] -= there[code]
+            values[:, INDEX[f"{code[1]}0C"]] += there[code]
+    return values
+
+
+# -- claims ----------------------------------------------------------------------------------------------------------
+
+
+def claims(found: Volume) -> list[Claim]:
+    """Judge what the paper says about the work volume, by criteria that were fixed beforehand."""
+    fits = found.learned.fits
+    straight = [code for code, fit in fits.items() if fit.enough == 1]
+    more = [f"{code} (m = {fit.enough})" for code, fit in fits.items() if fit.enough > 1]
+    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
+    causes = {name: Errors.of(np.linalg.norm(e, axis=1)).rms for name, e in found.causes.items()}
+    limits = "what is left comes from " + ", ".join(f"the {name} ({e:.2f} um)" for name, e in causes.items())
+    flat, full = (_off(f) for f in (found.learned.flat, fits["EYX"]))
+    return [
+        judged(
+            ("C-01", "C-08"),
+            "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
+            f"first order; the true error, composed exactly, is met within {CLOSED} um)",
+            "",
+            f"{found.closure:.3f} um at most",
+            found.closure <= CLOSED,
+            "angles are too large for first order",
+        ),
+        judged(
+            ("C-05",),
+            "In most cases first order describes the thermal part of a position-dependent component well enough",
+            "m = 1",
+            f"{len(straight)} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
+            2 * len(straight) > len(fits),
+            "the bent parts of bed and column make parabolas",
+        ),
+        judged(
+            ("C-06",),
+            "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
+            "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
+            "",
+            f"{flat:.2f} -> {full:.2f} um",
+            full < flat,
+            "the dependence is smaller than the noise",
+        ),
+        judged(
+            ("C-35",),
+            f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
+            "points and thermal states of tests that were not learned from (RMS)",
+            "ten times",
+            f"{Errors.of(found.sizes[WITHOUT]).rms:.1f} -> {Errors.of(found.sizes[WITH]).rms:.2f} um, "
+            f"{found.gain():.1f} times; {limits}; by component: {told}",
+            found.gain() >= TENFOLD,
+            "temperatures do not tell all that the screws and the spindle's shaft do",
+        ),
+        shown(
+            ("C-35",),
+            "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)",
+            "",
+            f"{Errors.of(found.sizes[LINES]).rms:.1f} um, {found.gain(LINES):.1f} times",
+        ),
+    ]
+
+
+def numbers(found: Volume) -> dict[str, float]:
+    """Return the figures that a page can assert."""
+    made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
+    short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
+    return made | {f"volume_{short[name]}_um": Errors.of(e).rms for name, e in found.sizes.items()}
+
+
+# -- tables and figures ----------------------------------------------------------------------------------------------
+
+
+def tables(found: Volume) -> list[Table]:
+    """Return the error before and after, and what each component was made of and leaves."""
+    rows = []
+    for name, size in found.sizes.items():
+        along = [f"{Errors.of(found.errors[name][:, k]).rms:.2f}" for k in range(3)]
+        e = Errors.of(size)
+        rows.append([name, f"{e.rms:.2f}", f"{np.percentile(size, MOST):.2f}", f"{e.max_abs:.2f}", *along])
+    header = ("", "RMS", f"{MOST} %", "max", "X RMS", "Y RMS", "Z RMS")
+    parts = []
+    for c in COMPONENTS:
+        fit = found.learned.fits.get(c.code)
+        source = found.learned.machine.components.get(c.code)
+        how = "no model: in the spindle's drifts" if source is None else "constant" if fit is None else ""
+        if c.group == "spindle":
+            how = "drift"
+        made = ["", "", ""] if fit is None else [f"{fit.profile.order[0]}", f"{fit.enough}", f"{fit.thermal_rms:.2f}"]
+        parts.append([c.code, c.description, how, *made, f"{found.by_component[c.code]:.2f}"])
+    return [
+        Table(f"Length of the error at {POINTS} random points and thermal states [um]", header, rows),
+        Table(
+            "The 32 components: degree of the cold profile, m, thermal part [um, urad RMS], and what its own error "
+            "does to the tool point [um RMS]",
+            ("", "", "", "degree", "m", "thermal", "left"),
+            parts,
+        ),
+    ]
+
+
+def figures(found: Volume) -> list[Figure]:
+    """Return how large the error is in what share of the points."""
+    share = 100.0 * np.arange(1, POINTS + 1) / POINTS
+    curves = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
+    panel = Panel("", "length of the error vector [um]", "points with a smaller one [%]", curves)
+    text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
+    return [Figure("chen1996-volume", text, [panel])]
+
+
+def _off(fit: PositionFit) -> float:
+    """Return how far the cold profile of EYX is off the true one, RMS over the travels of X and Z [um]."""
+    x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
+    points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
+    assert fit.model.profile is not None
+    return Errors.of(fit.model.profile.at(points) - cold("EYX", points)).rms

@@ -1,0 +1,127 @@
+"""Chen, Yuan, Ni 1996, section 2: the components of the whole machine, learned from lasers, levels and probes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from thermocomp.core.components import BY_CODE
+from thermocomp.core.machine import Axis, Channel, Machine, Source
+from thermocomp.core.structure import Structure
+from thermocomp.datasets import virtual
+from thermocomp.models.position import PositionFit, PositionOptions, fit_position
+from thermocomp.models.training import train
+from thermocomp.papers import common
+from thermocomp.recording.cycles import find_cycles
+from thermocomp.recording.profiles import Profiles
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL
+from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE
+
+STRUCTURE = "w X' b Z Y (C1) t"
+METHOD = "dynamic"
+#: a round of the lasers takes 20 min: every so many rows of the recording
+ROUND = 4
+#: rounds before anything turns or moves: they tell the cold profiles
+COLD = (0, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """A machine that was measured, and what its components were learned from.
+
+    Parameters
+    ----------
+    machine : Machine
+        18 components of the axes as position models, three squareness errors, five drifts of the spindle. The shifts of
+        the axes' references are in the latter: the probes see their sum.
+    fits : mapping of str to PositionFit
+        By code of the component.
+    flat : PositionFit
+        EYX as if it depended on X alone (C-06).
+    """
+
+    machine: Machine
+    fits: Mapping[str, PositionFit]
+    flat: PositionFit
+
+
+def learn(seed: int) -> Learned:
+    """Measure the machine in experiment ``volumetric`` and learn its components.
+
+    Parameters
+    ----------
+    seed : int
+        Of weather and noise.
+
+    Returns
+    -------
+    Learned
+    """
+    tests = virtual.record("volumetric", seed=seed)
+    inputs = [c.name for c in tests[0].temperatures] + ["spindle_rpm"]
+    rounds = [every(test, ROUND) for test in tests]
+    found: Sequence[PositionFit] = Parallel(n_jobs=-1, prefer="threads")(
+        delayed(_component)(code, rounds, inputs, "XZ" if code == "EYX" else None) for code in (*COMPONENTS, "EYX flat")
+    )
+    fits = dict(zip(COMPONENTS, found, strict=False))
+    sources: dict[str, Source] = {code: fit.model for code, fit in fits.items()}
+    for code in ("C0Y", "B0Z", "A0Z"):
+        sources[code] = float(np.mean([test.table[f"{code}_urad"].mean() for test in rounds]))
+    return Learned(_machine(sources | _spindle(tests, inputs)), fits, found[-1])
+
+
+def every(test: Recording, step: int) -> Recording:
+    """Return every so many rows of a recording."""
+    time, table = test.time[::step], test.table.iloc[::step].reset_index(drop=True)
+    return replace(test, time=time, table=table, cycles=find_cycles(time, table["spindle_rpm"].to_numpy()))
+
+
+def _component(code: str, rounds: Sequence[Recording], inputs: Sequence[str], coordinates: str | None) -> PositionFit:
+    """Fit a component of an axis, by as many powers of the position as its own profiles ask for."""
+    code, _, flat = code.partition(" ")
+    options = PositionOptions(
+        method=METHOD,
+        inputs=inputs,
+        offset=BY_CODE[code].unit == "urad",  # levels keep their zero, lasers do not
+        coordinates=coordinates,
+        reference=COLD,
+        reference_position=float(TEST_POSITION[code[2].lower()]),
+    )
+    profiles = [_profiles(code, test, flat=bool(flat)) for test in rounds]
+    fit = fit_position(profiles, options)
+    return fit if fit.enough == options.slopes else fit_position(profiles, replace(options, slopes=fit.enough))
+
+
+def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
+    """Return the profiles of a component; of EYX with Z at both ends of its travel too."""
+    axis, unit = code[2], BY_CODE[code].unit
+    stations = STATIONS[axis.lower()]
+    lines = [("", {})] if code != "EYX" or flat else [("_z0", {"z": 0}), ("", {}), ("_z600", {"z": 600})]
+    points = [[{**TEST_POSITION, **aside, axis.lower(): p}[a] for a in AXES] for _, aside in lines for p in stations]
+    columns = [f"{code}{suffix}_{p}_{unit}" for suffix, _ in lines for p in stations]
+    values = test.table[columns].to_numpy(dtype=np.float64)
+    return Profiles(code, unit, axis, np.array(points, dtype=np.float64), values, test)
+
+
+def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Source]:
+    """Learn the drifts of the spindle from the nest of probes; the tilts of the axes are not its own."""
+    tilts = {
+        "A0C": {"y1_um": 1.0 / PROBE_DISTANCE, "y2_um": -1.0 / PROBE_DISTANCE},
+        "B0C": {"x2_um": 1.0 / PROBE_DISTANCE, "x1_um": -1.0 / PROBE_DISTANCE},
+    }
+    for code, weights in tilts.items():
+        levels = {f"E{code[0]}{a.upper()}_{TEST_POSITION[a]}_urad": -1.0 for a in AXES}
+        tests = [common.derived(test, Channel(code, "angle", "urad"), weights | levels) for test in tests]
+    channels = {"X0C": "x1_um", "Y0C": "y1_um", "Z0C": "z_um", "A0C": "A0C", "B0C": "B0C"}
+    samples = stack(list(tests), list(channels.values()), inputs)
+    seen = np.ones(len(samples), dtype=np.bool_)
+    return {code: train(METHOD, samples, k, seen).model for k, code in enumerate(channels)}
+
+
+def _machine(components: Mapping[str, Source]) -> Machine:
+    test = (float(TEST_POSITION["x"]), float(TEST_POSITION["y"]), float(TEST_POSITION["z"]))
+    axes = tuple(Axis(a.upper(), (0.0, TRAVEL[a]), TEST_POSITION[a], test, TEST_BAR) for a in AXES)
+    return Machine("virtual", Structure.parse(STRUCTURE), axes, components, spindle_tool=TEST_BAR, tool=TEST_BAR)
