@@ -8,8 +8,8 @@ nine temperatures: by multiple regression analysis (MRA) with stepwise choice am
 by an artificial neural network. Then both are tried on what they have not seen, with noise, and with a sensor cut off.
 
 Here the same is done on the virtual machining centre. It is another machine than Chen's, so numbers differ; what is
-compared is whether what the paper says of the methods also holds here. What it says of the whole working volume needs
-the machine's kinematics, which is not built yet: its headline is judged at one position.
+compared is whether what the paper says of the methods also holds here. Its headline is judged at the tool point, on a
+dimension along Y, and in the whole work volume.
 """
 
 # %%
@@ -121,7 +121,7 @@ draw("fig10", "fig11", "fig12")
 # in place of twelve. Fig. 6: some of the profiles. Fig. 1: its pitch, measured at the same time.
 
 draw("fig6", "fig1")
-tell("C-22", "C-05", "C-23", "C-24", "C-27")
+tell("C-22", "C-05")
 show(6, 7, 8)
 assert numbers["slope_sets"] == 51
 assert numbers["lateral_measured_um"] < 0.2 * numbers["lateral_none_um"]
@@ -130,6 +130,32 @@ assert numbers["lateral_measured_um"] < 0.2 * numbers["lateral_none_um"]
 # Figs. 7 and 13: the slope over time, and the fits by regression and by the 5-8-1 net.
 
 draw("fig7", "fig13")
+
+# %%
+# Do 51 profiles tell the law?
+# ----------------------------
+#
+# The regression keeps a few of 20 terms, and the paper reads them as a law. Whether they are one cannot be seen from
+# the fit: in one warm-up all temperatures rise together, one term stands in for another, and the wrong ones tell the
+# slope as well. So Eq. 6 and 8 are planted on the virtual machine's temperatures, noise is put on laser (0.3 um) and
+# sensors (0.05 degC), and the law is sought many times, with other weather and noise.
+#
+# Two things bring it back. What is to be told apart must be warmed apart: three tests of 17 profiles, in which the
+# spindle warms the column's front, the Y axis its own drive, and a heating mat the column's rear right; each profile is
+# the mean of five runs (``thermocomp simulate chen1996-law``). And temperatures and slopes must count from the mean
+# state of their test. Counted from the cold state, nearly all changes of a test have one sign, a square looks like its
+# temperature, and the stepwise choice goes astray with products at its first steps, however little noise there is; and
+# all slopes of a test share the noise of its one cold profile. Letting products in only after their factors helps.
+# For use on the machine the coefficients are the same from any reference, only the cold profile is not.
+#
+# The net fits as closely. It has no terms, and uses what has no part in the law.
+
+tell("C-23", "C-24", "C-27")
+show(9, 10)
+assert numbers["law_whole"] >= 0.95
+assert numbers["law_whole_cold"] < 0.8
+assert numbers["law_whole_one_warm_up"] < 0.2
+assert numbers["law_elsewhere_mra"] < numbers["law_elsewhere_net"]
 
 # %%
 # New observations
@@ -141,7 +167,7 @@ draw("fig7", "fig13")
 
 draw("fig14", "fig15")
 tell("C-32")
-show(9)
+show(11)
 assert numbers["rms_z_1250_net_um"] < 0.5 * numbers["rms_z_1250_none_um"]
 assert numbers["rms_z_random_dynamic_um"] < 0.3 * numbers["rms_z_random_none_um"]
 
@@ -160,8 +186,16 @@ assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 # Ten times better?
 # -----------------
 #
-# The paper's headline, on the two new tests and on another day of the Y axis. The fit is not asked any more here: these
-# are errors that a part would have had.
+# The paper's headline, on the two new tests, on another day of the Y axis, and in the whole work volume. The fit is not
+# asked any more here: these are errors that a part would have had.
+#
+# For the volume all six components of each axis are measured by lasers and levels in several thermal states, the
+# spindle's drift by a nest of probes, on six days of work; each component becomes a cold profile and thermal slopes. On
+# two other days, at a thousand random points and moments, the machine is then corrected by what these models say of it,
+# and judged by what it truly does.
 
-tell("C-35")
+tell("C-01", "C-05", "C-06", "C-35")
+draw("volume")
+show(-2, -1)
 assert numbers["largest_error_net_um"] < numbers["largest_error_none_um"]
+assert numbers["volume_gain"] >= 10.0

@@ -97,8 +97,9 @@ def test_outside_tells_which_input() -> None:
 def test_a_number_that_is_none_is_refused(bad: float) -> None:
     model = line()
     state, _ = model.step(model.init(), np.array([20.0]), 0.0)
-    with pytest.raises(ReadingError):
-        model.step(state, np.array([bad]), 1.0)
+    for before in (model.init(), state):
+        with pytest.raises(ReadingError):
+            model.step(before, np.array([bad]), 1.0)
     with pytest.raises(ReadingError):
         model.step(state, np.array([20.0]), bad)
     with pytest.raises(ReadingError):

@@ -3,7 +3,7 @@
 import pytest
 
 from thermocomp.core.exceptions import UnitError
-from thermocomp.core.units import unit
+from thermocomp.core.units import measured, unit
 
 
 @pytest.mark.parametrize(
@@ -44,3 +44,30 @@ def test_wrong_quantity_says_what_it_measures() -> None:
 def test_unknown_quantity() -> None:
     with pytest.raises(UnitError, match="unknown quantity 'colour'"):
         unit("degC", "colour")
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "value"),
+    [
+        ("250 mm", "position", 250.0),
+        (" -1.5e-1m ", "position", -150.0),
+        (".5 urad", "angle", 0.5),
+        ("+3. µm", "displacement", 3.0),
+        ("68 °F", "temperature", 20.0),
+        ("1.5 h", "time", 5400.0),
+    ],
+)
+def test_a_value_with_its_unit(text: str, quantity: str, value: float) -> None:
+    assert measured(text, quantity) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize("text", [250, 250.0, None, True, ["250 mm"], "", "mm", "250", "12,5 mm", "1 2 mm", "1.2.3 mm"])
+def test_what_is_no_value_with_its_unit(text: object) -> None:
+    assert measured(text, "position") is None
+
+
+def test_a_value_with_a_wrong_unit_or_without_end() -> None:
+    with pytest.raises(UnitError, match="'degC' measures temperature, not position"):
+        measured("250 degC", "position")
+    with pytest.raises(UnitError, match="is no finite number"):
+        measured("1e999 mm", "position")

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.dynamic import MINUTE, DynamicRidge
+from thermocomp.models.dynamic import MINUTE, SHORTEST_LAG, DynamicRidge
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.recording.samples import Samples
 
@@ -81,6 +82,59 @@ def test_without_time_every_row_is_at_rest(samples: Samples) -> None:
     X = samples.frame()
     alone = np.array([estimator.predict(X.iloc[[k]])[0] for k in (0, 50, 600)])
     assert estimator.predict(X)[[0, 50, 600]] == pytest.approx(alone, rel=1e-12)
+
+
+def network(seed: int, *, minutes: int = 96 * 60) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return four noisy temperatures and the deviation, every minute, of first-order bodies heated by two drives.
+
+    The deviation comes from a body that no sensor sees, with a time constant of 15 min.
+    """
+    rng = np.random.default_rng(seed)
+    power = np.zeros((minutes, 2))
+    for drive in range(2):
+        start = 0
+        while start < minutes:
+            end = start + int(rng.integers(60, 300))
+            power[start:end, drive] = rng.uniform()
+            start = end
+    share = -np.expm1(-1.0 / np.array([20.0, 30.0, 90.0, 240.0, 15.0]))
+    bodies = np.zeros((minutes + 1, 5))
+    for k, (first, second) in enumerate(power):
+        a, b, c, *_ = bodies[k]
+        goals = np.array([10 * first, 8 * second, 0.5 * a + 0.4 * b, 0.6 * c, 0.8 * a + 0.6 * b])
+        bodies[k + 1] = bodies[k] + share * (goals - bodies[k])
+    noise = rng.normal(size=(minutes, 5))
+    temperatures = bodies[1:, :4] + 0.2 * noise[:, :4]
+    return temperatures, 5 * bodies[1:, 4] + 2 * bodies[1:, 2] + 0.3 * noise[:, 4]
+
+
+def left(estimator: DynamicRidge, every: int) -> float:
+    """Return the RMS that is left of another recording of the network with a row every so many minutes."""
+    temperatures, deviation = network(4)
+    y = deviation[::every]
+    steps = np.r_[np.inf, np.full(len(y) - 1, every * MINUTE)]
+    return float(np.sqrt(np.mean((y - estimator.predict(temperatures[::every], dt=steps)) ** 2)))
+
+
+def learned_slowly(**settings: object) -> DynamicRidge:
+    temperatures, deviation = (values[::20] for values in network(3))
+    estimator = DynamicRidge(**settings)  # type: ignore[arg-type]
+    return estimator.fit(temperatures, deviation, dt=np.r_[np.inf, np.full(len(deviation) - 1, 20 * MINUTE)])
+
+
+def test_learned_from_slow_rows_it_runs_at_fast_ones() -> None:
+    estimator = learned_slowly()
+    assert min(estimator.temperature_lags_) >= SHORTEST_LAG * 20 * MINUTE
+    assert left(estimator, 1) < 1.5 * left(estimator, 20) < 2.0
+    # a set is left out whole, and if none is left, temperatures are not lagged
+    assert learned_slowly(temperature_lags=((5 * MINUTE,), (10 * MINUTE, 160 * MINUTE))).temperature_lags_ == ()
+
+
+def test_without_the_limit_of_lags_fast_rows_go_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("thermocomp.models.dynamic.SHORTEST_LAG", 0.0)
+    estimator = learned_slowly()
+    assert min(estimator.temperature_lags_) < SHORTEST_LAG * 20 * MINUTE
+    assert left(estimator, 1) > 3 * left(estimator, 20)
 
 
 def test_chunks_do_not_matter(samples: Samples, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -153,9 +153,21 @@ def test_correction_leaves_less_than_a_hundredth_of_a_micrometre(code: str, seed
     points = rng.uniform(-400, 400, (6, 3))
     correction = field.correction(points)
     there = np.array([a in machine.structure.axes for a in "XYZ"])
-    left = field.error(points + 1e-3 * correction * there, exact=True) + correction
-    assert np.abs(left).max() < 0.01
-    assert np.abs(correction).max() > 0.1
+    left = field.error(points + 1e-3 * correction, exact=True) + correction
+    assert np.abs(left[:, there]).max() < 0.01
+    assert np.abs(correction[:, there]).max() > 0.1
+    assert not correction[:, ~there].any()
+
+
+def test_an_axis_that_is_not_there_corrects_nothing() -> None:
+    """A lathe-like machine errs along Y as well: that stays, and is not in the way of X and Z."""
+    values = np.zeros(len(COMPONENTS))
+    values[[INDEX[c] for c in ("EXX", "EYX", "EZX", "Y0C")]] = 3.0, 40.0, -2.0, -5.0
+    field = ErrorField(Kinematics(by_hand("XFZ", {})), values)
+    point = np.array([100.0, 0.0, 50.0])
+    correction = field.correction(point)
+    assert correction.tolist() == [pytest.approx(-3.0), 0.0, pytest.approx(2.0)]
+    assert field.error(point + 1e-3 * correction, exact=True) + correction == pytest.approx([0.0, 35.0, 0.0], abs=1e-9)
 
 
 def test_a_correction_that_does_not_settle_is_refused() -> None:

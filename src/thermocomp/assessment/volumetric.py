@@ -12,11 +12,12 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine, Source, Vector
 from thermocomp.core.model import ErrorModel, Input
 from thermocomp.core.position import PositionModel
+from thermocomp.core.size import Size
 from thermocomp.recording.recording import Recording
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import Kinematics
 from thermocomp.volumetric.model import ThermalStates, VolumetricModel
-from thermocomp.volumetric.straight import Size, StraightLines, straight_lines
+from thermocomp.volumetric.straight import StraightLines, left_by, straight_lines
 
 FloatArray = NDArray[np.float64]
 #: rows in which the largest error is looked for
@@ -106,18 +107,12 @@ class Moment:
 
     def after_lines(self, points: FloatArray) -> FloatArray:
         """Return what is left behind the straight lines of the axes, of shape (..., 3) [um]."""
-        correction = np.zeros(points.shape)
-        for line in self.straight.lines:
-            k, c = "XYZ".index(line.axis), line.correction
-            correction[..., k] = c.offset + c.slope * 1e-3 * (points[..., k] - c.reference_position)
-        return self._left(points, correction)
+        lines = {line.axis: line.correction for line in self.straight.lines}
+        return left_by(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
         """Return what is left behind the whole correction, a vector at every point, of shape (..., 3) [um]."""
-        return self._left(points, self.field.correction(points, self.tool))
-
-    def _left(self, points: FloatArray, correction: FloatArray) -> FloatArray:
-        """Return the error where the axes stand once they are corrected, and the correction itself."""
+        correction = self.field.correction(points, self.tool)
         return self.error(points + 1e-3 * correction) + correction
 
     @cached_property

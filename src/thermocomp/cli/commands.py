@@ -4,16 +4,12 @@ What needs the training wing is imported inside the commands, so that ``thermoco
 without it.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from thermocomp.assessment.choice import Progress as Told
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Flag,
@@ -28,6 +24,7 @@ from thermocomp.cli.options import (
     refuse_existing,
     tell_trouble,
 )
+from thermocomp.cli.progress import by_steps
 from thermocomp.core.exceptions import InputError
 
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
@@ -38,7 +35,6 @@ STOPPED = 130
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
 
 _console = Console(highlight=False)
-_progress_console = Console(stderr=True)
 
 
 def demo(
@@ -95,9 +91,10 @@ def simulate(
     Parameters
     ----------
     experiment : str
-        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-new, chen1996-slope, demo,
-        etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing, random, stepwise2017,
-        stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets, wessel-tool.
+        A protocol of your own, as a path that ends in .toml, or one of: chen1996, chen1996-law, chen1996-new,
+        chen1996-slope, demo, etve, hwang, iso230-axis, iso230-spindle, precompensation, precompensation-cut, probing,
+        random, stepwise2017, stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets,
+        wessel-tool.
     output : Path
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     seed : int
@@ -126,7 +123,7 @@ def simulate(
         else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, n_tests + 1)]
     )
     refuse_existing(paths, overwrite)
-    with _progress(n_tests, json or quiet) as progress:
+    with by_steps(n_tests, hidden=json or quiet) as progress:
         tests = virtual.record(found, seed=seed, sensor_noise=noise, progress=progress)
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)
@@ -210,7 +207,7 @@ def select(
     samples = study.samples(tests)
     # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
     judging = study.judging(samples) if method == "pareto" else Judging("", ())
-    with _progress(selecting.n_pieces(method, samples, judging, settings), json) as progress:
+    with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
         choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
@@ -273,7 +270,7 @@ def fit(
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     judging = study.judging(samples)
-    with _progress(n_pieces(samples, [model], judging) + len(samples.targets), quiet or json) as progress:
+    with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
             samples, model, judging, support=Support(support, margin), jobs=study.jobs, progress=progress
         )
@@ -316,7 +313,7 @@ def assess(
         from thermocomp.files import modelfile
     models = modelfile.read(model)
     trouble = tell_trouble(tests)
-    with _progress(len(models), json) as progress:
+    with by_steps(len(models), hidden=json) as progress:
         judged = studies.assess(models, tests, progress=progress)
     out.show_assess(judged, trouble, _console, as_json=json)
     return 0 if all(a.accepted for a in judged.assessments) else 1
@@ -365,7 +362,7 @@ def compare(
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     judging = study.judging(samples)
-    with _progress(comparing.n_pieces(samples, models, judging), json) as progress:
+    with by_steps(comparing.n_pieces(samples, models, judging), hidden=json) as progress:
         comparison = comparing.compare(samples, models, judging, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
@@ -375,15 +372,3 @@ def compare(
     if comparison.left:
         return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1
-
-
-@contextmanager
-def _progress(total: int, hidden: bool) -> Iterator[Told]:
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
-        task = bar.add_task("working", total=total)
-
-        def tell(text: str, /, steps: int = 1) -> None:
-            bar.update(task, description=text, advance=steps)
-
-        yield tell

@@ -1,6 +1,5 @@
 """``thermocomp iso230``: thermal tests (ISO 230-3), positioning (ISO 230-2) and time constants."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -19,7 +18,7 @@ from thermocomp.cli.options import (
     tell_trouble,
 )
 from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.core.units import unit
+from thermocomp.core.units import measured
 
 if TYPE_CHECKING:
     from thermocomp.assessment.iso230_2 import PositioningResult
@@ -32,7 +31,6 @@ Tables = Annotated[list[Path], Parameter(consume_multiple=True, negative=(), sho
 Test = Literal["etve", "spindle", "axis"]
 
 _console = Console(highlight=False)
-_LENGTH = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*([^\s\d.]\S*)\s*")
 #: columns that the widest table needs
 TABLE_WIDTH = 118
 
@@ -135,13 +133,13 @@ def length(text: str, what: str) -> float:
     InputError
         It is no number with a unit of length.
     """
-    found = _LENGTH.fullmatch(text)
-    if found is None:
-        raise InputError(f'{what} {text!r}: write a number and its unit, such as "100 mm"')
     try:
-        return float(found[1]) * unit(found[2], "position").scale
+        found = measured(text, "position")
     except UnitError as e:
         raise InputError(f"{what} {text!r}: {e}") from e
+    if found is None or found < 0:
+        raise InputError(f'{what} {text!r}: write a number and its unit, such as "100 mm"')
+    return found
 
 
 def _pairs(recording: "Recording", distance: str | None, pairs: list[str] | None) -> "tuple[Pair, ...]":

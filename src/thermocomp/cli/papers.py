@@ -1,15 +1,12 @@
 """``thermocomp papers``: the papers' studies redone, their number beside ours."""
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from thermocomp.cli.extras import needs
@@ -22,6 +19,7 @@ from thermocomp.cli.options import (
     refuse_existing,
     tell_trouble,
 )
+from thermocomp.cli.progress import by_share
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -40,7 +38,6 @@ CROSS = "cross"
 TABLE_WIDTH = 120
 
 _console = Console(highlight=False)
-_progress_console = Console(stderr=True)
 _STYLES = {"yes": "green", "no": "bold red", "-": "dim"}
 
 
@@ -112,7 +109,7 @@ def papers(
     done: list[tuple[Study, float]] = []
     for number, name in enumerate(chosen, start=1):
         begin = time.perf_counter()
-        with _progress(f"{number}/{len(chosen)} {name}", json) as progress:
+        with by_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
             study = (
                 _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, repeats, progress)
             )
@@ -205,15 +202,3 @@ def _content(study: "Study", seconds: float) -> dict[str, Any]:
         "tables": [{"caption": t.caption, "header": t.header, "rows": t.rows} for t in study.tables],
         "numbers": study.numbers,
     }
-
-
-@contextmanager
-def _progress(name: str, hidden: bool) -> "Iterator[Told]":
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
-        task = bar.add_task(name, total=1.0)
-
-        def tell(share: float, text: str) -> None:
-            bar.update(task, completed=share, description=f"{name}: {text}")
-
-        yield tell

@@ -1,23 +1,20 @@
 """``thermocomp volumetric``: the error anywhere in the work volume, in the course of a recording."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import Flag, Json, OptionalOutput, read_recordings, refuse_existing, tell_trouble
+from thermocomp.cli.progress import by_share
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
     from thermocomp.assessment.volumetric import Moment, Volumetric
-    from thermocomp.assessment.volumetric import Progress as Told
 
 Point = Annotated[tuple[float, float, float] | None, Parameter(negative=())]
 Hours = Annotated[list[float] | None, Parameter(consume_multiple=True, negative=())]
@@ -26,7 +23,6 @@ TOLD = 8
 GRID = 5
 
 _console = Console(highlight=False)
-_progress_console = Console(stderr=True)
 
 
 def volumetric(
@@ -89,7 +85,7 @@ def volumetric(
     known = read_machine(machine)
     tests = read_recordings([recording], mapping) if recording is not None else []
     trouble = tell_trouble(tests)
-    with _progress(json) as progress:
+    with by_share("replaying", hidden=json) as progress:
         result = study(
             known,
             tests[0] if tests else None,
@@ -284,15 +280,3 @@ def _content(study: "Volumetric") -> dict[str, Any]:
 
 def _number(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
-
-
-@contextmanager
-def _progress(hidden: bool) -> "Iterator[Told]":
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_progress_console, transient=True, disable=hidden) as bar:
-        task = bar.add_task("replaying", total=1.0)
-
-        def tell(share: float) -> None:
-            bar.update(task, completed=share)
-
-        yield tell

@@ -2,8 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
+
+#: one position, or an array of them
+Position = TypeVar("Position", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
@@ -24,7 +31,7 @@ class Deviation:
     slope: float = 0.0
     reference_position: float = 0.0
 
-    def at(self, position: float) -> float:
+    def at(self, position: Position) -> Position:
         """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
@@ -55,7 +62,7 @@ class Correction:
         # "0.0 -" rather than a bare minus: a zero deviation must not become -0.0 in a journal or a controller
         return cls(0.0 - deviation.offset, 0.0 - deviation.slope, deviation.reference_position)
 
-    def at(self, position: float) -> float:
+    def at(self, position: Position) -> Position:
         """Correction [um] at a position [mm]."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 

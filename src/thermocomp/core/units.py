@@ -1,5 +1,7 @@
 """Units at the doors: inside the house everything is mm, um, urad, degC, s, 1/min."""
 
+import math
+import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -98,6 +100,9 @@ _ALIASES = {
     "": "1",
 }
 
+#: a number and its unit, such as 12.5 mm or 1e-3urad
+_MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?)\s*")
+
 _BY_KEY = {(u.symbol, u.quantity): u for u in _UNITS}
 
 
@@ -139,3 +144,33 @@ def unit(symbol: str, quantity: str | None = None) -> Unit:
     near = get_close_matches(symbol, known, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(near)}?" if near else "."
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")
+
+
+def measured(text: object, quantity: str) -> float | None:
+    """Read a value that is written with its unit.
+
+    Parameters
+    ----------
+    text : object
+        Such as ``"250 mm"``.
+    quantity : str
+        What it must measure, a key of `HOUSE_UNITS`.
+
+    Returns
+    -------
+    float or None
+        In the house unit; None: it is no text of a number and a unit.
+
+    Raises
+    ------
+    UnitError
+        The unit is unknown, or does not measure the quantity; or the number is not finite.
+    """
+    found = _MEASURED.fullmatch(text) if isinstance(text, str) else None
+    if found is None:
+        return None
+    known = unit(found[2], quantity)
+    value = known.scale * float(found[1]) + known.shift
+    if not math.isfinite(value):
+        raise UnitError("is no finite number")
+    return value

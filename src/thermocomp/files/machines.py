@@ -1,9 +1,6 @@
 """Machine files: axes, lengths and what is known of the 32 components, written as TOML; see :doc:`/machine_file`."""
 
 import json
-import math
-import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -16,14 +13,14 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
-from thermocomp.core.units import unit
+from thermocomp.core.units import measured
 from thermocomp.files import jsonfile, modelfile, positionfile
+from thermocomp.files.tomlfile import read_toml
 
 Keys = tuple[str | int, ...]
 #: turns what stands under a key into house units; gets the key's path for its error
 Convert = Callable[[Any, Keys], Any]
 
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?)?\s*")
 #: what a value with a unit is called, and an example of it
 _SAID = {
     "position": ("length", "600 mm"),
@@ -75,14 +72,7 @@ def read_machine(path: str | Path) -> Machine:
         Z0C = {model = "drift.json", target = "z"}
     """
     source = Path(path)
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as e:
-        raise InputError(f"{source}: no such machine file") from e
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as a machine file: {e}") from e
-    except tomllib.TOMLDecodeError as e:
-        raise InputError(f"{source}: not valid TOML: {e}") from e
+    content = read_toml(source, "machine file")
     try:
         return _machine(content, source)
     except SettingError as e:
@@ -244,19 +234,15 @@ def _measure(quantity: str) -> Convert:
     what, example = _SAID[quantity]
 
     def convert(value: Any, where: Keys) -> float:
-        found = _NUMBER.fullmatch(value) if isinstance(value, str) else None
-        if not found or found[2] is None:
+        try:
+            number = measured(value, quantity)
+        except UnitError as e:
+            raise SettingError(f'"{value}": {e}', where) from e
+        if number is None:
             shown = json.dumps(value) if isinstance(value, str | float | int) else repr(value)
             raise SettingError(
                 f'{shown}: write a{"n" * (what[0] in "a")} {what} with its unit, such as "{example}"', where
             )
-        try:
-            known = unit(found[2], quantity)
-        except UnitError as e:
-            raise SettingError(f'"{value}": {e}', where) from e
-        number = known.scale * float(found[1]) + known.shift
-        if not math.isfinite(number):
-            raise SettingError(f'"{value}": is no finite number', where)
         return number
 
     return convert

@@ -2,7 +2,6 @@
 
 import codecs
 import math
-import tomllib
 from collections.abc import Mapping as AbstractMapping
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
@@ -13,6 +12,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, unit
+from thermocomp.files.tomlfile import read_toml
 
 Role = Literal[
     "temperature",
@@ -220,14 +220,7 @@ def read_mapping(path: str | Path) -> Mapping:
         missing = [-180.0]
     """
     source = Path(path)
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as e:
-        raise InputError(f"{source}: no such mapping file") from e
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as a mapping: {e}") from e
-    except tomllib.TOMLDecodeError as e:
-        raise InputError(f"{source}: not valid TOML: {e}") from e
+    content = read_toml(source, "mapping file")
     try:
         return ADAPTER.validate_python(content)
     except ValidationError as e:

@@ -1,7 +1,6 @@
 """Protocols of tests on the virtual machines, written as TOML; see :doc:`/protocols`."""
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -11,7 +10,8 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.exceptions import InputError, SettingError, UnitError, unknown
-from thermocomp.core.units import unit
+from thermocomp.core.units import measured
+from thermocomp.files.tomlfile import read_toml
 from thermocomp.simulation.climate import CLIMATES, Climate
 from thermocomp.simulation.instruments import Touch
 from thermocomp.simulation.protocol import Experiment, Plan
@@ -22,7 +22,6 @@ from thermocomp.simulation.sensors import Fault
 #: the one door for a protocol from outside
 ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Experiment))
 
-_TIME = re.compile(r"\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)\s*")
 #: keys that hold a time, which is written with its unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
 #: keys that hold true or false, and texts that may look like a number
@@ -86,14 +85,7 @@ def read_protocol(path: str | Path) -> Experiment:
         ]
     """
     source = Path(path)
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as e:
-        raise InputError(f"{source}: no such protocol file") from e
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as a protocol: {e}") from e
-    except tomllib.TOMLDecodeError as e:
-        raise InputError(f"{source}: not valid TOML: {e}") from e
+    content = read_toml(source, "protocol file")
     try:
         _check_types(content, ())
         given = _in_house_units(content)
@@ -167,13 +159,13 @@ def _seconds(value: Any, path: Keys) -> Any:
         return {key: _seconds(v, (*path, key)) for key, v in value.items()}
     if isinstance(value, list):
         return [_seconds(v, (*path, k)) for k, v in enumerate(value)]
-    found = _TIME.fullmatch(value) if isinstance(value, str) else None
-    if not found:
-        raise SettingError('write a time with its unit, such as "30 min", "6 h" or "10 s"', path)
     try:
-        return float(found[1]) * unit(found[2], "time").scale
+        seconds = measured(value, "time")
     except UnitError as e:
         raise SettingError(str(e), path) from e
+    if seconds is None:
+        raise SettingError('write a time with its unit, such as "30 min", "6 h" or "10 s"', path)
+    return seconds
 
 
 def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, str]:

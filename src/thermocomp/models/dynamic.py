@@ -68,7 +68,8 @@ class DynamicRidge(ThermalRegressor):
     of the ridge and the set of time constants are chosen by leaving out whole thermal cycles, one after the other,
     inside the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
     RMS is within one standard error of the smallest (the one-standard-error rule of Breiman et al. 1984). A set with a
-    lag of the temperatures below `SHORTEST_LAG` times the time between two rows is not tried.
+    lag of the temperatures below `SHORTEST_LAG` times the time between two rows (their median) is not tried; if none is
+    left, the temperatures are not lagged.
 
     Without `dt`, every row is taken to be a machine at rest in that state: all lags equal their signals.
 

@@ -20,7 +20,7 @@ BoolArray = NDArray[np.bool_]
 NO_INPUTS = {
     "displacement": "a machine in production has no displacement probe",
     "angle": "a machine in production has no probe for angles",
-    "position": "models that depend on it are not built yet",
+    "position": "thermocomp position fits errors that depend on it",
 }
 #: no temperature, speed or displacement of a machine reaches this, whatever its unit
 ABSURD = 1e9

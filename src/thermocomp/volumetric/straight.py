@@ -1,5 +1,6 @@
 """Straight lines: what a controller that knows K0 + tanb (P - P0) per axis can correct, and what it leaves."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,30 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.machine import Vector
+from thermocomp.core.size import Size
 from thermocomp.volumetric.field import ErrorField
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Size:
-    """How large an error is over some points.
-
-    Parameters
-    ----------
-    rms : float
-        Root of the mean square [um].
-    largest : float
-        Largest magnitude [um].
-    """
-
-    rms: float
-    largest: float
-
-    @classmethod
-    def of(cls, errors: FloatArray) -> "Size":
-        """Return the size of errors of any shape [um]."""
-        return cls(float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()))
 
 
 @dataclass(frozen=True)
@@ -119,18 +100,18 @@ def straight_lines(
 
     sides = [np.array([p]) for p in place]
     found: list[tuple[int, str, Deviation, Size]] = []
-    corrections: dict[int, Correction] = {}
+    corrections: dict[str, Correction] = {}
     for k, axis in axes:
         sides[k] = np.linspace(*axis.travel, grid)
         points = np.tile(place, (stations, 1))
         points[:, k] = np.linspace(*axis.travel, stations)
         deviation = _best(points[:, k], field.error(points, tool, exact=exact)[:, k], axis.reference_position)
-        corrections[k] = Correction.opposing(deviation)
-        left = _left(field, points, {k: corrections[k]}, tool, exact)
-        found.append((k, axis.name, deviation, Size.of(left[:, k])))
+        corrections[axis.name] = Correction.opposing(deviation)
+        along = left_by(field, points, {axis.name: corrections[axis.name]}, tool, exact=exact)
+        found.append((k, axis.name, deviation, Size.of(along[:, k])))
 
     volume = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-    before, after = field.error(volume, tool, exact=exact), _left(field, volume, corrections, tool, exact)
+    before, after = field.error(volume, tool, exact=exact), left_by(field, volume, corrections, tool, exact=exact)
     return StraightLines(
         at=(float(place[0]), float(place[1]), float(place[2])),
         lines=tuple(StraightLine(name, d, along, Size.of(after[:, k])) for k, name, d, along in found),
@@ -147,11 +128,35 @@ def _best(positions: FloatArray, errors: FloatArray, reference: float) -> Deviat
     return Deviation(float(mean + slope * 1e-3 * (reference - middle)), slope, reference)
 
 
-def _left(
-    field: ErrorField, points: FloatArray, corrections: dict[int, Correction], tool: ArrayLike | None, exact: bool
+def left_by(
+    field: ErrorField,
+    points: FloatArray,
+    corrections: Mapping[str, Correction],
+    tool: ArrayLike | None = None,
+    *,
+    exact: bool = False,
 ) -> FloatArray:
-    """Return the error that is left at points (n, 3) after the corrections of some axes, of shape (n, 3) [um]."""
+    """Return the error that is left when some axes are corrected.
+
+    Parameters
+    ----------
+    field : ErrorField
+    points : ndarray of shape (..., 3)
+        Commanded positions of the axes [mm].
+    corrections : mapping of str to Correction
+        By axis.
+    tool : array-like of shape (3,), optional
+        From the gauge point to the tip [mm]; the machine's own if not given.
+    exact : bool
+        By homogeneous transforms instead of to first order in the angles.
+
+    Returns
+    -------
+    ndarray of shape (..., 3)
+        Along X, Y, Z [um].
+    """
     added = np.zeros(points.shape)
-    for k, correction in corrections.items():
-        added[:, k] = [correction.at(p) for p in points[:, k].tolist()]
+    for axis, correction in corrections.items():
+        k = "XYZ".index(axis)
+        added[..., k] = correction.at(points[..., k])
     return field.error(points + 1e-3 * added, tool, exact=exact) + added

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from thermocomp.core.machine import Channel
 from thermocomp.datasets.virtual import record
 from thermocomp.papers.common import derived, renamed
@@ -35,6 +37,10 @@ SUBGROUPS = {
 }
 #: of the slope of Y (C-23; no row of Table 2 is this set, E-C7)
 SLOPE_VARIABLES = ("T1", "T3", "T4", "T6-T8", "T7-T9")
+#: Eq. 6 (C-22): the cold profile of Y, um for y in mm (E-C5)
+EQ6 = np.polynomial.Polynomial(1e3 * np.array([2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14]))
+#: Eq. 8 (C-24; T7-T9 by E-C4): the slope of Y, um/m per degC (E-C6)
+EQ8 = {"T3": 0.465, "T4": 2.705, "(T6-T8)": 3.675, "(T7-T9)": -5.589}
 
 #: R2 from which a model counts as fitting closely: the smaller of the two the paper prints (.988, .973; C-19, E-C2)
 CLOSELY = 0.973
@@ -46,20 +52,22 @@ WELL = 0.8
 TENFOLD = 10.0
 
 
-def recordings(experiment: str, seed: int) -> list[Recording]:
+def recordings(experiment: str, seed: int, sensor_noise: float | None = None) -> list[Recording]:
     """Run one of Chen's experiments; T1 to T9, x, y, z where they were recorded, speed, then all other channels.
 
     Parameters
     ----------
     experiment : str
     seed : int
+    sensor_noise : float, optional
+        Of the temperatures [degC]; the sensors' own if not given.
 
     Returns
     -------
     list of Recording
     """
     found = []
-    for recording in record(experiment, seed=seed):
+    for recording in record(experiment, seed=seed, sensor_noise=sensor_noise):
         given = {c.name for c in recording.channels}
         known = {new: old for new, old in {**SENSORS, **DRIFTS, **SPEED}.items() if old in given}
         rest = {c.name: c.name for c in recording.channels if c.name not in known.values()}
@@ -67,6 +75,25 @@ def recordings(experiment: str, seed: int) -> list[Recording]:
         mean = dict.fromkeys(COLUMN, 1 / len(COLUMN))
         found.append(derived(named, Channel("T5", "temperature", "degC", "column, average"), mean))
     return found
+
+
+def with_differences(recording: Recording) -> Recording:
+    """Return the recording with those differences of temperatures as channels that the slope depends on (C-23).
+
+    Parameters
+    ----------
+    recording : Recording
+        From `recordings`.
+
+    Returns
+    -------
+    Recording
+    """
+    for plus, minus in DIFFERENCES:
+        if f"{plus}-{minus}" in SLOPE_VARIABLES:
+            channel = Channel(f"{plus}-{minus}", "temperature", "degC")
+            recording = derived(recording, channel, {plus: 1.0, minus: -1.0})
+    return recording
 
 
 def drift_samples(tests: Sequence[Recording]) -> Samples:

@@ -1,132 +1,110 @@
 """Chen, Yuan, Ni 1996, sections 3.3 and 4.3: the positioning error of Y, cold profile plus a slope that drifts."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from thermocomp.core.machine import Channel
-from thermocomp.core.model import ErrorModel
+from thermocomp.files.profiles import from_recording
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mra import StepwiseMRA
-from thermocomp.models.training import train
+from thermocomp.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 from thermocomp.papers import common
+from thermocomp.papers.chen1996 import law
+from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
 from thermocomp.papers.chen1996.setup import (
     CLOSELY,
     DIFFERENCES,
+    EQ6,
+    EQ8,
     SLOPE_VARIABLES,
     SPEED,
     TEMPERATURES,
     TENFOLD,
     recordings,
+    with_differences,
 )
-from thermocomp.papers.common import Errors, judged, shown
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, judged, shown
 from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
-from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.profiles import Profiles
 
 FloatArray = NDArray[np.float64]
 
-#: Eq. 6 (C-22): mm, for y in mm, constant first
-EQ6 = (2.424e-4, 3.096e-4, -3.571e-6, 1.474e-8, -2.662e-11, 1.738e-14)
-#: Eq. 8 (C-24; T7-T9 by E-C4): um/m per degC (E-C6)
-EQ8 = {"T3": 0.465, "T4": 2.705, "(T6-T8)": 3.675, "(T7-T9)": -5.589}
 #: sets, unscreened and screened coefficients (C-23)
 SETS, CANDIDATES = 51, 20
 #: error of a dimension along Y before and after compensation [um] (C-35)
 LATERAL = (92.4, 7.2)
-#: the 5-8-1 net (C-27), and how often it is trained
-HIDDEN, STARTS = 8, 5
+#: how often the 5-8-1 net is trained (C-27)
+STARTS = 5
 #: share of the thermal part beside its straight line up to which the line is enough (C-05)
 STRAIGHT = 0.1
 NONE, MRA, NET, DYNAMIC, MEASURED = "no compensation", "MRA", "net", "dynamic (ours)", "measured slope"
 
 
 @dataclass(frozen=True, eq=False)
-class Profiles:
-    """Profiles of the positioning error of Y, measured one after the other.
-
-    Parameters
-    ----------
-    recording : Recording
-    positions : ndarray of shape (n_positions,)
-        [mm]
-    errors : ndarray of shape (n_profiles, n_positions)
-        [um]
-    geometric : ndarray of shape (n_positions,)
-        Positioning error of the cold machine, by its polynomial [um].
-    """
-
-    recording: Recording
-    positions: FloatArray
-    errors: FloatArray
-    geometric: FloatArray
-
-    @property
-    def thermal(self) -> FloatArray:
-        """What is not geometric, shape (n_profiles, n_positions) [um] (C-07)."""
-        return self.errors - self.geometric
-
-    @property
-    def slope(self) -> FloatArray:
-        """Slope k1 of the thermal part through position 0, shape (n_profiles,) [um/m] (Eq. 2; C-04, E-C6)."""
-        return 1e3 * (self.thermal @ self.positions) / (self.positions @ self.positions)
-
-    def along(self, slope: FloatArray) -> FloatArray:
-        """Return slope times position, shape (n_profiles, n_positions) [um]."""
-        return 1e-3 * np.outer(slope, self.positions)
-
-    @cached_property
-    def samples(self) -> Samples:
-        """Temperatures, their differences and the speed; target k1."""
-        table = self.recording.table.assign(k1=self.slope)
-        channels = (*self.recording.channels, Channel("k1", "angle", "urad", "slope of the positioning of Y"))  # = um/m
-        made = replace(self.recording, table=table, channels=channels)
-        differences = {f"{plus}-{minus}": {plus: 1.0, minus: -1.0} for plus, minus in DIFFERENCES[2:]}
-        for name, weights in differences.items():
-            made = common.derived(made, Channel(name, "temperature", "degC"), weights)
-        return stack([made], ["k1"], (*TEMPERATURES, *differences, *SPEED))
-
-
-@dataclass(frozen=True, eq=False)
-class Slopes:
+class Positioning:
     """What was learned from the profiles of one test, and those of another day.
 
     Parameters
     ----------
     learned, other : Profiles
-        The 51 sets, and the same test on another day, with the geometric part of the first.
-    polynomial : ndarray of shape (6,)
-        Of the cold profile, constant first [um, mm].
-    regression : StepwiseMRA
-    nets : sequence of SigmoidNet
+        EYY: the 51 sets, and the same test on another day.
+    pitch : Profiles
+        EAY, measured with the former.
+    fits : mapping of str to PositionFit
+        Of `learned`, one of each method; of the nets the one with the median error after training.
+    nets : sequence of PositionFit
         5-8-1, each from another start.
-    models : mapping of str to ErrorModel
-        One of each method; of the nets the one with the median error after training.
-    linear : ErrorModel
+    linear : PositionFit
         By stepwise regression on first-order terms alone.
+    law : Law
+        What became of a law that was planted.
     """
 
     learned: Profiles
     other: Profiles
-    polynomial: FloatArray
-    regression: StepwiseMRA
-    nets: Sequence[SigmoidNet]
-    models: Mapping[str, ErrorModel]
-    linear: ErrorModel
+    pitch: Profiles
+    fits: Mapping[str, PositionFit]
+    nets: Sequence[PositionFit]
+    linear: PositionFit
+    law: Law
+
+    @property
+    def regression(self) -> Any:
+        """The StepwiseMRA behind its fit."""
+        return self.fits[MRA].trained[0].estimator
 
     @cached_property
     def net_r2(self) -> FloatArray:
         """R2 of the nets about zero, shape (n_starts,)."""
-        change, slope = self.learned.samples.only(SLOPE_VARIABLES).frame(), self.learned.slope
-        return np.array([_r2(slope, n.predict(change)) for n in self.nets])
+        k1 = self.slope(self.learned)
+        return np.array([r2_about_zero(k1, n.trained[0].estimator.predict(n.samples.frame())) for n in self.nets])
+
+    def geometric(self, day: Profiles) -> FloatArray:
+        """Return the cold profile of `learned`, by its polynomial, shape (n_points,) [um] (C-07, C-22)."""
+        return self.fits[MRA].profile.profile.at(day.points)
+
+    def slope(self, day: Profiles) -> FloatArray:
+        """Return the slope k1 of what comes on top, through position 0, shape (n_states,) [um/m] (C-04, E-C6)."""
+        thermal = day.values - self.geometric(day)
+        return 1e3 * (thermal @ day.position) / (day.position @ day.position)
+
+    def predicted(self, fit: PositionFit, day: Profiles) -> FloatArray:
+        """Return the slope that a model tells from the readings of a day, shape (n_states,) [um/m]."""
+        model = fit.model.slopes[0]
+        samples, _ = slope_samples([day], PositionOptions(inputs=[i.name for i in model.inputs]))
+        return common.predicted(model, samples)
+
+    def left(self, fit: PositionFit, day: Profiles) -> float:
+        """Return the RMS of what a model leaves of the slope [um/m]."""
+        return Errors.of(self.slope(day) - self.predicted(fit, day)).rms
 
 
-def learn(seed: int, other_seed: int) -> Slopes:
+def learn(seed: int, other_seed: int) -> Positioning:
     """Run the test on two days and fit what the paper fits to the first.
 
     Parameters
@@ -136,71 +114,51 @@ def learn(seed: int, other_seed: int) -> Slopes:
 
     Returns
     -------
-    Slopes
+    Positioning
     """
-    (first,), (second,) = recordings("chen1996-slope", seed), recordings("chen1996-slope", other_seed)
-    positions, errors = profiles(first, "displacement")
-    fit = np.polynomial.Polynomial.fit(positions, errors[0], len(EQ6) - 1)
-    learned = Profiles(first, positions, errors, fit(positions))
-    other = Profiles(second, positions, profiles(second, "displacement")[1], fit(positions))
-
-    heat = learned.samples.only(TEMPERATURES)
+    (first,), (second,) = (map(with_differences, recordings("chen1996-slope", s)) for s in (seed, other_seed))
+    learned, other = (from_recording(day, "EYY") for day in (first, second))
+    paper = PositionOptions(order=EQ6.degree(), inputs=TEMPERATURES, support=PAPERS_SUPPORT)
     # The two regressions differ in their candidates only.
-    regression, straight = (
-        StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES, second_order=second) for second in (True, False)
+    regression, linear = (
+        fit_position(
+            learned,
+            replace(paper, method=StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES, second_order=second)),
+        )
+        for second in (True, False)
     )
-    model, linear = (common.fitted(r, heat, ["k1"])["k1"] for r in (regression, straight))
-    nets = [SigmoidNet(hidden=HIDDEN, seed=start) for start in range(STARTS)]
-    variables = learned.samples.only(SLOPE_VARIABLES)
-    frozen: list[dict[str, ErrorModel]] = Parallel(n_jobs=-1, prefer="threads")(
-        delayed(common.fitted)(net, variables, ["k1"]) for net in nets
+    nets: list[PositionFit] = Parallel(n_jobs=-1, prefer="threads")(
+        delayed(fit_position)(
+            learned, replace(paper, inputs=SLOPE_VARIABLES, method=SigmoidNet(hidden=HIDDEN, seed=start))
+        )
+        for start in range(STARTS)
     )
-    typical = int(np.argsort([n.loss_history_[-1] for n in nets])[STARTS // 2])
-    every = np.ones(len(heat), dtype=np.bool_)
-    dynamic = train("dynamic", learned.samples.only((*TEMPERATURES, *SPEED)), 0, every).model
-    models = {MRA: model, NET: frozen[typical]["k1"], DYNAMIC: dynamic}
-    return Slopes(learned, other, np.asarray(fit.convert().coef, dtype=np.float64), regression, nets, models, linear)
+    typical = int(np.argsort([_net(n).loss_history_[-1] for n in nets])[STARTS // 2])
+    ours = fit_position(learned, PositionOptions(order=EQ6.degree(), inputs=(*TEMPERATURES, *SPEED), method="dynamic"))
+    fits = {MRA: regression, NET: nets[typical], DYNAMIC: ours}
+    return Positioning(learned, other, from_recording(first, "EAY"), fits, nets, linear, law.seek(seed))
 
 
-def profiles(recording: Recording, quantity: str) -> tuple[FloatArray, FloatArray]:
-    """Return positions [mm] and profiles, (n_rows, n_positions), of the channels named ``.._POSITION_UNIT``.
-
-    Parameters
-    ----------
-    recording : Recording
-    quantity : {'displacement', 'angle'}
-
-    Returns
-    -------
-    positions : ndarray of shape (n_positions,)
-        [mm]
-    profiles : ndarray of shape (n_rows, n_positions)
-        [um or urad]
-    """
-    found = {c: re.search(r"_(\d+)_[a-z]+$", c.name) for c in recording.of_quantity(quantity)}
-    places = {c: float(match[1]) for c, match in found.items() if match}
-    return np.array(list(places.values())), recording.values(list(places))
-
-
-def _r2(measured: FloatArray, predicted: FloatArray) -> float:
-    """Return R2 about zero, as of a regression without constant (E-C10)."""
-    return float(1 - np.sum((measured - predicted) ** 2) / np.sum(measured**2))
+def _net(fit: PositionFit) -> Any:
+    return fit.trained[0].estimator
 
 
 # -- claims --------------------------------------------------------------------------------------------------------
 
 
-def claims(found: Slopes) -> list[Claim]:
+def claims(found: Positioning) -> list[Claim]:
     """Judge what the paper says about the profiles, by criteria that were fixed beforehand."""
     learned, regression = found.learned, found.regression
-    cold = 1e3 * np.polynomial.Polynomial(EQ6)(learned.positions)
-    apart, lowest, highest = Errors.of(learned.geometric - cold), learned.geometric.min(), learned.geometric.max()
-    bent = Errors.of(learned.thermal - learned.along(learned.slope)).rms / Errors.of(learned.thermal).rms
+    k1, geometric = found.slope(learned), found.geometric(learned)
+    apart, lowest, highest = Errors.of(geometric - EQ6(learned.position)), geometric.min(), geometric.max()
+    thermal = learned.values - geometric
+    bent = Errors.of(thermal - along(learned, k1)).rms / Errors.of(thermal).rms
     second = [t for t in regression.terms_ if "*" in t]
     r2_net = float(np.median(found.net_r2))
-    slope = Errors.of(learned.slope)
-    left = {m: Errors.of(_left(model, found.other)).rms for m, model in (*found.models.items(), ("", found.linear))}
-    net = found.nets[0]
+    slope = Errors.of(k1)
+    left = {m: found.left(fit, found.other) for m, fit in (*found.fits.items(), ("", found.linear))}
+    other = Errors.of(found.slope(found.other)).rms
+    net = _net(found.nets[0])
     return [
         shown(
             ("C-22", "C-36"),
@@ -221,7 +179,7 @@ def claims(found: Slopes) -> list[Claim]:
             ("C-23",),
             f"{SETS} sets of slopes, {CANDIDATES} unscreened coefficients",
             f"{SETS}, {CANDIDATES}",
-            f"{len(learned.slope)}, {len(regression.candidates_)}",
+            f"{len(learned)}, {len(regression.candidates_)}",
         ),
         judged(
             ("C-23", "C-24"),
@@ -230,7 +188,7 @@ def claims(found: Slopes) -> list[Claim]:
             ", ".join(regression.terms_),
             not second,
             f"{', '.join(second)} came in; on another day this model leaves {left[MRA]:.2f} um/m (RMS) and one of "
-            f"first-order terms alone {left['']:.2f}, of slopes of {Errors.of(found.other.slope).rms:.1f}",
+            f"first-order terms alone {left['']:.2f}, of slopes of {other:.1f}",
         ),
         judged(
             ("C-24", "C-36"),
@@ -247,7 +205,7 @@ def claims(found: Slopes) -> list[Claim]:
             "Fig. 13",
             f"R2 {r2_net:.3f} ({found.net_r2.min():.3f}-{found.net_r2.max():.3f})",
             round(r2_net, 3) >= CLOSELY,
-            f"after {net.n_epochs} epochs of {len(learned.slope)} patterns it is no nearer",
+            f"after {net.n_epochs} epochs of {len(learned)} patterns it is no nearer",
         ),
         shown(
             ("C-27",),
@@ -259,20 +217,19 @@ def claims(found: Slopes) -> list[Claim]:
             ("C-24",),
             "Slope on another day that was not learned: RMS left (ours)",
             "",
-            f"{Errors.of(found.other.slope).rms:.2f} um/m; "
-            + ", ".join(f"{m} {left[m]:.2f}" for m in found.models)
-            + " um/m",
+            f"{other:.2f} um/m; " + ", ".join(f"{m} {left[m]:.2f}" for m in found.fits) + " um/m",
         ),
+        *law.claims(found.law),
         _lateral(found),
     ]
 
 
-def _lateral(found: Slopes) -> Claim:
+def _lateral(found: Positioning) -> Claim:
     """Judge the error of a dimension over the whole travel, on the day that was not learned."""
     left = lateral(found)
     best = left[NONE] / min(left[MRA], left[NET])
-    slopes = {m: Errors.of(_left(model, found.other)).rms for m, model in found.models.items()}
-    after = ", ".join(f"{m} {left[m]:.1f}" for m in found.models)
+    slopes = {m: found.left(fit, found.other) for m, fit in found.fits.items()}
+    after = ", ".join(f"{m} {left[m]:.1f}" for m in found.fits)
     return judged(
         ("C-35",),
         "Errors of dimensions along Y shrink by a factor of ten or more. Here: largest error of a length of the whole "
@@ -285,72 +242,76 @@ def _lateral(found: Slopes) -> Claim:
     )
 
 
-def lateral(found: Slopes) -> dict[str, float]:
+def residuals(found: Positioning, day: Profiles) -> dict[str, FloatArray]:
+    """Return what each method leaves of the profiles of a day, cold profile taken off, (n_states, n_points) [um]."""
+    thermal, k1 = day.values - found.geometric(day), found.slope(day)
+    slopes = {m: found.predicted(fit, day) for m, fit in found.fits.items()} | {MEASURED: k1}
+    return {NONE: thermal} | {m: thermal - along(day, slope) for m, slope in slopes.items()}
+
+
+def along(day: Profiles, slope: FloatArray) -> FloatArray:
+    """Return slope times position, shape (n_states, n_points) [um]."""
+    return 1e-3 * np.outer(slope, day.position)
+
+
+def lateral(found: Positioning) -> dict[str, float]:
     """Return the largest error of a length of the whole travel on the other day, per method [um]."""
-    day = found.other
-    slopes = {NONE: 0.0 * day.slope, MEASURED: day.slope}
-    slopes |= {m: common.predicted(model, day.samples) for m, model in found.models.items()}
-    left = {m: day.thermal - day.along(slope) for m, slope in slopes.items()}
-    return {m: float(np.abs(e[:, -1] - e[:, 0]).max()) for m, e in left.items()}
+    return {m: float(np.abs(e[:, -1] - e[:, 0]).max()) for m, e in residuals(found, found.other).items()}
 
 
-def _left(model: ErrorModel, day: Profiles) -> FloatArray:
-    return day.slope - common.predicted(model, day.samples)
-
-
-def numbers(found: Slopes) -> dict[str, float]:
+def numbers(found: Positioning) -> dict[str, float]:
     """Return the figures that a page can assert."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic", MEASURED: "measured"}
     r = found.regression
     made = {"slope_sets": float(r.n_rows_), "slope_candidates": float(len(r.candidates_)), "slope_r2_mra": r.r_squared_}
     made |= {"slope_terms": float(len(r.terms_)), "slope_r2_net": float(np.median(found.net_r2))}
     made |= {f"lateral_{short[m]}_um": e for m, e in lateral(found).items()}
-    return made
+    return made | law.numbers(found.law)
 
 
 # -- tables and figures --------------------------------------------------------------------------------------------
 
 
-def tables(found: Slopes) -> list[Table]:
-    """Return Eq. 6 and Eq. 8 beside ours, and the error of the profiles without and with compensation."""
+def tables(found: Positioning) -> list[Table]:
+    """Return Eq. 6 and Eq. 8 beside ours, the planted law, and the error without and with compensation."""
+    learned = found.learned
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
+    # in plain mm, as the paper's
+    cold = np.polynomial.polynomial.polyfit(learned.position, found.geometric(learned), EQ6.degree())
     eq6 = [
-        [f"y^{k}", f"{1e-3 * c:.3e}", f"{p:.3e}"] for k, (c, p) in enumerate(zip(found.polynomial, EQ6, strict=True))
+        [f"y^{k}", f"{1e-3 * c:.3e}", f"{1e-3 * p:.3e}"]
+        for k, (c, p) in enumerate(zip(cold, EQ6.coef.tolist(), strict=True))
     ]
     eq8 = [[t, *(f"{c[t]:.3f}" if t in c else "" for c in (ours, EQ8))] for t in {**ours, **EQ8}]
-    residuals = {}
-    for day, what in ((found.learned, "learned"), (found.other, "another day")):
-        residuals[what, NONE] = day.errors
-        residuals[what, "cold profile alone"] = day.thermal
-        for method, model in found.models.items():
-            residuals[what, method] = day.thermal - day.along(common.predicted(model, day.samples))
-        residuals[what, MEASURED] = day.thermal - day.along(day.slope)
+    errors = {}
+    for day, what in ((learned, "learned"), (found.other, "another day")):
+        errors[what, NONE] = day.values
+        errors |= {(what, "cold profile alone" if m == NONE else m): e for m, e in residuals(found, day).items()}
     return [
         Table("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
         Table("Slope of Y: coefficients [um/m per degC, degC2] here and in Eq. 8", ("term", "here", "Eq. 8"), eq8),
-        common.errors_table("Positioning of Y, all profiles: error without and with compensation", residuals),
+        common.errors_table("Positioning of Y, all profiles: error without and with compensation", errors),
+        *law.tables(found.law),
     ]
 
 
-def figures(found: Slopes) -> list[Figure]:
+def figures(found: Positioning) -> list[Figure]:
     """Return Figs. 1, 6, 7 and 13."""
-    learned = found.learned
-    hours = learned.recording.time / 3600.0
-    peak = int(np.abs(learned.slope).argmax())
+    learned, k1 = found.learned, found.slope(found.learned)
+    hours = learned.states.time / 3600.0
+    peak = int(np.abs(k1).argmax())
     states = [*np.linspace(0, peak, 5).round().astype(int).tolist(), len(hours) - 1]
     drawn = []
-    for number, quantity, text, label in (
-        (1, "angle", "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
-        (6, "displacement", "positioning errors of Y", "positioning error of Y [um]"),
+    for number, day, text, label in (
+        (1, found.pitch, "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
+        (6, learned, "positioning errors of Y", "positioning error of Y [um]"),
     ):
-        positions, values = profiles(learned.recording, quantity)
-        if positions.size:
-            curves = [Curve(f"after {hours[k]:.1f} h", positions, values[k]) for k in states]
-            panel = Panel("", "position of Y [mm]", label, curves)
-            drawn.append(_figure(number, f"{text} in several thermal states.", panel))
+        curves = [Curve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
+        panel = Panel("", "position of Y [mm]", label, curves)
+        drawn.append(_figure(number, f"{text} in several thermal states.", panel))
     for number, method in ((7, MRA), (13, NET)):
-        fit = common.predicted(found.models[method], learned.samples)
-        curves = [Curve("measured", hours, learned.slope, "points"), Curve(method, hours, fit)]
+        fit = found.predicted(found.fits[method], learned)
+        curves = [Curve("measured", hours, k1, "points"), Curve(method, hours, fit)]
         panel = Panel("", "time [h]", "slope [um/m]", curves)
         drawn.append(_figure(number, f"slope of the positioning error of Y, and the fit by the {method}.", panel))
     return drawn

@@ -1,0 +1,32 @@
+"""`Size`: how large an error is."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large an error is over some points.
+
+    Parameters
+    ----------
+    rms : float
+        Root of the mean square [unit of the errors].
+    largest : float
+        Largest magnitude [unit of the errors].
+    """
+
+    rms: float
+    largest: float
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> "Size":
+        """Return the size of errors of any shape [their unit]; nan of none."""
+        if not errors.size:
+            return cls(math.nan, math.nan)
+        return cls(float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()))

@@ -1,0 +1,397 @@
+"""Chen, Yuan, Ni 1996, section 3.3: do 51 profiles tell the law of the slope? Eq. 6 and 8 are planted, and sought.
+
+The virtual machine's own slopes follow no law in temperatures that anyone knows. So its temperatures are kept, and its
+profiles are replaced by those of a machine that obeys Eq. 6 and 8; noise is then put on all that is read. What is found
+can be held against what was planted (C-23).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.machine import Channel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.models.mlp import SigmoidNet
+from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.position import PositionFit, PositionOptions, fit_position
+from thermocomp.papers.chen1996.setup import (
+    DIFFERENCES,
+    EQ6,
+    EQ8,
+    SLOPE_VARIABLES,
+    TEMPERATURES,
+    recordings,
+    with_differences,
+)
+from thermocomp.papers.common import Errors, judged, shown
+from thermocomp.papers.study import Claim, Table
+from thermocomp.recording.cycles import whole as whole_test
+from thermocomp.recording.profiles import Profiles
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+#: noise of one run of the laser at a position [um], and of one reading of a temperature [degC]
+LASER, SENSOR = 0.3, 0.05
+#: share of the draws in which the whole law must come back, to say that it does
+MOST = 0.95
+#: days with another weather, and draws of the noise over all of them: of `OURS`, and of each other design
+DAYS, DRAWS, FEWER = 5, 200, 50
+#: nodes of the 5-8-1 net (C-27)
+HIDDEN = 8
+#: where the laser measures [mm]
+POSITIONS = np.arange(0.0, 551.0, 50.0)
+
+
+@dataclass(frozen=True)
+class Design:
+    """How 51 profiles are measured and what is counted from where.
+
+    Parameters
+    ----------
+    name : str
+    experiment : str
+        Whose temperatures are taken.
+    runs : int
+        Of the laser, whose mean is a profile; the temperatures are means over them too.
+    centred : bool
+        Temperatures and slopes count from the mean of all states of their test; else from its first one, as Chen's.
+    laser, sensor : float
+        As `LASER` and `SENSOR`.
+    hierarchy : bool
+        A square or product enters only when its factors are in; Chen's are free of that (C-21).
+    """
+
+    name: str
+    experiment: str = "chen1996-law"
+    runs: int = 5
+    centred: bool = True
+    laser: float = LASER
+    sensor: float = SENSOR
+    hierarchy: bool = False
+
+    @property
+    def method(self) -> StepwiseMRA:
+        """Chen's regression."""
+        return StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
+
+    def reference(self, n_states: int) -> list[int]:
+        """Return the states of a test that are counted from the mean of."""
+        return list(range(n_states)) if self.centred else [0]
+
+
+#: the one that tells the law
+OURS = Design("three tests, five runs, counted from the mean state")
+#: a day of the paper, what helps, and what spoils it
+DESIGNS = (
+    Design("one warm-up, one run, counted from the cold state", "chen1996-slope", 1, centred=False),
+    Design("three tests, five runs, counted from the cold state", centred=False),
+    Design("cold state, products only of terms that are in", centred=False, hierarchy=True),
+    OURS,
+    Design("mean state, four times the noise of the laser", laser=4 * LASER),
+    Design("mean state, four times the noise of the sensors", sensor=4 * SENSOR),
+)
+
+
+class Measured(NamedTuple):
+    """What is read in one test.
+
+    Parameters
+    ----------
+    temperatures : ndarray of shape (n_profiles, 9)
+        T1 to T9 [degC].
+    errors : ndarray of shape (n_profiles, 12)
+        Of Y at `POSITIONS` [um].
+    """
+
+    temperatures: FloatArray
+    errors: FloatArray
+
+    def counted(self, design: Design) -> tuple[FloatArray, FloatArray]:
+        """Return changes of temperature and slopes k1 [um/m], from where the design counts."""
+        change, thermal = (v - v[design.reference(len(v))].mean(axis=0) for v in self)
+        return change, 1e3 * (thermal @ POSITIONS) / (POSITIONS @ POSITIONS)
+
+    def profiles(self, name: str) -> Profiles:
+        """Return the same as profiles of EYY, an hour apart, with the differences that the slope depends on."""
+        n = len(self.errors)
+        channels = tuple(Channel(t, "temperature", "degC") for t in TEMPERATURES)
+        table = pd.DataFrame(self.temperatures, columns=list(TEMPERATURES))
+        states = with_differences(Recording(name, np.arange(0.0, 3600.0 * n, 3600.0), table, channels, whole_test(n)))
+        points = np.stack([0 * POSITIONS, POSITIONS, 0 * POSITIONS], axis=1)
+        return Profiles("EYY", "um", "Y", points, self.errors, states)
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """What came back of the law in many draws.
+
+    Parameters
+    ----------
+    design : Design
+    found : sequence of mapping of str to float
+        Per draw, coefficients by the names of the terms [um/m per degC, degC2].
+    """
+
+    design: Design
+    found: Sequence[Mapping[str, float]]
+
+    @property
+    def whole(self) -> float:
+        """Share of the draws with exactly the terms of Eq. 8."""
+        return float(np.mean([f.keys() == EQ8.keys() for f in self.found]))
+
+    @property
+    def missing(self) -> float:
+        """Share of the draws in which a term of Eq. 8 is missing."""
+        return float(np.mean([bool(EQ8.keys() - f.keys()) for f in self.found]))
+
+    @property
+    def wrong(self) -> float:
+        """Share of the draws in which a term came in that is not in Eq. 8."""
+        return float(np.mean([bool(f.keys() - EQ8.keys()) for f in self.found]))
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Coefficients of Eq. 8 in the draws with exactly its terms, (n_whole, 4); a row of nan if there are none."""
+        rows = [[f[t] for t in EQ8] for f in self.found if f.keys() == EQ8.keys()]
+        return np.array(rows or [[np.nan] * len(EQ8)])
+
+
+def temperatures(experiment: str, seed: int) -> list[FloatArray]:
+    """Return T1 to T9 of each test, without noise, (n_rows, 9) [degC].
+
+    Parameters
+    ----------
+    experiment : str
+    seed : int
+        Of the weather.
+    """
+    return [test.values([test.channel(t) for t in TEMPERATURES]) for test in recordings(experiment, seed, 0.0)]
+
+
+def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -> list[Measured]:
+    """Measure profiles by Eq. 6 and 8.
+
+    Parameters
+    ----------
+    day : sequence of ndarray of shape (n_runs, 9)
+        From `temperatures`, a row per run of the laser; the first is that of the cold machine.
+    design : Design
+    rng : Generator
+        Of the noise.
+
+    Returns
+    -------
+    list of Measured
+        One per test.
+    """
+    made = []
+    for true in day:
+        errors = EQ6(POSITIONS) + 1e-3 * np.outer(slope(true - true[0]), POSITIONS)
+        errors = errors + design.laser * rng.standard_normal(errors.shape)
+        read = true + design.sensor * rng.standard_normal(true.shape)
+        n = len(true) // design.runs
+        means = (v[: n * design.runs].reshape(n, design.runs, -1).mean(axis=1) for v in (read, errors))
+        made.append(Measured(*means))
+    return made
+
+
+def slope(change: FloatArray) -> FloatArray:
+    """Return the slope of Y by Eq. 8 [um/m].
+
+    Parameters
+    ----------
+    change : ndarray of shape (n, 9)
+        T1 to T9 [degC].
+    """
+    column = dict(zip(TEMPERATURES, change.T, strict=True))
+    k1 = np.zeros(len(change))
+    for term, factor in EQ8.items():
+        plus, _, minus = term.strip("()").partition("-")
+        k1 += factor * (column[plus] - (column[minus] if minus else 0.0))
+    return k1
+
+
+def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, seed: int) -> Recovery:
+    """Seek the law in many draws.
+
+    Parameters
+    ----------
+    design : Design
+    days : sequence of sequence of ndarray
+        With another weather each, taken in turn; see `plant`.
+    n_draws : int
+    seed : int
+        Of the noise.
+
+    """
+    rng = np.random.default_rng(seed)
+    found = []
+    for draw in range(n_draws):
+        measured = plant(days[draw % len(days)], design, rng)
+        change, k1 = (np.concatenate(v) for v in zip(*(m.counted(design) for m in measured), strict=True))
+        regression: StepwiseMRA = design.method.fit(pd.DataFrame(change, columns=list(TEMPERATURES)), k1)
+        found.append(dict(zip(regression.terms_, regression.coef_.tolist(), strict=True)))
+    return Recovery(design, found)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """What was found of the planted law.
+
+    Parameters
+    ----------
+    recoveries : mapping of Design to Recovery
+    fit : PositionFit
+        Of the first draw of `OURS`.
+    net : SigmoidNet
+        5-8-1, trained on the same profiles, counted from the cold state.
+    net_r2 : float
+        About zero, in-sample (E-C10).
+    idle : float
+        How much the net's slope changes at most over the range of T1, which the law does not know [um/m].
+    elsewhere : mapping of str to float
+        Of a test in which all is warmed together: RMS of the slope ("law"), and of what regression ("MRA") and net
+        ("net") miss of it [um/m].
+    """
+
+    recoveries: Mapping[Design, Recovery]
+    fit: PositionFit
+    net: SigmoidNet
+    net_r2: float
+    idle: float
+    elsewhere: Mapping[str, float]
+
+
+def seek(seed: int) -> Law:
+    """Plant the law and seek it, by all designs.
+
+    Parameters
+    ----------
+    seed : int
+        Of weather and noise.
+
+    Returns
+    -------
+    Law
+    """
+    days = {e: [temperatures(e, seed + k) for k in range(DAYS)] for e in {d.experiment for d in DESIGNS}}
+    recoveries = {d: recover(d, days[d.experiment], DRAWS if d is OURS else FEWER, seed) for d in DESIGNS}
+    # the first draw again, whatever it gave
+    first = plant(days[OURS.experiment][0], OURS, np.random.default_rng(seed))
+    profiles = [m.profiles(f"test {k}") for k, m in enumerate(first, start=1)]
+    options = PositionOptions(order=EQ6.degree(), inputs=SLOPE_VARIABLES, method=SigmoidNet(hidden=HIDDEN))
+    learned = fit_position(profiles, options)
+    options = replace(options, inputs=TEMPERATURES, method=OURS.method, reference=OURS.reference(len(profiles[0])))
+    fit = fit_position(profiles, options)
+
+    net: Any = learned.trained[0].estimator
+    k1, change = learned.samples.deviations[:, 0], learned.samples.frame()
+    ends = [net.predict(change.assign(T1=end)) for end in (change["T1"].min(), change["T1"].max())]
+    (true,) = days["chen1996-slope"][0]
+    other = Measured(true - true[0], np.zeros((len(true), len(POSITIONS)))).profiles("other").states.table
+    planted = slope(other[list(TEMPERATURES)].to_numpy())
+    missed = {
+        "law": planted,
+        "MRA": planted - fit.trained[0].estimator.predict(other[list(TEMPERATURES)]),
+        "net": planted - net.predict(other[list(SLOPE_VARIABLES)]),
+    }
+    return Law(
+        recoveries,
+        fit,
+        net,
+        r2_about_zero(k1, net.predict(change)),
+        float(np.abs(ends[1] - ends[0]).max()),
+        {name: Errors.of(left).rms for name, left in missed.items()},
+    )
+
+
+def r2_about_zero(measured: FloatArray, predicted: FloatArray) -> float:
+    """Return R2 about zero, as of a regression without constant (E-C10)."""
+    return float(1 - np.sum((measured - predicted) ** 2) / np.sum(measured**2))
+
+
+# -- claims --------------------------------------------------------------------------------------------------------
+
+
+def claims(found: Law) -> list[Claim]:
+    """Judge whether the law came back, by criteria that were fixed beforehand."""
+    ours = found.recoveries[OURS]
+    errors = np.array([found.fit.coefficient_errors[0].get(t, np.nan) for t in EQ8])
+    off = np.abs(ours.coefficients - np.array(list(EQ8.values()))) / errors
+    within = [float(np.mean(off < k)) for k in (2, 3)]
+    return [
+        judged(
+            ("C-23", "C-24"),
+            f"A known law comes back from 51 profiles: Eq. 8, planted on temperatures of the virtual machine, its "
+            f"{len(EQ8)} terms of 20 and none that is not there, in at least {MOST:.0%} of the draws (ours)",
+            "20 -> 4 terms",
+            f"whole in {ours.whole:.1%} of {len(ours.found)} draws, a term missing in {ours.missing:.1%}, a wrong one "
+            f"in {ours.wrong:.1%} (16 idle terms at a significance of .001 may give 1.6%)",
+            ours.whole >= MOST,
+            "51 profiles with this noise do not tell it",
+        ),
+        shown(
+            ("C-23", "E-C12"),
+            "The same law, measured and counted otherwise (ours)",
+            "",
+            "; ".join(f"{d.name}: {r.whole:.0%}" for d, r in found.recoveries.items() if d is not OURS),
+        ),
+        judged(
+            ("C-24",),
+            "Coefficients that came back are within three standard errors of the planted ones (ours)",
+            "",
+            f"{within[0]:.0%} within two, {within[1]:.0%} within three",
+            within[1] >= MOST,
+            "noise of the temperatures makes coefficients too small, and their standard errors do not know it",
+        ),
+        shown(
+            ("C-27",),
+            "The 5-8-1 net learns the same profiles, but tells no law (ours)",
+            "",
+            f"R2 {found.net_r2:.4f}; T1, which is not in the law, moves its slope by up to {found.idle:.1f} um/m; in a "
+            f"test that warms all together it misses {found.elsewhere['net']:.2f} um/m (RMS) of "
+            f"{found.elsewhere['law']:.1f}, the regression {found.elsewhere['MRA']:.2f}; {found.net.caution_}",
+        ),
+    ]
+
+
+def numbers(found: Law) -> dict[str, float]:
+    """Return the figures that a page can assert."""
+    ours, paper, cold = (found.recoveries[d] for d in (OURS, DESIGNS[0], DESIGNS[1]))
+    made = {"law_whole": ours.whole, "law_missing": ours.missing, "law_wrong": ours.wrong}
+    made |= {"law_whole_one_warm_up": paper.whole, "law_whole_cold": cold.whole}
+    made |= {"law_net_r2": found.net_r2, "law_net_idle": found.idle}
+    return made | {f"law_elsewhere_{name.lower()}": e for name, e in found.elsewhere.items()}
+
+
+def tables(found: Law) -> list[Table]:
+    """Return how often the law came back, and its coefficients."""
+    rates = [
+        [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
+        for d, r in found.recoveries.items()
+    ]
+    got, errors = found.fit.model.slopes[0], found.fit.coefficient_errors[0]
+    first = got.coefficients_by_name() if isinstance(got, Polynomial) else {}
+    drawn = found.recoveries[OURS].coefficients
+    coefficients = [
+        [t, f"{true:.3f}", *(f"{v[t]:.3f}" if t in v else "" for v in (first, errors)), f"{mean:.3f}", f"{spread:.3f}"]
+        for (t, true), mean, spread in zip(EQ8.items(), drawn.mean(axis=0), drawn.std(axis=0), strict=True)
+    ]
+    return [
+        Table(
+            "A planted law sought: share of the draws",
+            ("51 profiles", "laser [um]", "sensor [degC]", "whole", "a term missing", "a wrong one"),
+            rates,
+        ),
+        Table(
+            "Coefficients of the planted law [um/m per degC]",
+            ("term", "planted", "found, first draw", "standard error", "mean of draws", "spread of draws"),
+            coefficients,
+        ),
+    ]
