@@ -22,6 +22,7 @@ tool = ["0 mm", "0 mm", "-100 mm"]
 travel = ["0 mm", "600 mm"]
 [axes.Y]
 travel = ["-200 mm", "200 mm"]
+reference_position = "0 mm"
 [axes.Z]
 travel = ["0 mm", "500 mm"]
 

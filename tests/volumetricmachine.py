@@ -43,7 +43,14 @@ def random_machine(code: str, rng: np.random.Generator) -> Machine:
     """Return a machine without components, all of whose reference points are somewhere."""
     structure = Structure.parse(code)
     axes = tuple(
-        Axis(name, (-400.0, 400.0), float(rng.uniform(-300, 300)), vector(rng, 400), vector(rng, 200))
+        Axis(
+            name,
+            (-400.0, 400.0),
+            float(rng.uniform(-300, 300)),
+            vector(rng, 400),
+            vector(rng, 200),
+            "workpiece" if rng.integers(2) else "tool",
+        )
         for name in sorted(structure.axes)
     )
     return Machine("random", structure, axes, spindle_tool=vector(rng, 200), tool=vector(rng, 200))

@@ -190,7 +190,7 @@ assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 # asked any more here: these are errors that a part would have had.
 #
 # For the volume all six components of each axis are measured by lasers and levels in several thermal states, the
-# spindle's drift by a nest of probes, on six days of work; each component becomes a cold profile and thermal slopes. On
+# spindle's drift by a nest of probes, on eight days of work; each component becomes a cold profile and thermal slopes. On
 # two other days, at a thousand random points and moments, the machine is then corrected by what these models say of it,
 # and judged by what it truly does.
 

@@ -14,6 +14,8 @@ error: actual minus commanded, tool against workpiece.
 # What the sections below need: a machine of a given structure whose axes were measured at zero, and the error of its
 # tool's tip for some components, all others being zero.
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pencil  # the drawings' arrows, boxes and labels
@@ -316,3 +318,12 @@ pencil.label(axes[0, 1], (45, 0), "measured here", pencil.BLUE, size=9, ha="left
 pencil.label(axes[1, 0], (-130, 85), "measured here", pencil.BLUE, size=9)
 plt.show()
 # sphinx_gallery_end_ignore
+# %%
+# In all four drawings the place where it was measured goes with the tool, as a reflector in the spindle does. If it
+# stays on the table, the axis' own way is a lever too (``measured_on``): the tool goes away from it.
+
+table = machine("w X' b Y Z (C1) t")
+reflector_on_it = replace(table, axes=tuple(replace(a, measured_on="workpiece") for a in table.axes))
+
+assert error(table, yaw_x, at=(400, 0, 0)) == [0, 0, 0]
+assert error(reflector_on_it, yaw_x, at=(400, 0, 0)) == [0, 8, 0]

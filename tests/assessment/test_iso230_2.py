@@ -147,13 +147,58 @@ def test_a_long_axis_wants_more_targets() -> None:
     assert notes == ("6 targets over 1.9 m; ISO 230-2 wants at least 10",)
 
 
+def test_a_single_run_tells_systematic_values_only() -> None:
+    """ISO 230-2 over 2 m: one approach in each direction, every 250 mm."""
+    positions = np.linspace(0.0, 3000.0, 13)
+    up = (0.01 * positions)[None]
+    r = assess(Positioning("X", "", "um", positions, up, up - 2.0))
+    assert r.axis_values == pytest.approx({"E↑": 30.0, "E↓": 30.0, "E": 32.0, "M": 30.0, "B": 2.0, "mean B": 2.0})
+    assert r.repeatability is None
+    assert np.isnan([r.A, r.R]).all()
+    assert r.notes == tuple(
+        f"a single run in direction {d}: s, R and A take more; ISO 230-2 wants no more over 2 m" for d in "+-"
+    )
+    main, at_targets = positioning_tables([r])
+    assert [row[0] for row in main.rows] == ["E↑", "E↓", "E", "M", "B", "mean B"]
+    assert at_targets.columns == ("target [mm]", "mean ↑", "mean ↓", "mean", "B")
+    content = positioning_content(r)
+    assert content["s"] == {"+": None, "-": None}
+    assert content["R"] is None
+    # several runs in one direction only
+    r = assess(Positioning("X", "", "um", positions, np.concatenate([up, up + 1.0]), up))
+    assert {"A↑", "R↑", "E", "B"} <= r.axis_values.keys()
+    assert not {"A↓", "R↓", "A", "R"} & r.axis_values.keys()
+    assert r.notes == ("a single run in direction -: s, R and A take more; ISO 230-2 wants no more over 2 m",)
+
+
+def test_what_is_wanted_changes_at_2_m() -> None:
+    def notes(length: float, n: int, runs: int) -> tuple[str, ...]:
+        up = np.tile(np.arange(float(n)), (runs, 1))
+        return assess(Positioning("X", "", "um", np.linspace(0.0, length, n), up, up)).notes
+
+    assert notes(2000.0, 10, 5) == ()
+    assert notes(2000.0, 9, 5) == ("9 targets over 2 m; ISO 230-2 wants at least 10",)
+    short = notes(2000.0, 10, 1)
+    assert short[0] == "a single run in direction +: s, R and A take more, ISO 230-2 wants 5"
+    assert notes(2250.0, 10, 3) == ()
+    assert notes(2250.0, 9, 5) == ("9 targets over 2.25 m; ISO 230-2 wants at least 10",)
+
+
+def test_the_uncertainty_is_said_not_to_be_told() -> None:
+    r = assess(Positioning("Y", "cold", "um", TARGETS, UP, DOWN))
+    assert "uncertainty is not told" in positioning_tables([r])[0].caption
+    content = positioning_content(r)
+    assert content["uncertainty"] is None
+    assert "uncertainty is not told" in content["notes"][-1]
+
+
 @pytest.mark.parametrize(
     ("positions", "up", "down", "told"),
     [
         ([0.0], np.zeros((5, 1)), None, "1 target; positioning needs at least 2"),
         ([0.0, 0.0], np.zeros((5, 2)), None, "must rise and differ"),
         ([0.0, 1.0], None, None, "no deviations"),
-        ([0.0, 1.0], np.zeros((1, 2)), None, "1 run in direction +"),
+        ([0.0, 1.0], np.zeros((0, 2)), None, "no run in direction +"),
         ([0.0, 1.0], np.zeros((2, 2)), np.zeros((2, 3)), "direction - have the shape"),
         ([0.0, 1.0], np.array([[0.0, np.nan], [0, 0]]), None, "not a finite number"),
     ],

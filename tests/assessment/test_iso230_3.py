@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.assessment.iso230_3 import assess, detect, find_ambient, find_pairs
+from thermocomp.assessment.iso230_3 import assess, detect, find_ambient, find_pairs, find_stations
 from thermocomp.assessment.iso230_tables import thermal_content, thermal_tables
 from thermocomp.assessment.thermaltest import Curve, Pair, ThermalTest, figures
 from thermocomp.core.exceptions import InputError
@@ -136,6 +136,44 @@ def test_an_axis_grows() -> None:
     assert expansion.rows[0][2] == pytest.approx(100 * (1 - np.exp(-6.0)), abs=0.006)
     positions = {c["name"]: c["position_mm"] for c in thermal_content(test)["curves"]}
     assert positions == {"x_laser_0_um": 0, "x_laser_250_um": 250, "x_laser_500_um": 500, "length X 0-500 mm": None}
+
+
+def test_the_last_hour_against_the_first() -> None:
+    """First order, 30 min: of the change in the first hour the last of four leaves exp(-6)."""
+    (test,) = assess(spindle_test(30 * MIN))
+    f = of(test, "z_um").figures
+    assert f.range_last == pytest.approx(50 * (np.exp(-6.0) - np.exp(-8.0)))
+    (said,) = (n for n in test.notes if n.startswith("range of the last 60 min"))
+    assert said == (
+        "range of the last 60 min to that of the first: y1_um 0 %, y2_um 0 %, z_um 0 %; all are within the 15 % by "
+        "which ISO 230-3 lets a spindle test end before 4 h (from memory)"
+    )
+    (slow,) = assess(spindle_test(180 * MIN))
+    share = 100 * np.exp(-1.0)
+    assert any(f"z_um {share:.0f} %; not all are within the 15 %" in n for n in slow.notes)
+    assert thermal_content(slow)["curves"][-1]["range_last"] == of(slow, "z_um").figures.range_last
+    time = np.arange(0.0, 100 * MIN, MIN)
+    assert np.isnan(figures(time, time, len(time) - 1).range_last)
+
+
+def test_stations_of_profiles_are_no_probes() -> None:
+    """EXX_0 belongs to a profile, measured again and again: no target of a laser, and not told probe by probe."""
+    plain = spindle_test()
+    stations = {
+        f"{code}_{p}_{unit}": plain.table["z_um"].to_numpy()
+        for code, unit in (("EXX", "um"), ("EBY", "urad"))
+        for p in (0, 100)
+    } | {"EYX_z600_100_um": plain.table["z_um"].to_numpy()}
+    columns = {c: plain.table[c].to_numpy() for c in plain.table.columns}
+    recording = recorded({**columns, **stations})
+    (test,) = assess(recording)
+    assert [c.name for c in test.curves] == [c.name for c in assess(plain)[0].curves]
+    assert any(n.startswith("5 channels are stations of error profiles (EXX, EBY, EYX)") for n in test.notes)
+    assert set(find_stations(recording)) == set(stations)
+    assert not find_stations(recorded({"x_laser_0_um": np.zeros(9), "EXX_um": np.zeros(9), "C0Y_urad": np.zeros(9)}))
+    only = recorded({**stations, "s_rpm": columns["s_rpm"]})
+    with pytest.raises(InputError, match=r"there is no displacement.*5 channels are stations"):
+        assess(only)
 
 
 def test_several_runs_are_several_tests() -> None:

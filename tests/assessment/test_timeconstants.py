@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from smallmachine import small_machine
 from thermocomp.assessment.exponentials import fit
+from thermocomp.assessment.iso230_tables import settling_content, time_constant_tables
 from thermocomp.assessment.timeconstants import Phase, drive, find_phases, noise, settle, time_constants
 from thermocomp.core.machine import Channel
 from thermocomp.recording.cycles import whole
@@ -111,6 +112,38 @@ def test_what_cannot_be_known_is_said() -> None:
     bump = settle(TIME, 10 * (rise(900) - rise(3000)) + jitter, "x", "um", PHASE)
     assert bump.words == "comes back"
     assert np.isnan(bump.t63)
+
+
+def test_an_overshoot_has_no_time_to_90_percent() -> None:
+    """It peaks at 1.28 of its end value: 90 % were first passed long before it came to rest."""
+    rng = np.random.default_rng(2)
+    jitter = 0.05 * rng.normal(size=TIME.size)
+    for sign in (-1.0, 1.0):
+        s = settle(TIME, sign * (20 * rise(600) - 10 * rise(2400)) + jitter, "z", "um", PHASE)
+        peak = float((20 * rise(600) - 10 * rise(2400)).max())
+        assert peak > 1.1 * 10
+        assert s.overshoots
+        assert s.words == "overshoots"
+        assert np.isnan([s.t63, s.t90]).all()
+        assert s.two is not None
+        (table,) = time_constant_tables([s])
+        assert table.rows[0][2:4] == ("peaks", "peaks")
+        assert "peaks: it overshoots its last value" in str(table.caption)
+        assert settling_content(s)["told"] == "overshoots"
+    # a twentieth is within the band of t90
+    slight = settle(TIME, 11 * rise(600) - rise(4000) + jitter, "z", "um", PHASE)
+    assert not slight.overshoots
+    assert np.isfinite(slight.t90)
+    # still on its way down
+    late = settle(TIME, 20 * rise(600) - 10 * rise(9000) + jitter, "z", "um", PHASE)
+    assert late.words == "overshoots, not settled"
+
+
+def test_channels_may_be_left_out() -> None:
+    recording = small_machine()
+    found = time_constants(recording, None, {"t1_C"})
+    assert "t1_C" not in {s.channel for s in found}
+    assert len(found) == 8 * 4
 
 
 def test_missing_values_and_outliers_are_passed_over() -> None:

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from thermocomp.cli.app import run
@@ -53,6 +54,24 @@ def test_the_kind_of_test_is_found_out_or_told(folder: Path, capsys: pytest.Capt
     assert test["test"] == "etve"
     assert test["ambient"]["channel"] == "t_coolant_C"
     assert any("moves" in note for note in test["notes"])
+
+
+def test_stations_of_profiles_are_counted_not_listed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As in the recordings of thermocomp simulate volumetric: 18 errors at a dozen stations each."""
+    recorded = pd.read_csv(folder / "spindle-1.csv", comment="#")
+    z = next(c for c in recorded.columns if c.startswith("z_um"))
+    for code in ("EXX", "EYX", "EZX"):
+        for p in range(0, 700, 50):
+            recorded[f"{code}_{p}_um"] = recorded[z]
+    path = folder / "stations.csv"
+    recorded.to_csv(path, index=False)
+    assert run(["iso230", str(path), "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    (test,) = content["thermal"]
+    assert any(note.startswith("42 channels are stations of error profiles (EXX, EYX, EZX)") for note in test["notes"])
+    told = {c["name"] for c in test["curves"]} | {c["channel"] for c in content["time_constants"][0]["channels"]}
+    assert any(name.startswith("z_um") for name in told)
+    assert not [name for name in told if name.startswith("E")]
 
 
 def test_pairs_of_other_names(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

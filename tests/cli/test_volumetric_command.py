@@ -145,6 +145,25 @@ def test_a_missing_number_holds_the_state(mill: tuple[str, str], capsys: pytest.
     assert "in 1 rows an input is missing" in capsys.readouterr().out
 
 
+def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert asked(capsys, mill[0])["notes"] == []
+    text, place = Path(mill[0]).read_text(encoding="utf-8"), '["0 mm", "0 mm", "0 mm"]'
+    text = text.replace("[axes.X]\n", f"[axes.X]\nmeasured_at = {place}\nmeasured_tool = {place}\n")
+    text += 'ECX = "20 urad"\nEYX = {profile = [["0 mm", "0 um"], ["300 mm", "1 um"]]}\n'
+    Path(mill[0]).write_text(text, encoding="utf-8")
+    twice, held = asked(capsys, mill[0])["notes"]
+    assert twice.startswith(
+        "ECX is 20 urad at X 0 mm, where X stood while Y was measured: over the travel of Y it moves"
+    )
+    assert held.startswith("EYX: its profile is known from X 0 to 300 mm, the axis goes from 0 to 600 mm")
+    page = tmp_path / "noted.html"
+    assert run(["volumetric", mill[0], "-o", str(page)]) == 0
+    said, written = capsys.readouterr().out, page.read_text(encoding="utf-8")
+    for note in (twice, held):
+        assert f"note {note}" in said
+        assert f"<li>{note}.</li>" in written
+
+
 def test_a_page(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert run(["volumetric", mill[0], "-o", str(page)]) == 0

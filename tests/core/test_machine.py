@@ -11,6 +11,7 @@ from thermocomp.core.exceptions import InputError, SettingError, UnitError
 from thermocomp.core.machine import Axis, Channel, Machine, Source
 from thermocomp.core.ports import CorrectionSink, TemperatureSource
 from thermocomp.core.position import PositionModel
+from thermocomp.core.profile import PolynomialProfile, SplineProfile
 from thermocomp.core.reading import Reading
 from thermocomp.core.structure import Structure
 from volumetricmachine import line
@@ -42,11 +43,44 @@ def test_axis_refuses_numbers_that_are_none() -> None:
         assert caught.value.path == (key,)
 
 
+def test_axis_was_measured_on_one_of_its_sides() -> None:
+    assert Axis("X", (0.0, 1.0)).measured_on == "tool"
+    with pytest.raises(SettingError, match="'table': must be 'tool' or 'workpiece'") as caught:
+        Axis("X", (0.0, 1.0), measured_on="table")  # type: ignore[arg-type]
+    assert caught.value.path == ("measured_on",)
+
+
 XZ = (Axis("X", (0.0, 500.0)), Axis("Z", (0.0, 300.0)))
 
 
 def profiled(axis: str, unit: str = "um") -> PositionModel:
     return PositionModel(target="e", unit=unit, axis=axis, travel=(0.0, 1.0))  # type: ignore[arg-type]
+
+
+def splined(axis: str, along: str, start: float = 0.0) -> PositionModel:
+    profile = SplineProfile(axis=along, knots=(start, start + 100.0), pieces=((0.0, 1.0, 0.0, 0.0),))
+    return PositionModel(target="e", unit="um", axis=axis, travel=(0.0, 1.0), profile=profile)
+
+
+def sloped(start: float) -> PositionModel:
+    slope = line("EXX", "um/m", {"t": 1.0})
+    return PositionModel(target="e", unit="um", axis="X", travel=(start, start + 100.0), slopes=(slope,))
+
+
+def bent(axis: int) -> PositionModel:
+    """Return a model along X whose profile depends on another axis too."""
+    exponents = ((1, 0, 0), (1 if axis == 0 else 0, 1 if axis == 1 else 0, 1 if axis == 2 else 0))
+    profile = PolynomialProfile(
+        exponents=exponents, coefficients=(1.0, 1.0), low=(0.0, 0.0, 0.0), high=(500.0, 100.0, 100.0)
+    )
+    return PositionModel(target="e", unit="um", axis="X", travel=(0.0, 500.0), profile=profile)
+
+
+def test_ranges_that_reach_the_travel_are_enough() -> None:
+    for source in (splined("X", "X", 500.0), splined("X", "X", -100.0), sloped(499.0), bent(2)):
+        Machine("mill", Structure.parse("XFZ"), XZ, {"EXX": source})
+    assert bent(2).ranges() == (("profile", "X", (0.0, 500.0)), ("profile", "Z", (0.0, 100.0)))
+    assert sloped(1.0).ranges() == (("slope", "X", (1.0, 101.0)),)
 
 
 def test_every_component_may_be_told() -> None:
@@ -71,6 +105,14 @@ def test_every_component_may_be_told() -> None:
         ("EAX", profiled("X"), "the model is in um; roll of X is in urad"),
         ("B0Z", profiled("Z", "urad"), "does not depend on a position"),
         ("EXX", profiled("Z"), "the model is one along Z"),
+        ("EXX", True, "True: must be a number or a model"),
+        ("EXX", "1 um", "'1 um': must be a number or a model"),
+        ("EXX", 10_001.0, "10001 um is more than 10 mm: check the unit"),
+        ("EAX", -20_000.0, "-20000 urad is more than 10 mrad: check the unit"),
+        ("EXX", splined("X", "Z"), "positioning of X: its profile is one along Z, not X"),
+        ("EXX", splined("X", "X", 501.0), "its profile is known from X 501 to 601 mm, the axis goes from 0 to 500 mm"),
+        ("EXX", sloped(600.0), "its slope is known from X 600 to 700 mm, the axis goes from 0 to 500 mm"),
+        ("EXX", bent(1), "its profile depends on Y: the machine has no axis Y"),
     ],
 )
 def test_machine_refuses_a_source_that_does_not_fit(code: str, source: Source, message: str) -> None:
@@ -111,6 +153,16 @@ def test_correction_is_minus_the_deviation_everywhere() -> None:
 
 def test_a_zero_deviation_gives_a_positive_zero() -> None:
     assert str(Correction.opposing(Deviation(0.0)).offset) == "0.0"
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])
+@pytest.mark.parametrize("key", ["offset", "slope", "reference_position"])
+def test_a_correction_is_of_finite_numbers(key: str, bad: float) -> None:
+    numbers = {"offset": 0.0, key: bad}
+    with pytest.raises(InputError, match=f"deviation: .* {bad}.*: must be finite numbers"):
+        Deviation(**numbers)
+    with pytest.raises(InputError, match=f"correction: .* {bad}.*: must be finite numbers"):
+        Correction(**numbers)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """ErrorModel: init and step, support, both families."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel, Input, Support
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.stack import Stack
 from thermocomp.core.terms import TermTable, Variable, second_order_terms
 
 
@@ -62,6 +65,27 @@ def test_a_fixed_reference_wins_over_the_first_reading() -> None:
     state = model.init(reference=[20.0])
     _, deviation = model.step(state, np.array([23.0]), 0.0)
     assert deviation == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_a_trained_range_is_finite(bad: float) -> None:
+    for low, high in ((-bad, 1.0), (0.0, bad)):
+        with pytest.raises(InputError, match=r"input t: trained range .* must be finite numbers"):
+            temperature("t", low, high)
+
+
+def test_an_input_that_never_changed_fades_at_once_and_warns_of_nothing() -> None:
+    """Warnings are errors here: nothing may overflow."""
+    model = replace(line(Support("fade")), inputs=(temperature("t", 0.0, 0.0),), intercept=8.0)
+    readings = [20.0, 20.0, 20.0 + 1e-6, 1e300, -40.0, 20.0]
+    expected = [8.0, 8.0, 0.0, 0.0, 0.0, 8.0]
+    assert run(model, [[r] for r in readings], 1.0) == expected
+    stack, found = Stack([model]), []
+    state = stack.init()
+    for r in readings:
+        state, deviation = stack.step(state, np.array([r]), 1.0)
+        found.append(float(deviation[0]))
+    assert found == expected
 
 
 def test_reference_must_fit() -> None:

@@ -27,6 +27,12 @@ from thermocomp.core.structure import Structure
         ("XYZF", "XYZ", ""),
         ("XY FZ", "XY", "Z"),
         ("ZF", "Z", ""),
+        ("wX'bZYt", "X", "ZY"),
+        ("wX'bZY(C1)t", "X", "ZY"),
+        ("w x' y' b z (c1) t", "XY", "Z"),
+        ("wbxyzt", "", "XYZ"),
+        ("W X' B Z T", "X", "Z"),
+        ("xfzy", "X", "ZY"),
     ],
 )
 def test_codes(code: str, workpiece: str, tool: str) -> None:
@@ -67,7 +73,14 @@ def test_beyond_an_axis_is_what_moves_the_tool_against_it() -> None:
         ("w X' b Z' Y t", "\"Z'\" .* stands on the tool's side and has no prime: Z"),
         ("w C' X' b Y Z t", "axis C: only the linear axes"),
         ("XFZYB", "axis B: only the linear axes"),
-        ("w x' b Z t", "is no axis: want X, Y or Z"),
+        ("w x b Z t", "'X' .* stands on the workpiece's side and needs a prime: X'"),
+        ("w B' X' b Z t", "axis B: only the linear axes"),
+        ("w X' b B Z t", "axis B: only the linear axes"),
+        ("w X' b (C1) Z t", "is no axis: want X, Y or Z"),
+        ("w X'- b Z t", "is no axis: want X, Y or Z"),
+        ("w (C1) b Z X t", r"\(C1\) .*: a spindle on the workpiece's side is not supported"),
+        ("w (C) Z' X' b t", r"\(C\) .*: a spindle on the workpiece's side is not supported"),
+        ("w(c')z'bxt", "a spindle on the workpiece's side is not supported"),
     ],
 )
 def test_codes_that_are_none(code: str, message: str) -> None:

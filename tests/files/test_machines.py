@@ -28,6 +28,16 @@ travel = ["0 mm", "400 mm"]
 travel = ["-0.5 m", "0 m"]
 [components]
 """
+ZERO = '["0 mm", "0 mm", "0 mm"]'
+#: the same with all that a turn or a squareness needs
+WHOLE = re.sub(
+    r"(?m)^(travel .*)$",
+    rf"""\1
+reference_position = "0 mm"
+measured_at = {ZERO}
+measured_tool = {ZERO}""",
+    HEAD,
+).replace("[components]", f"[spindle]\nmeasured_tool = {ZERO}\n[components]")
 
 
 def written(folder: Path, text: str) -> Path:
@@ -74,6 +84,8 @@ measured_tool = ["0 mm", "0 mm", "-150 mm"]
 
 [axes.Z]
 travel = ["-500 mm", "+.5e2 mm"]
+reference_position = "0 mm"
+measured_on = "workpiece"
 
 [spindle]
 measured_tool = ["0 mm", "0 mm", "-200 mm"]
@@ -92,7 +104,7 @@ EBX = {profile = [["0 mm", "0 urad"], ["300 mm", "-0.002 mrad"], ["500 mm", "4 Â
     assert x.travel == pytest.approx((0.0, 609.6))
     assert x.reference_position == pytest.approx(300.0)
     assert (x.measured_at, x.measured_tool) == ((1.0, 2.0, 3.0), (0.0, 0.0, -150.0))
-    assert z == Axis("Z", (-500.0, 50.0))
+    assert z == Axis("Z", (-500.0, 50.0), measured_on="workpiece")
     assert machine.components["B0Z"] == pytest.approx(10 * 1e6 * np.pi / 180 / 3600)
     assert machine.components["X0C"] == -1.0
     profile = machine.components["EBX"]
@@ -110,7 +122,7 @@ def test_a_name_is_that_of_the_file_if_there_is_none(tmp_path: Path) -> None:
 
 def test_all_32_components_are_reached_by_constants(tmp_path: Path) -> None:
     lines = [f'{c.code} = "{k} {c.unit}"' for k, c in enumerate(COMPONENTS)]
-    machine = read_machine(written(tmp_path, HEAD + "\n".join(lines)))
+    machine = read_machine(written(tmp_path, WHOLE + "\n".join(lines)))
     assert len(COMPONENTS) == 32
     assert machine.components == {c.code: float(k) for k, c in enumerate(COMPONENTS)}
 
@@ -122,7 +134,7 @@ def test_all_32_components_are_reached_by_models(tmp_path: Path) -> None:
     positionfile.write(ofposition, tmp_path / "position.json")
     modelfile.write(oftime, tmp_path / "time.json")
     lines = [f'{c.code} = {{model = "{"time" if c.is_scalar else "position"}.json"}}' for c in COMPONENTS]
-    machine = read_machine(written(tmp_path, HEAD + "\n".join(lines)))
+    machine = read_machine(written(tmp_path, WHOLE + "\n".join(lines)))
     told: dict[str, Source] = {**{m.target: m for m in ofposition}, **{m.target: m for m in oftime}}
     assert machine.components == told
 
@@ -208,7 +220,8 @@ def test_what_cannot_be_used_is_told_to_the_key(text: str, message: str, tmp_pat
 
 
 def test_a_component_of_an_axis_that_is_not_there(tmp_path: Path) -> None:
-    text = 'structure = "XFZ"\n[axes.X]\ntravel = ["0 mm", "1 mm"]\n[axes.Z]\ntravel = ["0 mm", "1 mm"]\n[components]\n'
+    text = 'structure = "XFZ"\n[axes.X]\ntravel = ["0 mm", "1 mm"]\n[axes.Z]\ntravel = ["0 mm", "1 mm"]\n'
+    text += 'reference_position = "0 mm"\n[components]\n'
     read_machine(written(tmp_path, text + 'EXX = "1 um"\nB0Z = "1 urad"'))
     missing = [c for c in BY_CODE.values() if "Y" in c.axes]
     assert len(missing) == 6 + 2 + 3
@@ -250,12 +263,12 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
             "components.Y0C: spindle drift in Y does not depend on a position",
         ),
         ('EXX = {model = "wrong_axis.json"}', "components.EXX: positioning of X: the model is one along Y"),
-        ('Z0C = {model = "refused.json"}', "components.Z0C.model: the model of z_um in "),
+        ('Z0C = {model = "refused.json"}', "components.Z0C.model: "),
         (
             'Z0C = {model = "refused.json"}',
-            "was refused when it was judged: worse than none; fit a better one, or leave",
+            "refused.json: model of z_um was refused and will not run: worse than none; fit a better one, or leave Z0C",
         ),
-        ('EYY = {model = "refused_slope.json"}', "was refused when it was judged: worse than none"),
+        ('EYY = {model = "refused_slope.json"}', "model of EYY was refused and will not run: worse than none"),
     ):
         with pytest.raises(InputError, match=re.escape(message)):
             read_machine(written(tmp_path, HEAD + text))
@@ -268,3 +281,67 @@ def test_no_file_or_no_text(tmp_path: Path) -> None:
         read_machine(tmp_path / "no.toml")
     with pytest.raises(InputError, match="cannot be read as a machine file"):
         read_machine(tmp_path)
+
+
+def test_a_turn_or_a_squareness_needs_the_place_from_which_it_counts(tmp_path: Path) -> None:
+    """A lever from a guessed zero would be off by the whole table: nothing is guessed."""
+    read_machine(written(tmp_path, WHOLE + "\n".join(f'{c.code} = "1 {c.unit}"' for c in COMPONENTS)))
+    for code, table, keys in (
+        ("EAX", "axes.X", ("measured_at", "measured_tool")),
+        ("EBY", "axes.Y", ("measured_at", "measured_tool")),
+        ("ECZ", "axes.Z", ("measured_at", "measured_tool")),
+        ("C0Y", "axes.Y", ("reference_position",)),
+        ("B0Z", "axes.Z", ("reference_position",)),
+        ("A0Z", "axes.Z", ("reference_position",)),
+        ("A0C", "spindle", ("measured_tool",)),
+        ("B0C", "spindle", ("measured_tool",)),
+    ):
+        before, head, after = WHOLE.partition(f"[{table}]\n")
+        for key in keys:
+            text = before + head + re.sub(f"{key} = .*\n", "", after, count=1)
+            message = f"mill.toml: {table}.{key}: is missing: {code} ({BY_CODE[code].description}) is given, so write"
+            with pytest.raises(InputError, match=re.escape(message)):
+                read_machine(written(tmp_path, text + f'{code} = "1 urad"'))
+            read_machine(written(tmp_path, text + 'EXX = "1 um"\nX0C = "1 um"'))
+
+
+@pytest.mark.parametrize("value", ['{profile = [["0 mm", "0 urad"], ["9 mm", "1 urad"]]}', '{model = "ecx.json"}'])
+def test_a_turn_by_profile_or_model_needs_it_too(value: str, tmp_path: Path) -> None:
+    positionfile.write([along("ECX", "urad", "X")], tmp_path / "ecx.json")
+    with pytest.raises(InputError, match=r"axes\.X\.measured_at: is missing: ECX \(tilt about Z of X\) is given"):
+        read_machine(written(tmp_path, HEAD + f"ECX = {value}"))
+    read_machine(written(tmp_path, WHOLE + f"ECX = {value}"))
+
+
+def test_axes_stood_within_their_travels(tmp_path: Path) -> None:
+    def at(axis: str, place: str, more: str = "") -> Path:
+        return written(tmp_path, HEAD.replace(f"[axes.{axis}]\n", f"[axes.{axis}]\nmeasured_at = {place}\n{more}"))
+
+    for axis, place, message in (
+        ("X", '["0 mm", "401 mm", "0 mm"]', "axes.X.measured_at: Y 401 mm: outside the travel of Y, 0 to 400 mm"),
+        ("Y", '["0 mm", "0 mm", "1 mm"]', "axes.Y.measured_at: Z 1 mm: outside the travel of Z, -500 to 0 mm"),
+        ("Z", '["-1 mm", "0 mm", "0 mm"]', "axes.Z.measured_at: X -1 mm: outside the travel of X, 0 to 600 mm"),
+    ):
+        with pytest.raises(InputError, match=re.escape(message)):
+            read_machine(at(axis, place))
+    # its own coordinate counts if the place stays with the workpiece
+    read_machine(at("X", '["-9 mm", "0 mm", "0 mm"]'))
+    with pytest.raises(InputError, match=re.escape("axes.X.measured_at: X -9 mm: outside the travel of X")):
+        read_machine(at("X", '["-9 mm", "0 mm", "0 mm"]', 'measured_on = "workpiece"\n'))
+    assert read_machine(at("X", ZERO, 'measured_on = "workpiece"\n')).axis("X").measured_on == "workpiece"
+    with pytest.raises(InputError, match=re.escape("axes.X.measured_on: 'table': must be 'tool' or 'workpiece'")):
+        read_machine(at("X", ZERO, 'measured_on = "table"\n'))
+
+
+def test_numbers_in_another_unit_are_seen(tmp_path: Path) -> None:
+    for text, message in (
+        ('EXX = "11 mm"', "components.EXX: 11000 um is more than 10 mm: check the unit"),
+        ('C0Y = "-11 mrad"', "components.C0Y: -11000 urad is more than 10 mrad: check the unit"),
+        (
+            'EXX = {profile = [["1 m", "0 um"], ["2 m", "1 um"]]}',
+            "components.EXX: positioning of X: its profile is known from X 1000 to 2000 mm, the axis goes from 0",
+        ),
+    ):
+        with pytest.raises(InputError, match=re.escape(message)):
+            read_machine(written(tmp_path, WHOLE + text))
+    read_machine(written(tmp_path, WHOLE + 'EXX = "10 mm"\nC0Y = "-10 mrad"'))

@@ -286,7 +286,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
         ("[positions]\na = { y = 250 }", r'a\.y = 250: write a position with its unit, such as "250 mm"'),
         ("[positions]\na = { y = '250' }", r"a\.y = '250': write a position with its unit"),
         ("[positions]\na = { y = '250 degC' }", r"a\.y: unit 'degC' measures temperature, not position"),
-        ("[positions", "cannot be read as positions"),
+        ("[positions", "not valid TOML"),
     ],
 )
 def test_bad_files_of_positions(text: str, message: str, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from thermocomp.models.geometric import fit_profile
 from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.position import PositionOptions, fit_position
+from thermocomp.papers.chen1996.law import OURS, plant, temperatures
 from thermocomp.papers.chen1996.setup import DIFFERENCES, SLOPE_VARIABLES
 from thermocomp.recording.profiles import Profiles
 
@@ -50,8 +51,8 @@ def test_errors_at_points_left_out_are_those_of_fitting_anew() -> None:
     points = along_y(np.concatenate([position, position]))
     values = EQ6(points[:, 1]) + np.random.default_rng(0).normal(size=24)
     found = fit_profile(points, values, "Y")
-    assert {t.order[0] for t in found.tried} == set(range(7))
-    for t in found.tried:
+    assert {t.order[0] for t in found.tried if not t.through} == set(range(7))
+    for t in (t for t in found.tried if not t.through):
         squares = []
         for p in position[1:-1]:
             kept = points[:, 1] != p
@@ -102,7 +103,7 @@ def test_a_spline_follows_what_no_polynomial_does() -> None:
     position = np.linspace(0.0, 550.0, 23)
     points, truth = along_y(position), 20 * np.tanh((position - 300) / 30)
     values = truth + 0.1 * np.random.default_rng(0).normal(size=23)
-    spline, polynomial = (fit_profile(points, values, "Y", kind=k) for k in ("spline", "polynomial"))
+    spline, polynomial = fit_profile(points, values, "Y", kind="spline"), fit_profile(points, values, "Y", order=9)
     assert spline.order[0] >= 4
     assert off(spline.profile.at(points), truth) < 0.6 * off(polynomial.profile.at(points), truth)
     cubic = 1e-6 * position**3 - 2.0
@@ -133,26 +134,37 @@ def test_profiles_that_cannot_be_fitted(kind: str) -> None:
 
 
 def test_chens_law_comes_back_from_51_profiles() -> None:
-    """C-23, C-24 in E-C6's units: noise 0.3 um; the four terms of Eq. 8 and none of the 16 others."""
-    made = planted(seed=0, noise=0.3, draw=0)
-    assert made.values.shape == (51, 12)
-    found = fit_position(made, CHEN)
-    estimator = found.trained[0].estimator
-    assert len(estimator.candidates_) == 20
-    (slope,) = found.model.slopes
-    assert slope.unit == "um/m"
-    assert set(slope.coefficients_by_name()) == set(LAW)
-    for name, true in LAW.items():
-        error = found.coefficient_errors[0][name]
-        assert abs(slope.coefficients_by_name()[name] - true) < 2 * error
-        assert error < 0.4 * abs(true)
+    """C-23, C-24 in E-C6's units: the four terms of Eq. 8 and none of the 16 others, whatever weather and noise.
+
+    Three tests, each with another source of heat, and all counts from the mean state of its test: see
+    `thermocomp.papers.chen1996.law`.
+    """
+    days = [temperatures("chen1996-law", seed) for seed in range(4)]
+    rng = np.random.default_rng(0)
+    whole, scores = 0, []
+    for draw in range(20):
+        made = [m.profiles(f"test {k}") for k, m in enumerate(plant(days[draw % 4], OURS, rng))]
+        assert sum(len(m) for m in made) == 51
+        found = fit_position(made, replace(CHEN, order=5, reference=range(17)))
+        assert len(found.trained[0].estimator.candidates_) == 20
+        (slope,) = found.model.slopes
+        assert slope.unit == "um/m"
+        coefficients, errors = slope.coefficients_by_name(), found.coefficient_errors[0]
+        if set(coefficients) == set(LAW):
+            whole += 1
+            scores += [(coefficients[n] - true) / errors[n] for n, true in LAW.items()]
+    assert whole >= 19
+    # noise of the temperatures makes coefficients a little too small
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.6
+    assert np.abs(scores).max() < 4.5
 
 
 def test_chens_law_over_many_draws() -> None:
-    """What 51 profiles can tell: T6-T8 and T7-T9 go together (r = .95), so noise decides whether they come in.
+    """What 51 profiles of one warm-up tell: T6-T8 and T7-T9 go together (r = .95), so noise decides if they come in.
 
     With the noise of one laser run (0.3 um) the law comes back whole in a quarter of these draws, with 0.05 um in three
-    quarters. Where it does not, the terms that stand for others still tell the slope.
+    quarters; and that only because it is one of the readings here, whose own noise makes them differ. Where it does not
+    come back, the terms that stand for others still tell the slope.
     """
     whole = {}
     scores = []

@@ -82,6 +82,16 @@ def test_a_page_of_positioning_only() -> None:
     assert "approached from one direction only" in text
 
 
+def test_a_single_run_on_the_page() -> None:
+    positions = np.linspace(0, 3000, 13)
+    up = 0.01 * positions[None]
+    text = pages.render([], [], [iso230_2.assess(Positioning("X", "", "um", positions, up, up - 2, "x.csv"))])
+    assert "mean ↑ of a single run" in text
+    assert "a single run in direction +: s, R and A take more" in text
+    assert "measurement uncertainty is not told" in text
+    assert "nan" not in text.lower().replace("finance", "")
+
+
 def test_figures_say_what_they_show(spindle: ThermalTest) -> None:
     drawn = figures.thermal(spindle)
     for said in ("60 min", "tilts A (about X) and B (about Y)", "urad = um/m", "with model", "t_air_C: surroundings"):

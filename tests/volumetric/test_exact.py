@@ -30,17 +30,26 @@ class Joint:
             "Y": (0.0, 0.0, of.get("C0Y", 0.0)),
             "Z": (of.get("A0Z", 0.0), of.get("B0Z", 0.0), 0.0),
         }
+        self.stays = axis.measured_on == "workpiece"
+        if self.stays:
+            self.pivot[k] += axis.measured_at[k]
         straight = np.eye(3)[k]
         guide = Rotation.from_rotvec(1e-6 * np.array(lean[name])).apply(straight)
         # the carriage goes on the axis itself to the reference position, and along the guide from there
         self.move = axis.reference_position * straight + (point[k] - axis.reference_position) * guide
         self.move = self.move + 1e-3 * np.array([of[f"E{a}{name}"] for a in "XYZ"])
+        self.way = point[k] * straight
         self.turn = Rotation.from_rotvec(1e-6 * np.array([of[f"E{a}{name}"] for a in "ABC"]))
 
     def forth(self, points: FloatArray) -> FloatArray:
+        if self.stays:  # moved beside the pivot, and turned there
+            return np.asarray(self.turn.apply(points + self.way - self.pivot) + self.pivot + self.move - self.way)
         return np.asarray(self.turn.apply(points - self.pivot) + self.pivot + self.move)
 
     def back(self, points: FloatArray) -> FloatArray:
+        if self.stays:
+            returned = self.turn.inv().apply(points - self.pivot - self.move + self.way)
+            return np.asarray(returned + self.pivot - self.way)
         return np.asarray(self.turn.inv().apply(points - self.pivot - self.move) + self.pivot)
 
 

@@ -11,11 +11,13 @@ from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Machine, Source
+from thermocomp.core.model import HonestError
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from thermocomp.volumetric.model import VolumetricModel
+from thermocomp.volumetric.straight import straight_lines
 from volumetricmachine import STRUCTURES, by_hand, line, random_machine, random_values, temperature
 
 #: C-22, Eq. (6), for y in mm and d in mm (E-C6): 1000 times as much in um
@@ -183,6 +185,53 @@ def test_a_correction_that_does_not_settle_is_refused() -> None:
     _, field = VolumetricModel(machine := by_hand("XYZ", {"EXX": steep})).step(VolumetricModel(machine).init(), {}, 0.0)
     with pytest.raises(InputError, match="machine round: the correction still changes by"):
         field.correction(np.array([300.0, 0.0, 0.0]))
+
+
+def test_beyond_the_travel_the_correction_at_its_end_is_held() -> None:
+    """A live compensator a hundredth of a millimetre beyond must not stop, and nothing goes on without limit."""
+    field = VolumetricModel(machine := rich("XFZY")).field(np.full(len(VolumetricModel(machine).stack.models), 9.0))
+    ends = np.array([[0.0, 600.0, 600.0], [600.0, 0.0, 300.0]])
+    at_ends = field.correction(ends)
+    assert np.abs(at_ends).max() > 10.0
+    for beyond in (0.01, 1.0, 1e9):
+        points = ends + np.array([[-beyond, beyond, beyond], [beyond, -beyond, 0.0]])
+        assert np.array_equal(field.correction(points), at_ends)
+    within = field.correction(ends + np.array([[0.01, -0.01, -0.01], [-0.01, 0.01, 0.0]]))
+    assert within == pytest.approx(at_ends, abs=0.05)
+    assert not np.array_equal(within, at_ends)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_numbers_that_are_none_are_refused(bad: float) -> None:
+    field = ErrorField(Kinematics(by_hand("XFZ", {})), np.zeros(len(COMPONENTS)))
+    point, good = (0.0, bad, 0.0), (1.0, 2.0, 3.0)
+    for points in (point, [good, point]):
+        for job in (field.components, field.error, field.tilt, field.correction, lambda p: field.error(p, exact=True)):
+            with pytest.raises(InputError, match=f"positions: must be finite numbers, found {bad}"):
+                job(points)
+    with pytest.raises(InputError, match=f"position: must be finite numbers, found {bad}"):
+        field.sensitivity(point)
+    for use in (field.error, field.correction, field.sensitivity):
+        with pytest.raises(InputError, match=f"tool: must be finite numbers, found {bad}"):
+            use(good, point)
+    with pytest.raises(InputError, match=f"at: must be finite numbers, found {bad}"):
+        straight_lines(field, point)
+    with pytest.raises(InputError, match=f"tool: must be finite numbers, found {bad}"):
+        straight_lines(field, good, point)
+
+
+def test_a_refused_model_does_not_run() -> None:
+    refused = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, "refused", "worse than none")
+    slope = replace(line("EYY", "um/m", {"T1": 1.0}), honest_error=refused)
+    sources: tuple[Source, ...] = (
+        replace(line("EYY", "um", {"T1": 1.0}), honest_error=refused),
+        PositionModel(target="EYY", unit="um", axis="Y", travel=(0.0, 600.0), slopes=(slope,)),
+    )
+    for source in sources:
+        with pytest.raises(InputError, match="model of EYY was refused and will not run: worse than none"):
+            VolumetricModel(by_hand("XYZ", {"EYY": source}))
+    accepted = replace(line("EYY", "um", {"T1": 1.0}), honest_error=replace(refused, verdict="accepted"))
+    assert VolumetricModel(by_hand("XYZ", {"EYY": accepted})).inputs == ("T1",)
 
 
 def test_missing_channels_are_named() -> None:

@@ -11,7 +11,7 @@ from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.robustness import Robustness, pooled, stress
-from thermocomp.assessment.splits import Judging, Split
+from thermocomp.assessment.splits import Judging, Split, called, stretches
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.methods import deployable, expand
@@ -248,8 +248,8 @@ def judge(
 def per_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
-    for verdict, k in zip(whole.verdict.cycles, np.unique(whole.cycle), strict=True):
-        rows = whole.cycle == k
+    for verdict, block in zip(whole.verdict.cycles, stretches(whole.cycle, whole.test), strict=True):
+        rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]
         found.append(
             replace(
@@ -302,10 +302,10 @@ def _failed(samples: Samples, name: str, target: int, split: Split, why: str) ->
 
 def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
     cycle = samples.cycle[rows]
-    for k in np.unique(cycle):
-        name = samples.cycle_names[k]
-        whole = (cycle == k).sum() == (samples.cycle == k).sum()
-        yield name if whole else f"part of {name}", cycle == k
+    for block in stretches(cycle, samples.test[rows]):
+        mine, name = np.isin(cycle, block), called(samples, block)
+        whole = mine.sum() == np.isin(samples.cycle, block).sum()
+        yield name if whole else f"part of {name}", mine
 
 
 def _together(parts: Sequence[Assessment]) -> Assessment:

@@ -10,6 +10,10 @@ makers quote them. With x[i, j] the deviation at target i in run j of one direct
   their largest;
 - systematic deviation ``E_up = max x_up - min x_up``; ``E`` the same over both directions; ``M = max x - min x``;
 - accuracy ``A_up = max(x_up + 2 s_up) - min(x_up - 2 s_up)``; ``A`` the same over both directions.
+
+An axis over 2 m is approached once in each direction, every 250 mm on average: E, M and B come of that; s, R and A take
+at least two runs and are left out. The uncertainty of the measurement, which the 2014 edition wants to be told with the
+results, is not known from the deviations and not told here.
 """
 
 from dataclasses import dataclass
@@ -23,6 +27,10 @@ FloatArray = NDArray[np.float64]
 
 #: what ISO 230-2 wants of an axis up to 2 m: targets per axis, targets per metre, runs in each direction
 TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
+#: an axis is long from here on; it wants one run in each direction, targets so far apart on average [mm]
+LONG, LONG_INTERVAL = 2000.0, 250.0
+#: what every report of these values has to say
+UNCERTAINTY = "The measurement uncertainty is not told: ISO 230-2:2014 wants it stated with these values."
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +40,8 @@ class Direction:
     Parameters
     ----------
     mean, s : ndarray of shape (n_targets,)
-        Mean deviation and estimator of the standard deviation at each target [unit].
+        Mean deviation and estimator of the standard deviation at each target [unit]; s is nan, and with it R and A, of
+        a single run.
     """
 
     mean: FloatArray
@@ -61,7 +70,9 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class PositioningResult:
-    """A positioning test, evaluated. All in the unit of its deviations; nan or None where it takes both directions.
+    """A positioning test, evaluated. All in the unit of its deviations.
+
+    What takes both directions is nan or None without them, and so is what takes several runs in each.
 
     Parameters
     ----------
@@ -108,7 +119,7 @@ class PositioningResult:
                 values |= {f"A{arrow}": d.A, f"E{arrow}": d.E, f"R{arrow}": d.R}
         if self.mean is not None:
             values |= {"A": self.A, "E": self.E, "M": self.M, "R": self.R, "B": self.B, "mean B": self.B_mean}
-        return values
+        return {symbol: v for symbol, v in values.items() if np.isfinite(v)}
 
 
 def assess(test: Positioning) -> PositioningResult:
@@ -122,7 +133,7 @@ def assess(test: Positioning) -> PositioningResult:
     -------
     PositioningResult
     """
-    up, down = (None if d is None else Direction(d.mean(axis=0), d.std(axis=0, ddof=1)) for d in (test.up, test.down))
+    up, down = (None if d is None else _direction(d) for d in (test.up, test.down))
     nan = float("nan")
     if up is None or down is None:
         return PositioningResult(test, up, down, None, None, None, nan, nan, nan, nan, nan, nan, _shortfalls(test))
@@ -137,7 +148,7 @@ def assess(test: Positioning) -> PositioningResult:
         down=down,
         mean=mean,
         reversal=reversal,
-        repeatability=repeatability,
+        repeatability=repeatability if np.isfinite(repeatability).all() else None,
         A=float((means + twice).max() - (means - twice).min()),
         E=float(np.ptp(means)),
         M=float(np.ptp(mean)),
@@ -148,16 +159,31 @@ def assess(test: Positioning) -> PositioningResult:
     )
 
 
+def _direction(deviations: FloatArray) -> Direction:
+    mean = deviations.mean(axis=0)
+    return Direction(mean, deviations.std(axis=0, ddof=1) if len(deviations) > 1 else np.full(len(mean), np.nan))
+
+
 def _shortfalls(test: Positioning) -> tuple[str, ...]:
     notes = []
-    n, length = len(test.positions), float(np.ptp(test.positions)) / 1e3
     # the travel is not known: what lies between the first and the last target is
-    wanted = max(TARGETS, int(np.ceil(TARGETS_PER_METRE * length)))
+    n, travel = len(test.positions), float(np.ptp(test.positions))
+    long = travel > LONG
+    if long:
+        wanted = int(np.ceil(travel / LONG_INTERVAL - 1e-9)) + 1
+    else:
+        wanted = max(TARGETS, int(np.ceil(TARGETS_PER_METRE * travel / 1e3)))
     if n < wanted:
-        notes.append(f"{n} targets over {length:g} m; ISO 230-2 wants at least {wanted}")
+        notes.append(f"{n} targets over {travel / 1e3:g} m; ISO 230-2 wants at least {wanted}")
     for name, deviations in test.directions.items():
-        if len(deviations) < RUNS:
-            notes.append(f"{len(deviations)} runs in direction {name}; ISO 230-2 wants {RUNS}")
+        runs = len(deviations)
+        if runs == 1:
+            notes.append(
+                f"a single run in direction {name}: s, R and A take more"
+                + ("; ISO 230-2 wants no more over 2 m" if long else f", ISO 230-2 wants {RUNS}")
+            )
+        elif runs < RUNS and not long:
+            notes.append(f"{runs} runs in direction {name}; ISO 230-2 wants {RUNS}")
     if len(test.directions) == 1:
         notes.append("approached from one direction only: reversal and bidirectional values are unknown")
     return tuple(notes)

@@ -27,6 +27,10 @@ FloatArray = NDArray[np.float64]
 
 _AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 _PAIR = re.compile(r"([xy])([12])", re.IGNORECASE)
+# EXX_0, EYX_z600_100: an error of an axis at a station (ISO 230-1 code)
+_STATION = re.compile(r"(E[XYZABC][XYZ])(?:_\w+)?_-?\d+(?:\.\d+)?")
+#: a spindle test may end before 4 h if the last 60 min change by this share of the first, or less (from memory)
+CALM = 0.15
 _TARGET = re.compile(r"(([xyz])(?:_[a-z]+)*)_(-?\d+(?:\.\d+)?)", re.IGNORECASE)
 
 
@@ -66,6 +70,12 @@ def find_probe(recording: Recording, name: str) -> str:
     if channel.quantity != "displacement":
         raise InputError(f"{recording.name}: {channel.name} is a {channel.quantity}; probes measure displacements")
     return channel.name
+
+
+def find_stations(recording: Recording) -> dict[str, str]:
+    """Return the channels that are stations of an axis' error profile, such as ``EXX_300``, and whose: code by name."""
+    measured = (c for c in recording.channels if c.quantity in ("displacement", "angle"))
+    return {c.name: named[1] for c in measured if (named := _STATION.fullmatch(_base(c)))}
 
 
 def find_ambient(recording: Recording) -> Channel | None:
@@ -110,9 +120,12 @@ def assess(
         There is no displacement, a channel is not there, or no model belongs to the recording.
     """
     kind = detect(recording) if kind is None else kind
-    measured = [c for c in recording.channels if c.quantity in ("displacement", "angle")]
-    if not measured:
-        raise InputError(f"{recording.name}: there is no displacement; a thermal test needs at least one probe")
+    if not _probes(recording):
+        stations = find_stations(recording)
+        raise InputError(
+            f"{recording.name}: there is no displacement; a thermal test needs at least one probe"
+            + (f" ({_stations_words(stations)})" if stations else "")
+        )
     if len(recording) < 2:
         raise InputError(f"{recording.name}: has one row; a thermal test needs a start and what follows it")
     air = recording.channel(ambient) if ambient is not None else find_ambient(recording)
@@ -171,7 +184,7 @@ def _evaluate(
             after_figures=None if after is None else figures(time, after, stop - start),
         )
 
-    channels = [c for c in recording.channels if c.quantity in ("displacement", "angle")]
+    channels = _probes(recording)
     before = {c.name: recording.table[c.name].to_numpy(dtype=np.float64)[start : end + 1] for c in channels}
     after = {n: v[start : end + 1] for n, v in residuals.items()}
     drawn = {c.name: curve(c.name, c.unit, c.place, before[c.name], after.get(c.name)) for c in channels}
@@ -198,6 +211,8 @@ def _evaluate(
     still = [c.name for c in curves if np.isfinite(c.values).any() and c.figures.range_all <= MOVES * noise(c.values)]
     if still:
         notes.append(f"{', '.join(still)}: not beyond the probes' noise, whose range it is that is told")
+    if kind == "spindle":
+        notes += _about_the_end([c for c in (*drawn.values(), *tilts) if c.name not in still])
     for c in (*curves, *(c for t in targets for c in t.curves)):
         if c.after_figures is not None and c.after_figures.range_all > c.figures.range_all:
             grown = f"{c.figures.range_all:.3g} to {c.after_figures.range_all:.3g} {c.unit}"
@@ -256,6 +271,8 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     untold = [f"{named[a, 1]} and {named[a, 2]}" for a in "xy" if {(a, 1), (a, 2)} <= named.keys()]
     if untold and not used:
         notes.append(f"no tilt is told: the distance between the probes {', '.join(untold)} was not given")
+    if stations := find_stations(recording):
+        notes.append(_stations_words(stations))
     if air is None:
         notes.append("no temperature is known to be that of the surroundings: name it")
     if kind == "axis" and not _target_groups(recording):
@@ -263,6 +280,35 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
             "no channel is a target of an axis: name them by axis and position, such as x_laser_0, x_laser_500"
         )
     return notes
+
+
+def _probes(recording: Recording) -> list[Channel]:
+    """Return what a thermal test is told of: displacements and angles, without stations of error profiles."""
+    stations = find_stations(recording)
+    return [c for c in recording.channels if c.quantity in ("displacement", "angle") and c.name not in stations]
+
+
+def _stations_words(stations: dict[str, str]) -> str:
+    codes = list(dict.fromkeys(stations.values()))
+    shown = ", ".join(codes[:3]) + (" ..." if len(codes) > 3 else "")
+    return (
+        f"{len(stations)} channels are stations of error profiles ({shown}): they are not told here; thermocomp "
+        "position and thermocomp volumetric are for them"
+    )
+
+
+def _about_the_end(curves: Sequence[Curve]) -> list[str]:
+    """Return how calm a spindle test was when it ended: what the standard lets it end by."""
+    shares = {c.name: c.figures.range_last / c.figures.range_60 for c in curves if c.figures.range_60 > 0}
+    told = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if np.isfinite(share)]
+    if not told:
+        return []
+    calm = all(share <= CALM for share in shares.values() if np.isfinite(share))
+    return [
+        f"range of the last 60 min to that of the first: {', '.join(told)}; "
+        + ("all are" if calm else "not all are")
+        + f" within the {100 * CALM:.0f} % by which ISO 230-3 lets a spindle test end before 4 h (from memory)"
+    ]
 
 
 def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], number: int) -> list[str]:

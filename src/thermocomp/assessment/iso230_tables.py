@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from thermocomp.assessment.choice import Cell, Table
-from thermocomp.assessment.iso230_2 import PositioningResult
+from thermocomp.assessment.iso230_2 import UNCERTAINTY, PositioningResult
 from thermocomp.assessment.thermaltest import Curve, Figures, Targets, ThermalTest
 from thermocomp.assessment.timeconstants import Settling
 
@@ -16,6 +16,7 @@ _WORDS = {
     ">": "; > where the curve has not settled: it is later",
     "still": "; still: it does not move beyond its noise",
     "returns": "; returns: it comes back before",
+    "peaks": "; peaks: it overshoots its last value, then settles back",
 }
 #: the word for a curve that a model has been taken from
 WITH = "with model"
@@ -77,6 +78,8 @@ def _settled(test: ThermalTest, curve: Curve) -> tuple[str, ...]:
 def _minutes(s: Settling, seconds: float) -> str:
     if not s.moves or s.returns:
         return "still" if not s.moves else "returns"
+    if s.overshoots:
+        return "peaks"
     if not np.isfinite(seconds):
         return ""
     return f"{'' if s.settled else '> '}{seconds / 60:.0f}"
@@ -120,7 +123,8 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
         columns = ("", "change", "t63", "t90", "tau", "R2", "fast", "slow", "R2 of both")
         caption = (
             "t63, t90: read from the curve; > where it has not settled at the end; still: it does not move beyond its "
-            "noise; returns: it comes back before the end. tau: of one exponential, fast and "
+            "noise; returns: it comes back before the end; peaks: it overshoots its last value, "
+            "then settles back. tau: of one exponential, fast and "
             "slow: of two, where they are called for; each with its standard error, in brackets if it is longer than "
             "the phase or less sure than half of itself."
         )
@@ -173,7 +177,8 @@ def positioning_tables(results: Sequence[PositioningResult]) -> tuple[Table, ...
         axis_rows = tuple((s, *(r.axis_values.get(s) for r in mine)) for s in symbols)
         named = f"Axis {key[0]}" if key[0] else "Axis"
         columns = ("", *(r.test.state or "value" for r in mine))
-        tables.append(Table(f"{named}: accuracy, repeatability, reversal [{key[1]}]", columns, axis_rows))
+        title = f"{named}: accuracy, repeatability, reversal [{key[1]}]"
+        tables.append(Table(title, columns, axis_rows, None, UNCERTAINTY))
         tables += [_at_targets(r, named) for r in mine]
     return tuple(tables)
 
@@ -183,8 +188,10 @@ def _at_targets(r: PositioningResult, axis: str) -> Table:
     data: list[Any] = [r.test.positions]
     for name, arrow in (("+", "↑"), ("-", "↓")):
         if name in r.directions:
-            columns += [f"mean {arrow}", f"s {arrow}"]
-            data += [r.directions[name].mean, r.directions[name].s]
+            mean, s = r.directions[name].mean, r.directions[name].s
+            several = bool(np.isfinite(s).all())
+            columns += [f"mean {arrow}", f"s {arrow}"] if several else [f"mean {arrow}"]
+            data += [mean, s] if several else [mean]
     for symbol, values in (("mean", r.mean), ("B", r.reversal), ("R", r.repeatability)):
         if values is not None:
             columns.append(symbol)
@@ -240,10 +247,11 @@ def positioning_content(r: PositioningResult) -> dict[str, Any]:
         "values": r.axis_values,
         "positions_mm": r.test.positions.tolist(),
         "mean": {name: d.mean.tolist() for name, d in r.directions.items()},
-        "s": {name: d.s.tolist() for name, d in r.directions.items()},
+        "s": {name: d.s.tolist() if np.isfinite(d.s).all() else None for name, d in r.directions.items()},
         "B": r.reversal.tolist() if r.reversal is not None else None,
         "R": r.repeatability.tolist() if r.repeatability is not None else None,
-        "notes": list(r.notes),
+        "uncertainty": None,
+        "notes": [*r.notes, UNCERTAINTY],
     }
 
 

@@ -1,18 +1,22 @@
 """Judge models of position-dependent errors: whole profiles, in thermal cycles that were not learned from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
+from thermocomp.assessment.compare import ALL
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import HonestError
-from thermocomp.models.position import PositionFit, PositionOptions, fit_position, slope_samples
+from thermocomp.core.size import Size
+from thermocomp.models.position import PositionFit, fit_position, slope_samples
+from thermocomp.models.positionoptions import PositionOptions, Setting, reference_position, suited
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.samples import Samples
 
@@ -58,9 +62,10 @@ class PositionAssessment:
     cycles : tuple of CycleErrors
     overall : CycleErrors
         Of all of them together.
-    harmless, useful : Verdict
-        The do-no-harm gate: beside no compensation, and beside the cold profile alone, which tells whether the thermal
-        part is of use.
+    harmless : Verdict
+    useful : Verdict or None
+        The do-no-harm gate: beside no compensation, in each cycle; and, over all of them together, beside the cold
+        profile alone, which tells whether the thermal part is of use. None if there is none.
     factors : tuple of HonestError
         Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
@@ -70,14 +75,14 @@ class PositionAssessment:
     cycles: tuple[CycleErrors, ...]
     overall: CycleErrors
     harmless: harm.Verdict
-    useful: harm.Verdict
+    useful: harm.Verdict | None
     factors: tuple[HonestError, ...]
     unit: str
 
     @property
     def accepted(self) -> bool:
-        """True if the model is surely better than none, and than its cold profile alone, in every cycle."""
-        return self.harmless.accepted and self.useful.accepted
+        """True if the model is surely better than none in every cycle, and than its cold profile alone over all."""
+        return self.harmless.accepted and (self.useful is None or self.useful.accepted)
 
     @property
     def reason(self) -> str:
@@ -93,33 +98,46 @@ class PositionStudy:
     ----------
     fit : PositionFit
         The models of its factors carry the honest error.
+    options : PositionOptions
+        With what was left open filled in.
     assessment : PositionAssessment
+    dropped : str
+        Why the thermal part was left out, if it was: its own verdict.
     """
 
     fit: PositionFit
+    options: PositionOptions
     assessment: PositionAssessment
+    dropped: str = ""
 
 
 def study(
     profiles: Profiles | Sequence[Profiles],
     options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
     *,
+    left_open: Collection[Setting] = (),
     judging: Callable[[Samples], Judging] = leave_one_cycle_out,
+    jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> PositionStudy:
     """Judge how a position-dependent error is modelled on unseen cycles, then fit it to everything.
 
-    In each split everything is learned anew: cold profile, its order, slopes. The cold profile of a test of which only
-    a part is left out is its zero: it is used, and not judged. A left-out test is judged by the cold profiles of the
-    others.
+    In each split everything is learned anew: settings left open, cold profile, its order, slopes. The cold profile of a
+    test of which only a part is left out is its zero: it is used, and not judged. A left-out test is judged by the cold
+    profiles of the others.
 
     Parameters
     ----------
     profiles : Profiles or sequence of Profiles
         Of one component, one per test.
     options : PositionOptions
+    left_open : collection of {'slopes', 'offset', 'reference_position'}
+        Settings that the profiles tell, in place of `options`; see `thermocomp.models.positionoptions.suited`. If it is
+        open how many slopes there are and the thermal part is refused, the cold profile alone is judged and taken.
     judging : callable
         Makes splits of the states, such as those of `thermocomp.assessment.splits`.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     progress : callable
         Called with a line of text after each fit.
 
@@ -134,16 +152,107 @@ def study(
     FitError
         It cannot be fitted, to all states or to those of a split, or nothing is left to judge on.
     """
-    tests = (profiles,) if isinstance(profiles, Profiles) else tuple(profiles)
+    tests = (profiles,) if isinstance(profiles, Profiles) else profiles
+    (found,) = study_all([tests], options, left_open=left_open, judging=judging, jobs=jobs, progress=progress)
+    return found
+
+
+def study_all(
+    components: Sequence[Sequence[Profiles]],
+    options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
+    *,
+    left_open: Collection[Setting] = (),
+    judging: Callable[[Samples], Judging] = leave_one_cycle_out,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[PositionStudy, ...]:
+    """Do `study` for several components at once.
+
+    Parameters
+    ----------
+    components : sequence of sequence of Profiles
+        The tests of each.
+    options, left_open, judging, jobs, progress
+        See `study`; `n_pieces` tells how often `progress` is called.
+
+    Returns
+    -------
+    tuple of PositionStudy
+        One per component.
+    """
+    whole = [_All(tuple(tests), *_splits(tests, options, judging)) for tests in components]
+    found = _studies(whole, options, left_open, jobs, progress)
+    if "slopes" not in left_open:
+        return tuple(found)
+    for k, (one, first) in enumerate(zip(whole, found, strict=True)):
+        if first.assessment.accepted and first.options.powers:
+            continue
+        (alone,) = _studies([one], replace(first.options, slopes=0, offset=False), (), 1, lambda _: None)
+        if alone.assessment.accepted:
+            found[k] = replace(alone, dropped=first.assessment.reason if first.options.powers else "it is noise")
+    return tuple(found)
+
+
+def _studies(
+    whole: Sequence["_All"],
+    options: PositionOptions,
+    left_open: Collection[Setting],
+    jobs: int,
+    progress: Callable[[str], None],
+) -> list[PositionStudy]:
+    work = [
+        delayed(_piece)(one.tests, options, tuple(left_open), split)
+        for one in whole
+        for split in (*one.judging.splits, None)
+    ]
+    done: list[Any] = []
+    for text, found in Parallel(n_jobs=jobs, return_as="generator")(work):
+        progress(text)
+        done.append(found)
+    studies, start = [], 0
+    for one in whole:
+        stop = start + len(one.judging.splits)
+        studies.append(_study(one, done[start:stop], *done[stop]))
+        start = stop + 1
+    return studies
+
+
+def n_pieces(
+    components: Sequence[Sequence[Profiles]], options: PositionOptions, judging: Callable[[Samples], Judging]
+) -> int:
+    """Return the number of pieces of work of `study_all`."""
+    return sum(len(_splits(tests, options, judging)[1].splits) + 1 for tests in components)
+
+
+class _All(NamedTuple):
+    """A component: its tests, their states, and how they are split."""
+
+    tests: tuple[Profiles, ...]
+    samples: Samples
+    judging: Judging
+
+
+def _splits(
+    tests: Sequence[Profiles], options: PositionOptions, judging: Callable[[Samples], Judging]
+) -> tuple[Samples, Judging]:
     samples, _ = slope_samples(tests, options)
-    chosen = judging(samples)
-    parts = []
-    for split in chosen.splits:
-        parts.append(_judged(tests, options, split))
-        progress(f"{tests[0].target} {split.block}")
-    fit = fit_position(tests, options)
-    progress(f"{tests[0].target} all states")
-    assessment = _together(chosen.name, parts, samples, tests)
+    return samples, judging(samples)
+
+
+def _piece(
+    tests: tuple[Profiles, ...], options: PositionOptions, left_open: Collection[Setting], split: Split | None
+) -> tuple[str, Any]:
+    """Judge one split; or, without one, fit everything."""
+    learn = None if split is None else split.learn
+    chosen = suited(tests, options, left_open, learn=learn) if left_open else options
+    fit = fit_position(tests, chosen, learn=learn)
+    if split is None:
+        return f"{tests[0].target} all states", (chosen, fit)
+    return f"{tests[0].target} {split.block}", _judged(tests, fit, chosen, split)
+
+
+def _study(one: _All, parts: Sequence["_Part"], options: PositionOptions, fit: PositionFit) -> PositionStudy:
+    assessment = _together(one, parts, options)
     honest = assessment.factors
     trained = tuple(
         replace(t, model=replace(t.model, honest_error=h)) for t, h in zip(fit.trained, honest, strict=True)
@@ -152,56 +261,70 @@ def study(
     model = replace(
         fit.model, offset=models[0] if options.offset else None, slopes=tuple(models[1:] if options.offset else models)
     )
-    return PositionStudy(replace(fit, model=model, trained=trained), assessment)
+    return PositionStudy(replace(fit, model=model, trained=trained), options, assessment)
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What was judged in one split: errors of all points per state, measured and predicted factors."""
+    """What was judged in one split: errors of all points per state, and the predicted thermal parts."""
 
     state: NDArray[np.intp]  # (n,) row of the samples
     errors: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]  # per state: none, cold profile alone, model
-    measured: FloatArray  # (n, n_factors)
-    predicted: FloatArray
+    thermal: tuple[FloatArray, ...]  # per state, at all points of its test
 
 
-def _judged(tests: Sequence[Profiles], options: PositionOptions, split: Split) -> _Part:
-    fit = fit_position(tests, options, learn=split.learn)
+def _judged(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> _Part:
     samples, model = fit.samples, fit.model
     rows = split.judge.copy()
     for k, test in enumerate(tests):
         mine = np.flatnonzero(samples.test == k)
         rows[mine[test.reference_rows(options.reference)]] &= not split.learn[mine].any()
     state = np.flatnonzero(rows)
-    factors = np.stack([replay(m, samples, rows)[0] for m in model.models], axis=1)
+    factors = np.array([replay(m, samples, rows)[0] for m in model.models]).reshape(-1, len(state)).T
     assert model.profile is not None
-    errors = []
+    errors, thermal = [], []
     for row, factor in zip(state, factors, strict=True):
         test = tests[int(samples.test[row])]
-        measured = test.values[int(samples.row[row])]
+        measured, profile = test.values[int(samples.row[row])], model.profile.at(test.points)
+        told = model.at(test.points, factor)
         there = np.isfinite(measured)
-        points, measured = test.points[there], measured[there]
-        errors.append((measured, measured - model.profile.at(points), measured - model.at(points, factor)))
-    return _Part(state, tuple(errors), samples.deviations[rows], factors)
+        errors.append((measured[there], (measured - profile)[there], (measured - told)[there]))
+        thermal.append(told - profile)
+    return _Part(state, tuple(errors), tuple(thermal))
 
 
-def _together(protocol: str, parts: Sequence[_Part], samples: Samples, tests: Sequence[Profiles]) -> PositionAssessment:
+def _factors(one: _All, parts: Sequence[_Part], options: PositionOptions) -> tuple[FloatArray, FloatArray]:
+    """Return factors, measured and predicted, (n, n_factors): the predicted ones from what the model said everywhere.
+
+    A split may have chosen other powers; its thermal part is written in those of the whole.
+    """
+    samples, _ = slope_samples(one.tests, options)
+    turn = reference_position(one.tests, options)
+    predicted = []
+    for row, thermal in ((r, t) for p in parts for r, t in zip(p.state, p.thermal, strict=True)):
+        q = 1e-3 * (one.tests[int(samples.test[row])].position - turn)
+        reach = float(np.abs(q).max())
+        found = np.linalg.lstsq(np.stack([(q / reach) ** k for k in options.powers], axis=1), thermal)[0]
+        predicted.append(found / reach ** np.array(options.powers))
+    return samples.deviations[np.concatenate([p.state for p in parts])], np.array(predicted)
+
+
+def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> PositionAssessment:
+    samples, tests, protocol = one.samples, one.tests, one.judging.name
     unit = tests[0].unit
     rows = np.concatenate([p.state for p in parts])
     triples = [e for p in parts for e in p.errors]
     filled = np.array([e[0].size > 0 for e in triples], dtype=np.bool_)
     if not filled.any():
         raise FitError(f"{tests[0].target}: no profile is left to judge on")
-    rms = np.array([[_rms(e) for e in triple] for triple in triples])
+    rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
     cycle = samples.cycle[rows]
     segments = [(samples.cycle_names[k], filled & (cycle == k)) for k in np.unique(cycle)]
     none, geometric, left = rms.T
     # The gate looks at residual and drift of each row; those of a profile are its RMS.
-    harmless, useful = (
-        harm.judge(before, before - left, segments, least=MIN_STATES, unit=unit) for before in (none, geometric)
-    )
-    measured = np.concatenate([p.measured for p in parts])
-    predicted = np.concatenate([p.predicted for p in parts])
+    harmless = harm.judge(none, none - left, segments, least=MIN_STATES, unit=unit)
+    useful = harm.judge(geometric, geometric - left, [(ALL, filled)], least=MIN_STATES, unit=unit)
+    measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
     verdict: Literal["accepted", "refused"] = "accepted" if harmless.accepted and useful.accepted else "refused"
     factors = []
     for j in range(measured.shape[1]):
@@ -227,7 +350,7 @@ def _together(protocol: str, parts: Sequence[_Part], samples: Samples, tests: Se
         cycles=tuple(_errors(name, triples, mine) for name, mine in segments if mine.any()),
         overall=_errors("all", triples, filled),
         harmless=harmless,
-        useful=useful,
+        useful=useful if options.powers else None,
         factors=tuple(factors),
         unit=unit,
     )
@@ -235,24 +358,20 @@ def _together(protocol: str, parts: Sequence[_Part], samples: Samples, tests: Se
 
 def _errors(name: str, triples: Sequence[tuple[FloatArray, FloatArray, FloatArray]], mine: BoolArray) -> CycleErrors:
     none, geometric, left = (
-        np.concatenate([t[j] for t, wanted in zip(triples, mine, strict=True) if wanted]) for j in range(3)
+        Size.of(np.concatenate([t[j] for t, wanted in zip(triples, mine, strict=True) if wanted])) for j in range(3)
     )
     return CycleErrors(
         cycle=name,
         n_states=int(mine.sum()),
-        none=_rms(none),
-        geometric=_rms(geometric),
-        model=_rms(left),
-        none_max=float(np.abs(none).max()),
-        model_max=float(np.abs(left).max()),
+        none=none.rms,
+        geometric=geometric.rms,
+        model=left.rms,
+        none_max=none.largest,
+        model_max=left.largest,
     )
 
 
-def _rms(error: FloatArray) -> float:
-    return float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
-
-
-def _reason(harmless: harm.Verdict, useful: harm.Verdict) -> str:
-    if harmless.accepted and not useful.accepted:
+def _reason(harmless: harm.Verdict, useful: harm.Verdict | None) -> str:
+    if harmless.accepted and useful is not None and not useful.accepted:
         return f"beside its cold profile alone: {useful.reason.replace('without compensation', 'with that alone')}"
     return harmless.reason

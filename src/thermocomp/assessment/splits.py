@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.harm import MIN_ROWS
 from thermocomp.core.exceptions import InputError
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +88,44 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
     return _consecutive(name, len(samples), first, stop)
 
 
+def stretches(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
+    """Return the thermal cycles to judge by: those too short to say anything join the one before them in their test.
+
+    Parameters
+    ----------
+    cycle, test : ndarray of int of shape (n_rows,)
+        Of each row, in the order of time.
+    least : int
+        Rows that say something.
+
+    Returns
+    -------
+    list of ndarray of int
+        Cycles of each stretch. The first of a test joins the next; a test that is too short as a whole stays one.
+    """
+    found: list[IntArray] = []
+    for k in np.unique(test):
+        mine: list[list[int]] = []
+        short = True  # what came before is
+        for c in np.unique(cycle[test == k]).tolist():
+            n = int((cycle == c).sum())
+            if mine and (short or n < least):
+                mine[-1].append(c)
+            else:
+                mine.append([c])
+            short = int(np.isin(cycle, mine[-1]).sum()) < least
+        found += [np.array(m) for m in mine]
+    return found
+
+
+def called(samples: Samples, block: IntArray) -> str:
+    """Return the name of a cycle, or of several one after the other."""
+    more = f" and {len(block) - 1} more" if len(block) > 1 else ""
+    return f"{samples.cycle_names[block[0]]}{more}"
+
+
 def leave_one_cycle_out(samples: Samples) -> Judging:
-    """Judge on each thermal cycle in turn, learn from all others.
+    """Judge on each thermal cycle in turn, learn from all others; see `stretches`.
 
     Raises
     ------
@@ -100,8 +138,15 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
             "only one thermal cycle was found: leaving one out needs at least two. Give a spindle speed, a 'cycle' "
             "column or several files; or judge by time with --split 0.75/0.25"
         )
-    splits = [Split(f"cycle {samples.cycle_names[k]}", samples.cycle != k, samples.cycle == k) for k in range(n)]
-    return Judging(f"leave one thermal cycle out ({n} cycles)", tuple(splits))
+    blocks = stretches(samples.cycle, samples.test)
+    joined = f", {n - len(blocks)} of them too short: out with the one before" if 1 < len(blocks) < n else ""
+    if len(blocks) == 1:  # all together: there would be nothing to learn from
+        blocks = [np.array([k]) for k in range(n)]
+    splits = []
+    for block in blocks:
+        mine = np.isin(samples.cycle, block)
+        splits.append(Split(f"cycle {called(samples, block)}", ~mine, mine))
+    return Judging(f"leave one thermal cycle out ({n} cycles{joined})", tuple(splits))
 
 
 def leave_one_file_out(samples: Samples) -> Judging:

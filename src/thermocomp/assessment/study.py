@@ -105,7 +105,7 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         max_abs=overall.metric("max_abs"),
         none_mae=overall.none_metric("mae"),
         none_rms=overall.none_metric("rms"),
-        cycles={c.cycle: c.rms for c in overall.verdict.cycles},
+        cycles={c.cycle: c.rms for c in overall.verdict.cycles if np.isfinite(c.rms)},
         verdict="accepted" if overall.accepted else "refused",
         reason=overall.reason,
     )

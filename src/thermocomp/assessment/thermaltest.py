@@ -93,6 +93,8 @@ class Figures:
         Value farthest from the start, with its sign, while the drives run.
     cool_down : float
         Last value minus that when the drives stop; nan without a cool-down.
+    range_last : float
+        Largest minus smallest over the last 60 min that the drives run; nan if they run for less than 2 h.
     """
 
     range_60: float
@@ -102,6 +104,7 @@ class Figures:
     at_end: float
     largest: float
     cool_down: float
+    range_last: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,13 +263,17 @@ def figures(time: FloatArray, values: FloatArray, stop: int) -> Figures:
     there = np.isfinite(values)
     run = there & (np.arange(len(values)) <= stop)
     if not run.any():
-        return Figures(*[nan] * 7)
+        return Figures(*[nan] * 8)
     first = there & (time <= HOUR)
     at_60 = float(np.interp(HOUR, time[there], values[there]))
     hour = time[run][-1] >= HOUR
     # the value at 60 min belongs to the first 60 min, even if no row is at that very time
     range_60 = float(np.ptp([*values[first], at_60])) if hour else nan
     v, at_end = values[run], float(values[run][-1])
+    ends = float(time[run][-1])
+    # the value an hour before the end belongs to the last hour, even if no row is at that very time
+    an_hour_before = float(np.interp(ends - HOUR, time[there], values[there]))
+    last = float(np.ptp([*v[time[run] >= ends - HOUR], an_hour_before])) if ends >= 2.0 * HOUR else nan
     after = values[there & (np.arange(len(values)) > stop)]
     return Figures(
         range_60=range_60,
@@ -276,4 +283,5 @@ def figures(time: FloatArray, values: FloatArray, stop: int) -> Figures:
         at_end=at_end,
         largest=float(v[np.argmax(np.abs(v))]),
         cool_down=float(after[-1] - at_end) if after.size else nan,
+        range_last=last,
     )

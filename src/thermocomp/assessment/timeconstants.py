@@ -4,6 +4,7 @@ Three answers to one question, so that they check each other: the times to 63 % 
 without a model; then one and two exponentials are fitted. None of it is prescribed by ISO 230-3: all symbols are ours.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -25,6 +26,8 @@ INTERRUPTION = 1200.0
 SETTLED = 0.05
 #: a channel has to change by so many times its noise before its times are told
 MOVES = 8.0
+#: a curve overshoots if it goes beyond its last value by more than this share of its whole change: the band of t90
+OVERSHOOT = 0.1
 _ROWS = 8  # fewer are not fitted
 
 
@@ -63,13 +66,16 @@ class Settling:
         It changes by at least `MOVES` times its noise; if not, there is nothing to read and nothing is fitted.
     returns : bool
         It ends nearer to its start than to its extreme: there is no one time that describes it.
+    overshoots : bool
+        It goes beyond its last value by more than a tenth of its change, and then settles back: when it first passed
+        90 % says nothing of when it settled, so that no times are told.
     settled : bool
         Over the last quarter of the phase it stays within `SETTLED` of its change from its last value, and a straight
         line through it rises by no more; noise is allowed for. An exponential is settled by this rule from 3.3 time
         constants on, 4 % before its final value.
     t63, t90 : float
         When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
-        channel has not settled, the true ones are later.
+        channel has not settled, the true ones are later; nan if it returns or overshoots.
     one, two : Fit or None
         None if it could not be fitted; `two` also if a second exponential is not called for.
     """
@@ -81,6 +87,7 @@ class Settling:
     noise: float
     moves: bool
     returns: bool
+    overshoots: bool
     settled: bool
     t63: float
     t90: float
@@ -94,9 +101,9 @@ class Settling:
             return "does not move"
         if self.returns:
             return "comes back"
-        if not self.settled:
-            return "not settled"
-        return ""
+        if self.overshoots:
+            return "overshoots" if self.settled else "overshoots, not settled"
+        return "" if self.settled else "not settled"
 
 
 def drive(recording: Recording) -> BoolArray | None:
@@ -155,7 +162,9 @@ def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tup
     return tuple(found)
 
 
-def time_constants(recording: Recording, phases: tuple[Phase, ...] | None = None) -> tuple[Settling, ...]:
+def time_constants(
+    recording: Recording, phases: tuple[Phase, ...] | None = None, leave_out: Collection[str] = ()
+) -> tuple[Settling, ...]:
     """Read and fit the time constants of every temperature, displacement and angle in every phase.
 
     Parameters
@@ -163,6 +172,8 @@ def time_constants(recording: Recording, phases: tuple[Phase, ...] | None = None
     recording : Recording
     phases : tuple of Phase, optional
         Those of `find_phases` if not given.
+    leave_out : collection of str
+        Channels that are not asked for.
 
     Returns
     -------
@@ -170,7 +181,11 @@ def time_constants(recording: Recording, phases: tuple[Phase, ...] | None = None
         Phase by phase, channel by channel.
     """
     phases = find_phases(recording) if phases is None else phases
-    channels = [c for c in recording.channels if c.quantity in ("temperature", "displacement", "angle")]
+    channels = [
+        c
+        for c in recording.channels
+        if c.quantity in ("temperature", "displacement", "angle") and c.name not in leave_out
+    ]
     values = recording.values(channels)
     return tuple(
         settle(recording.time[p.start : p.end + 1], values[p.start : p.end + 1, k], c.name, c.unit, p)
@@ -199,16 +214,18 @@ def settle(time: FloatArray, values: FloatArray, channel: str, unit: str, phase:
     t, y = time[there] - time[0], values[there]
     nan = float("nan")
     if len(y) < _ROWS:
-        return Settling(channel, unit, phase, nan, nan, False, False, False, nan, nan, None, None)
+        return Settling(channel, unit, phase, nan, nan, False, False, False, False, nan, nan, None, None)
     # a median over five rows takes single outliers away and leaves a monotone curve as it is
     calm = median_filter(y, size=5, mode="nearest")
     sigma = noise(y)
     change, span = float(calm[-1] - calm[0]), float(np.ptp(calm))
     moves = span > max(MOVES * sigma, 1e-9)
     returns = moves and abs(change) < 0.5 * span
+    beyond = float((np.sign(change) * (calm - calm[-1])).max())
+    overshoots = moves and not returns and beyond > max(OVERSHOOT * abs(change), 3.0 * sigma)
     last = t >= 0.75 * t[-1]
     settled = moves and _rests(t[last], y[last], calm[last], SETTLED * abs(change), sigma)
-    reads = moves and not returns
+    reads = moves and not returns and not overshoots
     return Settling(
         channel,
         unit,
@@ -217,6 +234,7 @@ def settle(time: FloatArray, values: FloatArray, channel: str, unit: str, phase:
         sigma,
         moves,
         returns,
+        overshoots,
         settled,
         _reached(t, calm, 1.0 - np.exp(-1.0)) if reads else nan,
         _reached(t, calm, 0.9) if reads else nan,

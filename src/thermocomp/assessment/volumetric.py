@@ -14,6 +14,7 @@ from thermocomp.core.model import ErrorModel, Input
 from thermocomp.core.position import PositionModel
 from thermocomp.core.size import Size
 from thermocomp.recording.recording import Recording
+from thermocomp.volumetric import notes
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import Kinematics
 from thermocomp.volumetric.model import ThermalStates, VolumetricModel
@@ -158,6 +159,11 @@ class Volumetric:
     course: Course
     moments: tuple[Moment, ...]
     missing: int = 0
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of the machine: see `thermocomp.volumetric.notes`."""
+        return notes.notes(self.machine)
 
     @property
     def worst(self) -> Moment:

@@ -112,7 +112,7 @@ def iso230(
         # where nothing was recorded of the drives, a test is told to be a warm-up
         phases = find_phases(recording) or tuple(Phase("warm-up", 1, t.start, t.stop) for t in mine if t.kind != "etve")
         thermal += mine
-        settlings.append((recording, time_constants(recording, phases)))
+        settlings.append((recording, time_constants(recording, phases, iso230_3.find_stations(recording))))
     positioned = [iso230_2.assess(p) for path in positioning for p in positioning_files.read(path)]
     if output is not None:
         with needs("study"):

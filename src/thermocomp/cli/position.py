@@ -1,18 +1,17 @@
-"""``thermocomp position``: a position-dependent error from profiles in several thermal states."""
+"""``thermocomp position``: position-dependent errors from profiles in several thermal states."""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
+from thermocomp.cli import progress
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Flag,
     Json,
+    Names,
     OptionalNames,
     OptionalOutput,
     Recordings,
@@ -23,10 +22,15 @@ from thermocomp.cli.options import (
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
-    from thermocomp.assessment.position import CycleErrors, PositionStudy
     from thermocomp.recording.profiles import Profiles
 
 States = Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())]
+Switch = Annotated[bool | None, Parameter(negative="--no-offset")]
+
+#: stands for every component that has columns of its own
+ALL = "all"
+#: with so many recordings each is left out in turn, else each thermal cycle
+MANY = 3
 
 _console = Console(highlight=False)
 
@@ -35,36 +39,44 @@ def position(
     recordings: Recordings,
     /,
     *,
-    component: str,
+    component: Names,
     columns: str = "",
     positions: Path | None = None,
     layout: Literal["wide", "long"] | None = None,
     mapping: Path | None = None,
-    model: str = "mra",
+    model: str = "dynamic",
     inputs: OptionalNames = None,
-    slopes: int = 1,
-    offset: Flag = False,
+    slopes: int | None = None,
+    offset: Switch = None,
     profile: Literal["polynomial", "spline"] = "polynomial",
     order: int | None = None,
     reference: States = None,
     reference_position: float | None = None,
     split: str | None = None,
+    leave_one_cycle_out: Flag = False,
     leave_one_file_out: Flag = False,
+    absolute: Flag = False,
+    jobs: int = -1,
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
 ) -> int:
-    """Fit a position-dependent error: cold profile and thermal slopes, judged on unseen thermal cycles.
+    """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
+
+    Settings that are not given are found out from the profiles, and anew wherever a part is left out: how many slopes
+    are worth it, whether the profile shifts as a whole, and about which position it turns.
 
     Parameters
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files with profiles in several thermal states; each is one test.
-    component : str
-        Code of the error, such as EYY, EXX or EAZ: it says along which axis and in which unit.
+    component : list of str
+        Codes of the errors, such as EYY, EXX or EAZ, or all that have columns of their own: a code says along which
+        axis and in which unit. One file holds the models of all.
     columns : str
-        Names of the columns, * standing for the position in mm, such as 'y_laser_*'; of a long table the column of the
-        error. Without it, the columns that end in a position and the unit, such as y_laser_250_um.
+        Names of the columns of one component, * standing for the position in mm, such as 'y_laser_*'; of a long table
+        the column of the error. Without it those that are called after the component, such as EYY_250_um, or else
+        those that end in a position and the unit, such as y_laser_250_um.
     positions : Path
         TOML file that says where each column was measured, for columns that have no position in their name.
     layout : str
@@ -76,9 +88,9 @@ def position(
     inputs : list of str
         Channels to predict the slopes from; all temperatures and the spindle speed if not given.
     slopes : int
-        Highest power of the position.
+        Highest power of the position; 0: the cold profile alone. As many as are worth it if not given.
     offset : bool
-        Model a shift of the whole profile too.
+        Model a shift of the whole profile too. If not given: where it is more than noise.
     profile : str
         polynomial or spline, for the cold profile.
     order : int
@@ -86,13 +98,19 @@ def position(
     reference : list of int
         States of each test that count as cold, from 0: their mean is the cold profile. The first if not given.
     reference_position : float
-        Where the slopes turn [mm]; the axis' zero if not given.
+        Where the slopes turn [mm]; where the thermal part is smallest if not given.
     split : str
         Judge by time: shares of the states such as 0.6/0.4, or hours such as 10h/6h.
+    leave_one_cycle_out : bool
+        Judge on each thermal cycle in turn (what is done with fewer than three recordings, if nothing is said).
     leave_one_file_out : bool
-        Judge on each recording in turn; without it on each thermal cycle.
+        Judge on each recording in turn (what is done with three and more).
+    absolute : bool
+        Take temperatures as they are; without it they are counted from the cold states of each test.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     output : Path
-        File to write the model to (.json).
+        File to write the models to (.json).
     overwrite : bool
         Write over an existing file.
     json : bool
@@ -101,7 +119,7 @@ def position(
     Returns
     -------
     int
-        0 done, 1 the model was refused, 2 unusable input.
+        0 done, 1 a model was refused, 2 unusable input.
     """
     if not recordings:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
@@ -109,147 +127,80 @@ def position(
         refuse_existing([output], overwrite, recordings)
     with needs("study"):
         from thermocomp.assessment import position as assessing
-        from thermocomp.files import mapping as mappings
+        from thermocomp.cli import output as out
+        from thermocomp.cli import positiontables as told
         from thermocomp.files import positionfile
-        from thermocomp.files import profiles as tables
         from thermocomp.models.methods import method
         from thermocomp.models.position import PositionOptions
+        from thermocomp.models.positionoptions import Setting
+    if jobs == 0:
+        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
     if not method(model).kind.freezable:
         raise InputError(f"{model} cannot be frozen to plain numbers: choose another method")
-    given = mappings.read_mapping(mapping) if mapping is not None else None
-    places = tables.read_places(positions) if positions is not None else None
-    options = tables.ProfileOptions(target=component, columns=columns, places=places)
-    tests = [tables.read(path, options, given, layout=layout) for path in recordings]
-    trouble = tell_trouble([test.states for test in tests])
+    several = len(component) > 1 or ALL in component
+    tests = _read(recordings, component, columns, positions, mapping, layout)
+    trouble = tell_trouble([test.states for test in tests[0]])
     how = PositionOptions(
         method=model,
         inputs=inputs,
-        slopes=slopes,
-        offset=offset,
+        slopes=1 if slopes is None else slopes,
+        offset=bool(offset),
         profile=profile,
         order="auto" if order is None else order,
         reference=reference or 0,
         reference_position=reference_position,
+        rezero=not absolute,
     )
-    asked = Study(target=[component], split=split, leave_one_file_out=leave_one_file_out)
-    found = assessing.study(tests, how, judging=asked.judging)
+    given: dict[Setting, object] = {"slopes": slopes, "offset": offset, "reference_position": reference_position}
+    left_open = tuple(name for name, value in given.items() if value is None)
+    by_file = leave_one_file_out or (len(recordings) >= MANY and split is None and not leave_one_cycle_out)
+    asked = Study(
+        target=component,
+        split=split,
+        leave_one_file_out=by_file,
+        leave_one_cycle_out=leave_one_cycle_out,
+        jobs=jobs,
+    )
+    with progress.by_steps(assessing.n_pieces(tests, how, asked.judging), hidden=json) as tell:
+        found = assessing.study_all(tests, how, left_open=left_open, judging=asked.judging, jobs=jobs, progress=tell)
     if output is not None:
-        positionfile.write([found.fit.model], output, overwrite=overwrite)
+        positionfile.write([f.fit.model for f in found], output, overwrite=overwrite)
     if json:
-        with needs("study"):
-            from thermocomp.cli.output import print_json
-        print_json({"trouble": trouble, **_content(found, output)}, _console)
+        entries = [told.content(f, left_open) for f in found]
+        content = {"components": entries} if several else entries[0]
+        file = None if output is None else str(output)
+        out.print_json({"trouble": trouble, "judging": found[0].assessment.protocol, **content, "file": file}, _console)
     else:
-        _show(found, tests, output)
-    return 0 if found.assessment.accepted else 1
+        if several:
+            told.show_all(found, tests, left_open, _console)
+        else:
+            told.show(found[0], tests[0], left_open, _console)
+        if output is not None:
+            _console.print(f"Model file: {output}")
+    return 0 if all(f.assessment.accepted for f in found) else 1
 
 
-def _show(found: "PositionStudy", tests: "list[Profiles]", output: Path | None) -> None:
-    fit, judged = found.fit, found.assessment
-    model, unit = fit.model, fit.model.unit
-    states = sum(len(t) for t in tests)
-    low, high = model.travel
-    _console.print(
-        f"[bold]{escape(model.target)}[/]: {states} profiles of {len(tests[0].points)} points along {model.axis}, "
-        f"{low:g} to {high:g} mm"
-    )
-    if fit.profile.tried:
-        table = Table(title="Cold profile: error at points left out", caption="! = chosen")
-        for heading in ("order", "terms", f"left out, {unit}"):
-            table.add_column(heading, justify="right")
-        for t in fit.profile.tried:
-            mark = "!" if t.order == fit.profile.order else " "
-            table.add_row(f"{_order(t.order)}{mark}", str(t.n_terms), f"{t.left_out:.3f}")
-        _console.print(table)
-    _console.print(f"Cold profile: {model.profile and model.profile.kind} of order {_order(fit.profile.order)}")
-    for factor, errors, power in zip(model.models, fit.coefficient_errors, model.powers, strict=True):
-        _console.print(f"k{power} [{factor.unit}] = {factor.formula()}", markup=False)
-        if errors:
-            told = ", ".join(f"{name} {error:.2g}" for name, error in errors.items())
-            _console.print(f"  standard errors: {told}", markup=False)
-    rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
-    _console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {rest} {unit}")
-    if fit.enough > max(model.powers):
-        _console.print(f"[yellow]but[/] higher powers tell more: try --slopes {fit.enough}")
-    if fit.shifts:
-        _console.print(
-            f"[yellow]but[/] the profiles do not turn about {model.reference_position:g} mm: with an offset "
-            f"{fit.offset_remainder:.2f} {unit} are left; try --offset, or another --reference-position"
-        )
-    _console.print(f"Judged on: {judged.protocol}")
-    table = Table(caption=f"RMS over all points in {unit}; max: largest error")
-    table.add_column("unseen cycle")
-    for heading in ("profiles", "none", "cold profile", "model", "none max", "model max"):
-        table.add_column(heading, justify="right")
-    for c in (*judged.cycles, judged.overall):
-        numbers = (c.none, c.geometric, c.model, c.none_max, c.model_max)
-        table.add_row(escape(c.cycle), str(c.n_states), *(f"{v:.2f}" for v in numbers))
-    _console.print(table)
-    word = "[green]accepted[/]" if judged.accepted else "[red]refused[/]"
-    _console.print(f"{word} {escape(model.target)}: {escape(judged.reason)}")
-    if output is not None:
-        _console.print(f"Model file: {output}")
-
-
-def _content(found: "PositionStudy", output: Path | None) -> dict[str, Any]:
-    fit, judged = found.fit, found.assessment
-    model = fit.model
-    factors = []
-    for power, factor, errors in zip(model.powers, model.models, fit.coefficient_errors, strict=True):
-        honest = factor.honest_error
-        factors.append(
-            {
-                "power": power,
-                "unit": factor.unit,
-                "formula": factor.formula(),
-                "coefficients": factor.coefficients_by_name(),
-                "standard_errors": errors,
-                "intercept": factor.intercept,
-                "sensors": factor.sensors,
-                "unseen_rms": honest.rms if honest else None,
-                "none_rms": honest.none_rms if honest else None,
-            }
-        )
-    return {
-        "target": model.target,
-        "unit": model.unit,
-        "axis": model.axis,
-        "travel_mm": model.travel,
-        "reference_position_mm": model.reference_position,
-        "profile": {
-            "kind": model.profile.kind if model.profile else None,
-            "order": fit.profile.order,
-            "tried": [
-                {"order": t.order, "terms": t.n_terms, "left_out": t.left_out if math.isfinite(t.left_out) else None}
-                for t in fit.profile.tried
-            ],
-        },
-        "factors": factors,
-        "thermal_rms": fit.thermal_rms,
-        "remainders": {str(m): r for m, r in fit.remainders.items()},
-        "enough": fit.enough,
-        "offset_remainder": fit.offset_remainder,
-        "shifts": fit.shifts,
-        "judging": judged.protocol,
-        "cycles": [_cycle(c) for c in judged.cycles],
-        "overall": _cycle(judged.overall),
-        "verdict": "accepted" if judged.accepted else "refused",
-        "reason": judged.reason,
-        "file": None if output is None else str(output),
-    }
-
-
-def _cycle(c: "CycleErrors") -> dict[str, Any]:
-    return {
-        "cycle": c.cycle,
-        "profiles": c.n_states,
-        "none_rms": c.none,
-        "cold_profile_rms": c.geometric,
-        "rms": c.model,
-        "none_max": c.none_max,
-        "max": c.model_max,
-    }
-
-
-def _order(order: tuple[int, int]) -> str:
-    return str(order[0]) if not order[1] else f"{order[0]} ({order[1]} in the others)"
+def _read(
+    paths: list[Path],
+    components: list[str],
+    columns: str,
+    positions: Path | None,
+    mapping: Path | None,
+    layout: Literal["wide", "long"] | None,
+) -> "list[tuple[Profiles, ...]]":
+    """Read one component, however its columns are called, or several by columns that are called after them."""
+    with needs("study"):
+        from thermocomp.files import mapping as mappings
+        from thermocomp.files import profiles as tables
+    given = mappings.read_mapping(mapping) if mapping is not None else None
+    if len(components) > 1 or ALL in components:
+        if columns or positions is not None or layout == "long":
+            raise InputError(
+                "--columns, --positions and long tables are for one component: name a single one, or call the columns "
+                "after their components, such as EXX_250_um"
+            )
+        wanted = [] if ALL in components else list(dict.fromkeys(components))
+        return list(tables.read_components(paths, wanted, given).values())
+    places = tables.read_places(positions) if positions is not None else None
+    options = tables.ProfileOptions(target=components[0], columns=columns, places=places)
+    return [tuple(tables.read(path, options, given, layout=layout) for path in paths)]

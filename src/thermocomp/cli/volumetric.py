@@ -132,6 +132,8 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
         _console.print(f"[yellow]but[/] never judged on unseen cycles: {escape(', '.join(never))}", soft_wrap=True)
     if study.missing:
         _console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
+    for note in study.notes:
+        _console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
     if volume:
         _console.print(f"[bold]{headline(study)}[/]", soft_wrap=True)
 
@@ -242,6 +244,7 @@ def _content(study: "Volumetric") -> dict[str, Any]:
         "point_mm": course.point,
         "tool_mm": course.tool,
         "never_judged": untested(study),
+        "notes": study.notes,
         "components": listed(study),
         "states": [
             {

@@ -67,8 +67,7 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
     for m in models:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
-        if m.honest_error is not None and not m.accepted:
-            raise InputError(f"model of {m.target} was refused and will not run: {m.honest_error.reason}")
+        m.check_not_refused()
     return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
 
 

@@ -25,11 +25,19 @@ class Deviation:
         Change of the deviation along the axis [um/m].
     reference_position : float
         Where `offset` holds [mm].
+
+    Raises
+    ------
+    InputError
+        A number is not finite.
     """
 
     offset: float
     slope: float = 0.0
     reference_position: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite("deviation", self.offset, self.slope, self.reference_position)
 
     def at(self, position: Position) -> Position:
         """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
@@ -50,11 +58,19 @@ class Correction:
         tan b [um/m].
     reference_position : float
         P0 [mm].
+
+    Raises
+    ------
+    InputError
+        A number is not finite: it must never get to a controller.
     """
 
     offset: float
     slope: float = 0.0
     reference_position: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_finite("correction", self.offset, self.slope, self.reference_position)
 
     @classmethod
     def opposing(cls, deviation: Deviation) -> "Correction":
@@ -95,3 +111,10 @@ class Limits:
                 raise InputError(f"limit {name} = {value}: must be positive")
         if not (self.dead_band >= 0 and math.isfinite(self.dead_band)):
             raise InputError(f"limit dead_band = {self.dead_band}: must be finite and not negative")
+
+
+def _check_finite(what: str, offset: float, slope: float, reference_position: float) -> None:
+    if not (math.isfinite(offset) and math.isfinite(slope) and math.isfinite(reference_position)):
+        raise InputError(
+            f"{what}: offset {offset}, slope {slope}, reference position {reference_position}: must be finite numbers"
+        )

@@ -3,17 +3,21 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from thermocomp.core.components import BY_CODE, ErrorComponent
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
+from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
 from thermocomp.core.units import unit
 
 Vector = tuple[float, float, float]
 #: what may tell the value of a component: a constant [um or urad], a model of time, a model of time and position
 Source = float | ErrorModel | PositionModel
+#: a constant beyond that, 10 mm or 10 mrad, is one in another unit [um or urad]
+PLAUSIBLE = 10_000.0
 
 
 @dataclass(frozen=True)
@@ -29,15 +33,20 @@ class Axis:
     reference_position : float
         Where its squareness moves nothing [mm].
     measured_at : tuple of float
-        Where X, Y and Z stood while its errors were measured [mm]; its own coordinate does not matter.
+        Where X, Y and Z stood while its errors were measured [mm]; its own coordinate matters only if it was measured
+        on the workpiece's side.
     measured_tool : tuple of float
         From the spindle's gauge point to where its translations were measured, such as a reflector [mm]. This and
         `measured_at` are its reference point: there its angles move nothing.
+    measured_on : {'tool', 'workpiece'}
+        What carried that place while the axis moved: the tool's side, such as a probe or a reflector in the spindle, or
+        the workpiece's, such as a reflector on the table. In the second case the tool was at it with the axis at its
+        own coordinate of `measured_at`, and from there the axis' own way is a lever too.
 
     Raises
     ------
     SettingError
-        The name is none, or the travel does not rise.
+        The name is none, the travel does not rise, or `measured_on` is none of the two.
     """
 
     name: str
@@ -45,6 +54,7 @@ class Axis:
     reference_position: float = 0.0
     measured_at: Vector = (0.0, 0.0, 0.0)
     measured_tool: Vector = (0.0, 0.0, 0.0)
+    measured_on: Literal["tool", "workpiece"] = "tool"
 
     def __post_init__(self) -> None:
         low, high = self.travel
@@ -58,6 +68,8 @@ class Axis:
                 raise SettingError(f"{numbers}: must be finite numbers", (key,))
         if not math.isfinite(self.reference_position):
             raise SettingError(f"{self.reference_position}: must be a finite number", ("reference_position",))
+        if self.measured_on not in ("tool", "workpiece"):
+            raise SettingError(f"{self.measured_on!r}: must be 'tool' or 'workpiece'", ("measured_on",))
 
 
 @dataclass(frozen=True)
@@ -113,7 +125,8 @@ class Machine:
     ------
     SettingError
         Axes and structure differ, a number is not finite, or a component is unknown, belongs to an axis that is not
-        there, or has a source of another unit or axis.
+        there, has a source of another unit or axis, one that was measured beside the axis' travel, or a constant that
+        no machine has.
     """
 
     name: str
@@ -162,9 +175,14 @@ class Machine:
         for name in component.axes:
             if name not in self.structure.axes:
                 raise SettingError(f"{component.description}: the machine has no axis {name}")
+        if isinstance(source, bool) or not isinstance(source, float | int | ErrorModel | PositionModel):
+            raise SettingError(f"{source!r}: must be a number or a model")
         if isinstance(source, float | int):
             if not math.isfinite(source):
                 raise SettingError(f"{source}: must be a finite number")
+            if abs(source) > PLAUSIBLE:
+                most = "10 mm" if component.unit == "um" else "10 mrad"
+                raise SettingError(f"{source:g} {component.unit} is more than {most}: check the unit")
             return
         if source.unit != component.unit:
             raise SettingError(f"the model is in {source.unit}; {component.description} is in {component.unit}")
@@ -173,3 +191,20 @@ class Machine:
                 raise SettingError(f"{component.description} does not depend on a position; its model does")
             if source.axis != component.depends_on:
                 raise SettingError(f"{component.description}: the model is one along {source.axis}")
+            self._check_ranges(component, source)
+
+    def _check_ranges(self, component: ErrorComponent, source: PositionModel) -> None:
+        profile = source.profile
+        if isinstance(profile, SplineProfile) and profile.axis != source.axis:
+            raise SettingError(f"{component.description}: its profile is one along {profile.axis}, not {source.axis}")
+        for what, name, (low, high) in source.ranges():
+            if name not in self.structure.axes:
+                raise SettingError(
+                    f"{component.description}: its {what} depends on {name}: the machine has no axis {name}"
+                )
+            first, last = self.axis(name).travel
+            if high < first or low > last:
+                raise SettingError(
+                    f"{component.description}: its {what} is known from {name} {low:g} to {high:g} mm, the axis goes "
+                    f"from {first:g} to {last:g} mm: check the unit and the zero of the positions"
+                )

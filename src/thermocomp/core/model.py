@@ -46,6 +46,8 @@ class Input:
     high: float
 
     def __post_init__(self) -> None:
+        if not (np.isfinite(self.low) and np.isfinite(self.high)):
+            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] must be finite numbers")
         if not self.low <= self.high:
             raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
 
@@ -277,7 +279,7 @@ class ErrorModel(ABC):
             if self.support.policy == "hold":
                 deviation = np.where(outside.any(axis=-1), state.deviation, deviation)
             else:
-                excess = np.abs(change - clipped) / self._fade_span
+                excess = np.minimum(np.abs(change - clipped), self._fade_span) / self._fade_span
                 deviation = deviation * np.clip(1.0 - excess.max(axis=-1), 0.0, 1.0)
         return State(reference, memory, deviation, outside), deviation
 
@@ -311,6 +313,11 @@ class ErrorModel(ABC):
     def accepted(self) -> bool:
         """True if the do-no-harm gate has let this model pass."""
         return self.honest_error is not None and self.honest_error.verdict == "accepted"
+
+    def check_not_refused(self) -> None:
+        """Raise `InputError` if the do-no-harm gate has refused this model: then it does not run."""
+        if self.honest_error is not None and not self.accepted:
+            raise InputError(f"model of {self.target} was refused and will not run: {self.honest_error.reason}")
 
 
 def check_finite(owner: str, **numbers: Any) -> None:

@@ -81,6 +81,12 @@ class PositionModel:
         """The power of q that each of `models` is the factor of."""
         return tuple(k for k, _ in self._by_power)
 
+    def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:
+        """Return what is known of it over a range: profile or slope, along which axis, from where to where [mm]."""
+        profile = self.profile.ranges() if self.profile is not None else {}
+        slopes = (("slope", self.axis, self.travel),) if self.slopes else ()
+        return (*(("profile", name, known) for name, known in profile.items()), *slopes)
+
     def at(self, points: FloatArray, factors: FloatArray) -> FloatArray:
         """Return the error at points, in one thermal state.
 

@@ -58,6 +58,10 @@ class PolynomialProfile:
         """Indices of the coordinates that it depends on."""
         return tuple(a for a in range(3) if any(e[a] for e in self.exponents))
 
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return from where to where it is known along each axis that it depends on [mm]."""
+        return {"XYZ"[a]: (self.low[a], self.high[a]) for a in self._axes}
+
     @cached_property
     def _along_one(self) -> tuple[int, tuple[float, ...]] | None:
         """The coordinate and the coefficients by falling degree of a polynomial in one coordinate."""
@@ -135,6 +139,10 @@ class SplineProfile:
         if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
             raise InputError("profile: knots must rise")
         check_finite("profile", knots=self.knots, pieces=self.pieces)
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return from where to where it is known [mm], under its axis."""
+        return {self.axis: (self.knots[0], self.knots[-1])}
 
     @cached_property
     def _arrays(self) -> tuple[FloatArray, FloatArray]:

@@ -160,7 +160,7 @@ class Stack:
         if outside.any():
             models, taps = self._faded
             if models.size:
-                excess = (np.abs(change - clipped) / self._span)[..., taps].max(axis=-1)
+                excess = (np.minimum(np.abs(change - clipped), self._span) / self._span)[..., taps].max(axis=-1)
                 deviation[..., models] *= np.clip(1.0 - excess, 0.0, 1.0)
             models, taps = self._held
             if models.size:

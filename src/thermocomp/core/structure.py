@@ -6,8 +6,12 @@ from dataclasses import dataclass
 from thermocomp.core.exceptions import SettingError
 
 _LINEAR = "XYZ"
-_LONG = re.compile(r"w\s*(?P<workpiece>.*?)\bb\b(?P<tool>.*?)(?P<spindle>\(?\bC\d?\)?)?\s*t")
+# a B with a prime or a number is an axis, not the bed
+_LONG = re.compile(r"W(?P<workpiece>.*?)B(?!['\d])(?P<tool>.*?)(?P<spindle>C\d?|\(C\d?\))?T")
+_SHORT = re.compile(r"([ABCU-Z]*)(F?)([ABCU-Z]*)")
+_WORD = re.compile(r"\(?[A-Z]\d?'?\)?|.")
 _AXIS = re.compile(r"([A-Z])\d?('?)")
+_SPINDLE = re.compile(r"\(C\d?'?\)")
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class Structure:
         code : str
             As of ISO 10791, ``w X' b Z Y (C1) t``: from the workpiece over the bed to the tool, axes that carry the
             workpiece with a prime; or short, ``XFZY``: the letters before F carry the workpiece, those behind it the
-            tool; without F all carry the tool.
+            tool; without F all carry the tool. Blanks and small letters do not matter.
 
         Returns
         -------
@@ -52,10 +56,11 @@ class Structure:
         Raises
         ------
         SettingError
-            It is neither, has an axis twice, a rotary axis, or a prime in the wrong place.
+            It is neither, has an axis twice, a rotary axis, a prime in the wrong place, or a spindle that turns the
+            workpiece.
         """
-        text = code.strip().replace("’", "'").replace("′", "'")
-        short = re.fullmatch(r"([A-EG-Z]*)(F?)([A-EG-Z]*)", text.replace(" ", ""))
+        text = "".join(code.split()).replace("’", "'").replace("′", "'").upper()
+        short = _SHORT.fullmatch(text)
         if short and text:
             before, _, after = short.groups()
             return cls(tuple(before), tuple(after)) if "F" in text else cls((), tuple(before + after))
@@ -93,7 +98,9 @@ class Structure:
 def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
     """Return the letters of one side, with or without a prime as the side wants it."""
     side, found = ("workpiece" if primed else "tool"), []
-    for word in text.split():
+    for word in _WORD.findall(text):
+        if primed and _SPINDLE.fullmatch(word):
+            raise SettingError(f"{word} in {code!r}: a spindle on the workpiece's side is not supported")
         match = _AXIS.fullmatch(word)
         if not match:
             raise SettingError(f"{word!r} in {code!r} is no axis: want X, Y or Z")

@@ -98,14 +98,20 @@ def _machine(content: dict[str, Any], source: Path) -> Machine:
                 ("axes", name),
             )
     axes = tuple(_axis(name, tables[name]) for name in structure.axes)
+    for axis in axes:
+        if "measured_at" in tables[axis.name]:
+            _check_measured_at(axis, axes)
     spindle, components = given.pop("spindle", {}), given.pop("components", {})
     reader = _Sources(source.parent, {a.name: a for a in axes})
-    return Machine(
+    machine = Machine(
         **given,
         axes=axes,
         spindle_tool=spindle.get("measured_tool", (0.0, 0.0, 0.0)),
         components={code: reader.read(code, value) for code, value in components.items()},
     )
+    for code in machine.components:
+        _check_counted(BY_CODE[code], tables, spindle)
+    return machine
 
 
 def _axis(name: str, table: Mapping[str, Any]) -> Axis:
@@ -116,6 +122,33 @@ def _axis(name: str, table: Mapping[str, Any]) -> Axis:
         return Axis(name, **table)
     except SettingError as e:
         raise SettingError(str(e), where + e.path) from e
+
+
+def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
+    """Raise an error if one of the axes cannot have stood where it is said to."""
+    for other in axes:
+        if other is axis and axis.measured_on == "tool":
+            continue
+        (low, high), stood = other.travel, axis.measured_at["XYZ".index(other.name)]
+        if not low <= stood <= high:
+            raise SettingError(
+                f"{other.name} {stood:g} mm: outside the travel of {other.name}, {low:g} to {high:g} mm",
+                ("axes", axis.name, "measured_at"),
+            )
+
+
+def _check_counted(
+    component: ErrorComponent, axes: Mapping[str, Mapping[str, Any]], spindle: Mapping[str, Any]
+) -> None:
+    """Raise an error if a component in urad is given, but not the place from which its lever counts."""
+    if component.unit != "urad":
+        return
+    where: Keys = ("axes", component.axes[0]) if component.axes else ("spindle",)
+    table = axes[component.axes[0]] if component.axes else spindle
+    for key in _COUNTED_FROM[component.group]:
+        if key not in table:
+            told = f"{component.code} ({component.description}) is given"
+            raise SettingError(f"is missing: {told}, so write {_PLACES[key]}", (*where, key))
 
 
 class _Sources:
@@ -197,12 +230,10 @@ class _Sources:
         if target is None and model.target in BY_CODE and model.target != component.code:
             raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)
         for part in model.models if isinstance(model, PositionModel) else (model,):
-            if part.honest_error is not None and part.honest_error.verdict == "refused":
-                raise SettingError(
-                    f"the model of {part.target} in {path} was refused when it was judged: {part.honest_error.reason}; "
-                    f"fit a better one, or leave {component.code} out",
-                    here,
-                )
+            try:
+                part.check_not_refused()
+            except InputError as e:
+                raise SettingError(f"{path}: {e}; fit a better one, or leave {component.code} out", here) from e
         return model
 
 
@@ -296,6 +327,18 @@ _AXIS: dict[str, Convert] = {
     "reference_position": _LENGTH,
     "measured_at": _VECTOR,
     "measured_tool": _VECTOR,
+    "measured_on": _text,
+}
+#: keys that say from where the lever of a component in urad counts
+_COUNTED_FROM = {
+    "axis": ("measured_at", "measured_tool"),
+    "squareness": ("reference_position",),
+    "spindle": ("measured_tool",),
+}
+_PLACES = {
+    "measured_at": "where X, Y and Z stood while it was measured",
+    "measured_tool": "the way from the gauge point to where the translations were measured",
+    "reference_position": "the position at which it moves nothing",
 }
 _COMPONENT: dict[str, Convert] = {"model": _text, "target": _text, "profile": _rows}
 _MACHINE: dict[str, Convert] = {

@@ -57,7 +57,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     ------
     RecordingError
         There is no such file, a column is missing or comes twice in different units, a cell cannot be used, targets
-        of a run neither rise nor fall, a target is missing in a run, or there are too few targets or runs.
+        of a run neither rise nor fall, a target is missing in a run, or there are too few targets.
     UnitError
         A unit does not measure a length (or an angle).
     """

@@ -1,7 +1,6 @@
 """Error profiles from tables: wide, with a column per position, or long, with a row per position."""
 
 import re
-import tomllib
 from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +12,14 @@ import numpy as np
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import unit as find_unit
+from thermocomp.core.units import measured
+from thermocomp.files.codecolumns import codes, columns_of
+from thermocomp.files.codecolumns import is_one as is_profile
 from thermocomp.files.longtables import read_long
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.recordings import read as read_recording
 from thermocomp.files.recordings import read_rows
+from thermocomp.files.tomlfile import read_toml
 from thermocomp.recording.profiles import MIN_POSITIONS, QUANTITY, Profiles
 from thermocomp.recording.recording import Recording
 
@@ -25,9 +27,11 @@ from thermocomp.recording.recording import Recording
 Place = AbstractMapping[str, float]
 Layout = Literal["wide", "long"]
 
+#: how a note begins about columns of a component that could not be used
+NOT_TAKEN = "not taken:"
+
 #: columns of a wide table, if nothing else is said: y_laser_250_um, a_y_-50_urad
 _PLACED = re.compile(r"(?P<base>.+)_(?P<position>-?\d+(?:\.\d+)?)_(?:um|urad)")
-_LENGTH = re.compile(r"\s*([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*([^\d\s].*?)\s*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +48,8 @@ class ProfileOptions:
         um or urad; empty: that of the component.
     columns : str
         Wide: names of the columns, ``*`` standing for the position in mm, such as ``y_laser_*``. Long: the column of
-        the error. Empty: found by unit and position in the name.
+        the error. Empty: those called after the component, such as ``EYY_250_um`` (see
+        `thermocomp.files.codecolumns`); if there are none, found by unit and position in the name.
     places : mapping of str to Place
         Wide: position of each column by its name, instead of `columns`; see `read_places`.
     position : str
@@ -131,6 +136,47 @@ def read(
     )
 
 
+def read_components(
+    paths: Sequence[str | Path],
+    components: Sequence[str] = (),
+    mapping: Mapping | None = None,
+) -> dict[str, tuple[Profiles, ...]]:
+    """Read the profiles of several components from wide tables whose columns are called after them.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        One file per test.
+    components : sequence of str
+        Codes; all that have columns, if none is given.
+    mapping : Mapping, optional
+        See `read`.
+
+    Returns
+    -------
+    dict of str to tuple of Profiles
+        By code, one per test.
+
+    Raises
+    ------
+    RecordingError
+        A file cannot be read, or has no column that is called after a component.
+    InputError
+        There is no such component, or what a column measures is not what the component is.
+    """
+    recordings = [read_recording(path, mapping) for path in paths]
+    wanted = components or list(dict.fromkeys(code for r in recordings for code in codes(r)))
+    for r in recordings:
+        for code in wanted or [""]:
+            if code not in codes(r):
+                like = f"{code or 'EXX'}_250_{BY_CODE[code].unit if code in BY_CODE else 'um'}"
+                raise RecordingError(
+                    f"{r.source}: no column is called after {code or 'a component'}, such as {like} (position in mm, "
+                    "unit); columns of other names are read one component at a time"
+                )
+    return {code: tuple(from_recording(r, code) for r in recordings) for code in wanted}
+
+
 def from_recording(recording: Recording, options: ProfileOptions | str) -> Profiles:
     """Take profiles out of a recording that has a column per position.
 
@@ -144,7 +190,8 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     Returns
     -------
     Profiles
-        Whose states have the other channels. Coordinates that no place tells are 0.
+        Whose states have the other channels, but for profiles of other components. Coordinates that no place tells are
+        0.
 
     Raises
     ------
@@ -154,10 +201,17 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     wanted = ProfileOptions(target=options) if isinstance(options, str) else options
     axis, unit = wanted.about
     owner = f"{recording.source or recording.name}: {wanted.target}"
+    notes = recording.notes
+    called, elsewhere = columns_of(recording, wanted.target)
     if wanted.places is not None:
         found = [(recording.channel(name), place) for name, place in wanted.places.items()]
     elif wanted.columns:
         found = [(c, {axis: p}) for c, p in _matching(recording, wanted.columns)]
+    elif called:
+        found = [(recording.channel(name), {axis: p}) for name, p in called.items()]
+        if elsewhere:
+            why = "another axis stood elsewhere, where turns have a lever: take that off, and read a long table"
+            notes += (f"{NOT_TAKEN} {elsewhere[0]} to {elsewhere[-1]}: {why}",)
     else:
         found = [(c, {axis: p}) for c, p in _by_name(recording, QUANTITY[unit], owner)]
         _refuse_another_axis(wanted.target, axis, found, owner)
@@ -180,8 +234,8 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
             raise InputError(f"{owner}: column {channel.name!r}: its place does not tell the position of {axis}")
     points = np.array([[place.get(a, 0.0) for a in "XYZ"] for _, place in found])
     taken = [c for c, _ in found]
-    rest = tuple(c for c in recording.channels if c not in taken)
-    states = replace(recording, table=recording.table[[c.name for c in rest]], channels=rest)
+    rest = tuple(c for c in recording.channels if c not in taken and not (called and is_profile(c)))
+    states = replace(recording, table=recording.table[[c.name for c in rest]], channels=rest, notes=notes)
     return Profiles(wanted.target, unit, axis, points, recording.values(taken), states)
 
 
@@ -211,12 +265,7 @@ def read_places(path: str | Path) -> dict[str, Place]:
         probe_2 = { y = "250 mm", x = "300 mm" }
     """
     source = Path(path)
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as e:
-        raise InputError(f"{source}: no such file of positions") from e
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as positions: {e}") from e
+    content = read_toml(source, "file of positions")
     table = content.get("positions")
     if not isinstance(table, dict) or not table or len(content) > 1:
         raise InputError(f"{source}: want one table [positions] with a key per column, and nothing else")
@@ -228,13 +277,13 @@ def _read_place(value: Any, where: str) -> Place:
         raise InputError(f'{where} = {value!r}: write the axes\' positions, such as {{ y = "250 mm" }}')
     place = {}
     for axis, text in value.items():
-        found = _LENGTH.fullmatch(text) if isinstance(text, str) else None
-        if found is None:
-            raise InputError(f'{where}.{axis} = {text!r}: write a position with its unit, such as "250 mm"')
         try:
-            place[axis.upper()] = float(found[1]) * find_unit(found[2], "position").scale
+            position = measured(text, "position")
         except UnitError as e:
             raise UnitError(f"{where}.{axis}: {e}") from e
+        if position is None:
+            raise InputError(f'{where}.{axis} = {text!r}: write a position with its unit, such as "250 mm"')
+        place[axis.upper()] = position
     return place
 
 

@@ -317,7 +317,7 @@ class DynamicRidge(ThermalRegressor):
                 )
                 left_out = ridge.part(moments[k], candidate.columns)
                 full = np.vstack([weights, intercepts, -np.ones(len(strengths))])
-                squares = np.einsum("il,ij,jl->l", full, left_out, full, optimize=True)
+                squares = (full * (left_out @ full)).sum(axis=0)
                 rms[i, :, k] = np.sqrt(np.maximum(squares, 0.0) / left_out[-2, -2])
         mean = rms.mean(axis=2)
         i, j = (int(k) for k in np.unravel_index(np.argmin(mean), mean.shape))

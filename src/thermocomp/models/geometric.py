@@ -1,12 +1,13 @@
 """The geometric part f_g of an error: a polynomial or a spline, its order chosen by points left out (C-04, C-06)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, PPoly
+from scipy.interpolate import BSpline, CubicSpline, PPoly
+from scipy.stats import f as fisher
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.profile import PolynomialProfile, Profile, SplineProfile
@@ -21,6 +22,12 @@ Order = tuple[int, int]
 HIGHEST, HIGHEST_OTHER, MOST_KNOTS = 9, 3, 12
 #: so many positions between the ends are needed to judge by them alone
 FEW = 3
+#: A spline through all means takes over if its mean square at points left out is below this share of a polynomial's.
+#: With so few positions, leaving one out doubles the spacing and judges it too hard: a larger share holds, or against
+#: a constant, which only noise may call for, all of it.
+CLEARLY, BARELY, FEW_POSITIONS = 0.5, 1.25, 8
+#: a fit that leaves more than repeated values differ is told from chance at this level
+LEVEL = 0.01
 
 
 @dataclass(frozen=True)
@@ -36,12 +43,19 @@ class Tried:
         RMS error at points that were left out, one after the other [unit]; inf if the others do not determine it.
     margin : float
         Standard error of its square [unit^2].
+    misfit : float
+        Probability that a fit which leaves nothing but noise leaves so much beyond what repeated values differ by (F
+        test for lack of fit); nan where the noise is not known.
+    through : bool
+        True for the natural spline through the means of all positions; its order is (positions - 2, 0).
     """
 
     order: Order
     n_terms: int
     left_out: float
     margin: float
+    misfit: float = float("nan")
+    through: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,12 +71,35 @@ class ProfileFit:
         By rising number of terms; empty if the order was given.
     rms : float
         What the fit leaves [unit], per degree of freedom; nan if there is none.
+    noise : float
+        Standard deviation of the values at one point [unit]; nan where none comes twice, or only with the same number.
+    misfit : float
+        See `Tried`.
+    through : bool
+        True if it is the natural spline through the means of all positions.
     """
 
     profile: Profile
     order: Order
     tried: tuple[Tried, ...]
     rms: float
+    noise: float = float("nan")
+    misfit: float = float("nan")
+    through: bool = False
+
+    @property
+    def leaves_more(self) -> bool:
+        """True if the fit leaves clearly more than the noise, which is known only where points come several times."""
+        return self.misfit < LEVEL
+
+    @property
+    def words(self) -> str:
+        """Say what a reader must know of it; empty if there is nothing."""
+        if self.leaves_more:
+            return (
+                f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
+            )
+        return ""
 
 
 def fit_profile(
@@ -81,6 +118,13 @@ def fit_profile(
     whose mean square is within one standard error of the smallest, the one with the fewest terms is taken. The ends are
     not left out: a profile is never used beyond them, and what an order does there would decide alone. Only where there
     are fewer than three positions between them, too few to judge by, they are left out too.
+
+    Where points come several times, the noise is known: orders that leave clearly more are not taken (`LEVEL`).
+
+    With 5 to 8 positions no order may follow the profile. Along one coordinate a natural spline through the means of
+    all positions therefore competes, from 4 positions on. It takes over if no order fits, or if it tells points that
+    were left out clearly better (`CLEARLY`); with few positions, where the noise is not known, already if about as well
+    (`BARELY`), or better than a constant. It follows the noise, but misses little of the shape.
 
     Parameters
     ----------
@@ -127,51 +171,122 @@ def fit_profile(
     place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
     shape = _Spline(points, axis) if kind == "spline" else _Polynomial(points, axis, others)
     tried: list[Tried] = []
+    through = False
     if order == "auto":
         n_places = int(place.max()) + 1
         tried = [_try(shape.columns(o), values, place, points, axis, o) for o in shape.orders(n_places)]
+        if n_own > MIN_POSITIONS and (kind == "spline" or not others):
+            tried.append(_try_through(_Through(points, axis), values, place, points, axis))
         if not tried or not np.isfinite(min(t.left_out for t in tried)):
             raise FitError(f"profile along {axis}: {n_places} points are too few to choose an order; give it")
         tried.sort(key=lambda t: (t.n_terms, t.order))
-        best = min(tried, key=lambda t: t.left_out)
-        chosen = next(t.order for t in tried if t.left_out**2 <= best.left_out**2 + best.margin)
+        best = _choose(tried, n_own)
+        chosen, through = best.order, best.through
     else:
         chosen = order if isinstance(order, tuple) else (order, 1 if others and order and kind == "polynomial" else 0)
         if min(chosen) < 0:
             raise InputError(f"order {order}: must not be negative")
-    columns = shape.columns(chosen)
+    taken = _Through(points, axis) if through else shape
+    columns = taken.columns(chosen)
     n_terms = columns.shape[1]
     if np.linalg.matrix_rank(columns) < n_terms:
         raise FitError(f"profile along {axis}: {len(np.unique(place))} points do not determine {n_terms} terms")
     found: FloatArray = np.asarray(np.linalg.lstsq(columns, values)[0], dtype=np.float64)
     left = values - columns @ found
     spare = len(values) - n_terms
-    rms = float(np.sqrt(left @ left / spare)) if spare > 0 else float("nan")
-    return ProfileFit(shape.profile(chosen, found), chosen, tuple(tried), rms)
+    return ProfileFit(
+        profile=taken.profile(chosen, found),
+        order=chosen,
+        tried=tuple(tried),
+        rms=float(np.sqrt(left @ left / spare)) if spare > 0 else float("nan"),
+        noise=float(np.sqrt(_noise(values, place)[0])),
+        misfit=_misfit(left, values, place, n_terms),
+        through=through,
+    )
+
+
+def _choose(tried: Sequence[Tried], n_own: int) -> Tried:
+    """Choose among what was tried, sorted by the number of terms."""
+    through = next((t for t in tried if t.through), None)
+    orders = [t for t in tried if not t.through and np.isfinite(t.left_out)]
+    fitting = [t for t in orders if not t.misfit < LEVEL]
+    if through is not None and np.isfinite(through.left_out) and not fitting:
+        return through
+    best = min(fitting or orders, key=lambda t: t.left_out)
+    chosen = next(t for t in fitting or orders if t.left_out**2 <= best.left_out**2 + best.margin)
+    if through is None:
+        return chosen
+    hard = n_own <= FEW_POSITIONS and np.isnan(chosen.misfit)
+    share = CLEARLY if not hard else BARELY if chosen.n_terms > 1 else 1.0
+    return through if through.left_out**2 < share * chosen.left_out**2 else chosen
+
+
+def _noise(values: FloatArray, place: NDArray[np.intp]) -> tuple[float, int]:
+    """Return the variance of values at one place, and its degrees of freedom; nan and 0 if it is not known."""
+    count = np.bincount(place)
+    within = values - (np.bincount(place, values) / count)[place]
+    spare = len(values) - len(count)
+    # the same numbers again are copies of one measurement, not repeated ones
+    if np.abs(within).max() <= 1e-9 * np.abs(values).max():
+        return float("nan"), 0
+    return float(within @ within / spare), spare
+
+
+def _misfit(left: FloatArray, values: FloatArray, place: NDArray[np.intp], n_terms: int) -> float:
+    """Return the probability of the F test for lack of fit, from what a fit leaves."""
+    noise, spare = _noise(values, place)
+    free = int(place.max()) + 1 - n_terms
+    if not spare or free <= 0:
+        return 1.0 if spare else float("nan")
+    lack = max(float(left @ left) - noise * spare, 0.0) / free
+    return float(fisher.sf(lack / noise, free, spare))
+
+
+def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray[np.intp]:
+    """Return the places to leave out: those between the ends."""
+    own = points[:, "XYZ".index(axis)]
+    inside = (own > own.min()) & (own < own.max())
+    return np.unique(place[inside] if len(np.unique(own[inside])) >= FEW else place)
 
 
 def _try(
     columns: FloatArray, values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str, order: Order
 ) -> Tried:
     """Leave out each point between the ends in turn; by the hat matrix, without fitting anew."""
+    n_terms = columns.shape[1]
     Q, R = np.linalg.qr(columns)
     sizes = np.abs(np.diag(R))
     if sizes.min() <= 1e-10 * sizes.max():
-        return Tried(order, columns.shape[1], np.inf, np.inf)
+        return Tried(order, n_terms, np.inf, np.inf)
     residual = values - Q @ (Q.T @ values)
-    own = points[:, "XYZ".index(axis)]
     squares = []
-    inside = (own > own.min()) & (own < own.max())
-    if len(np.unique(own[inside])) < FEW:
-        inside[:] = True
-    for k in np.unique(place[inside]):
+    for k in _left_out(points, place, axis):
         rows = np.flatnonzero(place == k)
         free = np.eye(len(rows)) - Q[rows] @ Q[rows].T
         if np.linalg.cond(free) > 1e10:
-            return Tried(order, columns.shape[1], np.inf, np.inf)
+            return Tried(order, n_terms, np.inf, np.inf)
         squares.append(float(np.mean(np.linalg.solve(free, residual[rows]) ** 2)))
-    margin = float(np.std(squares, ddof=1) / np.sqrt(len(squares)))
-    return Tried(order, columns.shape[1], float(np.sqrt(np.mean(squares))), margin)
+    return Tried(order, n_terms, *_mean(squares), _misfit(residual, values, place, n_terms))
+
+
+def _try_through(
+    spline: "_Through", values: FloatArray, place: NDArray[np.intp], points: FloatArray, axis: str
+) -> Tried:
+    """Leave out each point between the ends in turn, and lay the spline through the others."""
+    squares = []
+    for k in _left_out(points, place, axis):
+        out = place == k
+        told = spline.through(values, ~out)(spline.position[out])
+        squares.append(float(np.mean((values[out] - told) ** 2)))
+    n_terms = len(spline.places)
+    residual = values - spline.through(values)(spline.position)
+    misfit = _misfit(residual, values, place, n_terms)
+    return Tried((n_terms - 2, 0), n_terms, *_mean(squares), misfit, through=True)
+
+
+def _mean(squares: Sequence[float]) -> tuple[float, float]:
+    """Return the root of their mean, and the standard error of the mean."""
+    return float(np.mean(squares) ** 0.5), float(np.std(squares, ddof=1) / len(squares) ** 0.5)
 
 
 class _Polynomial:
@@ -249,11 +364,35 @@ class _Spline:
     def profile(self, order: Order, found: FloatArray) -> SplineProfile:
         knots = self.knots(order)
         pieces = PPoly.from_spline(BSpline(knots, found, 3))
-        ends = knots[3:-3]
-        length = np.diff(ends)
-        scaled = pieces.c[::-1, 3:-3] * length ** np.arange(4)[:, None]
-        return SplineProfile(
-            axis=self.axis,
-            knots=tuple(ends.tolist()),
-            pieces=tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in scaled.T),
-        )
+        return _pieces(self.axis, knots[3:-3], pieces.c[:, 3:-3])
+
+
+class _Through:
+    """Natural cubic spline through the means of all positions."""
+
+    def __init__(self, points: FloatArray, axis: str) -> None:
+        self.axis = axis
+        self.position = points[:, "XYZ".index(axis)]
+        self.places = np.unique(self.position)
+
+    def through(self, values: FloatArray, rows: NDArray[np.bool_] | slice = slice(None)) -> CubicSpline:
+        """Return the spline through the means of some rows."""
+        places, which = np.unique(self.position[rows], return_inverse=True)
+        means = np.bincount(which, values[rows]) / np.bincount(which)
+        return CubicSpline(places, means, bc_type="natural")
+
+    def columns(self, order: Order) -> FloatArray:  # noqa: ARG002 - there is one
+        return np.asarray(self.position[:, None] == self.places, dtype=np.float64)
+
+    def profile(self, order: Order, found: FloatArray) -> SplineProfile:  # noqa: ARG002
+        return _pieces(self.axis, self.places, CubicSpline(self.places, found, bc_type="natural").c)
+
+
+def _pieces(axis: str, knots: FloatArray, falling: FloatArray) -> SplineProfile:
+    """Return a spline profile from the coefficients of its pieces by falling power [unit/mm^k], (4, n_pieces)."""
+    scaled = falling[::-1] * np.diff(knots) ** np.arange(4)[:, None]
+    return SplineProfile(
+        axis=axis,
+        knots=tuple(knots.tolist()),
+        pieces=tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in scaled.T),
+    )

@@ -2,19 +2,29 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp import __version__
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import ErrorModel, Provenance, Support
+from thermocomp.core.model import ErrorModel, Provenance
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.terms import TermTable
-from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.geometric import Kind, Order, ProfileFit, fit_profile
+from thermocomp.models.geometric import ProfileFit, fit_profile
+from thermocomp.models.positionoptions import (
+    POWERS,
+    PositionOptions,
+    counted,
+    enough,
+    learned,
+    reference_position,
+    remainder,
+    worth,
+)
 from thermocomp.models.training import Trained, train
 from thermocomp.recording.profiles import QUANTITY, Profiles, Slopes
 from thermocomp.recording.recording import Recording
@@ -23,52 +33,7 @@ from thermocomp.recording.samples import Samples, stack
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: powers whose remainder is told (C-05)
-POWERS = (1, 2, 3)
-#: one more power is worth it if it takes away this share of what is left, and this share of the thermal part
-WORTH_OF_REST, WORTH_OF_THERMAL = 0.1, 0.05
-
-
-@dataclass(frozen=True, kw_only=True)
-class PositionOptions:
-    """How a position-dependent error is modelled.
-
-    Parameters
-    ----------
-    method : str or ThermalRegressor
-        Of the slopes: any method of `thermocomp.models.methods`, or an estimator with settings of its own.
-    inputs : sequence of str, optional
-        Channels to predict the slopes from; all temperatures and the spindle speed if not given.
-    slopes : int
-        m, the highest power of the position; Chen finds 1 enough (C-05).
-    offset : bool
-        Model a k_0(t) too; without it the thermal part is zero at the reference position, as Chen's.
-    profile : {'polynomial', 'spline'}
-    order : int, (int, int) or 'auto'
-        Of the profile; see `thermocomp.models.geometric.fit_profile`.
-    coordinates : str, optional
-        Axes the profile may depend on (C-06).
-    reference : int or sequence of int
-        States that count as cold, in each test; of several, the mean (C-07). Temperatures are counted from them too.
-    reference_position : float, optional
-        Where q is zero [mm]. If not given: the axis' zero, or the end of the measured travel that is next to it.
-    rezero : bool
-        False: temperatures are taken as they are.
-    support : Support
-        What the models of the slopes do outside their trained range.
-    """
-
-    method: str | ThermalRegressor = "mra"
-    inputs: Sequence[str] | None = None
-    slopes: int = 1
-    offset: bool = False
-    profile: Kind = "polynomial"
-    order: int | Order | Literal["auto"] = "auto"
-    coordinates: str | None = None
-    reference: int | Sequence[int] = 0
-    reference_position: float | None = None
-    rezero: bool = True
-    support: Support = Support()
+__all__ = ["PositionFit", "PositionOptions", "fit_position", "slope_samples"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +47,7 @@ class PositionFit:
     profile : ProfileFit
         The cold profile: order and the errors at points left out.
     slopes : tuple of Slopes
-        Factors of the thermal parts that were measured, one per test.
+        Factors of the thermal parts that were measured, one per test; k1 if none is modelled.
     samples : Samples
         Inputs, and the factors as targets ``k0``, ``k1`` ...; one row per state.
     trained : tuple of Trained
@@ -112,22 +77,18 @@ class PositionFit:
     @property
     def enough(self) -> int:
         """The smallest m to which a higher one adds little: a tenth of the rest, or a twentieth of the thermal part."""
-        known = {m: rest for m, rest in self.remainders.items() if np.isfinite(rest)}
-        return next((m for m in known if not self._worth(known[m], min(known[k] for k in known if k >= m))), 1)
+        return enough(self.remainders, self.thermal_rms) or 1
 
     @property
     def shifts(self) -> bool:
         """True if an offset would take away more than that: the profiles turn about another position, or shift."""
         rest = self.remainders.get(len(self.model.slopes), np.nan)
-        return self.model.offset is None and self._worth(rest, self.offset_remainder)
-
-    def _worth(self, before: float, after: float) -> bool:
-        return before - after > max(WORTH_OF_REST * before, WORTH_OF_THERMAL * self.thermal_rms)
+        return self.model.offset is None and worth(rest, self.offset_remainder, self.thermal_rms)
 
 
 def fit_position(
     profiles: Profiles | Sequence[Profiles],
-    options: PositionOptions = PositionOptions(),
+    options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
     *,
     learn: BoolArray | None = None,
 ) -> PositionFit:
@@ -156,12 +117,10 @@ def fit_position(
     FitError
         There is too little to fit to.
     """
-    tests = (profiles,) if isinstance(profiles, Profiles) else tuple(profiles)
-    samples, slopes = slope_samples(tests, options)
+    tests = counted((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    samples, slopes = slope_samples(tests, options, learn)
     seen = np.ones(len(samples), dtype=np.bool_) if learn is None else learn
-    used = [test for k, test in enumerate(tests) if seen[samples.test == k].any()]
-    if not used:
-        raise FitError(f"{tests[0].target}: no state is left to learn from")
+    used = learned(tests, options, learn)
     points = np.concatenate([test.points for test in used])
     position = np.concatenate([test.position for test in used])
     cold = np.concatenate([test.cold(options.reference) for test in used])
@@ -174,11 +133,10 @@ def fit_position(
         order=options.order,
         coordinates=options.coordinates,
     )
-    unit, powers = tests[0].unit, slopes[0].powers
+    unit, powers = tests[0].unit, options.powers
     trained = [train(options.method, samples, j, seen, support=options.support) for j in range(len(powers))]
     models = [replace(t.model, unit=slope_unit(unit, k)) for t, k in zip(trained, powers, strict=True)]
-    warm = [np.delete(t.thermal(options.reference), t.reference_rows(options.reference), axis=0) for t in used]
-    thermal = np.concatenate([w[np.isfinite(w)] for w in warm])
+    made = models[0].provenance if models else _profile_alone(samples, seen)
     return PositionFit(
         model=PositionModel(
             target=tests[0].target,
@@ -189,26 +147,30 @@ def fit_position(
             profile=geometric.profile,
             offset=models[0] if options.offset else None,
             slopes=tuple(models[1:] if options.offset else models),
-            provenance=_provenance(models[0].provenance, geometric, options),
+            provenance=_provenance(made, geometric, options),
         ),
         profile=geometric,
         slopes=slopes,
         samples=samples,
         trained=tuple(replace(t, model=m) for t, m in zip(trained, models, strict=True)),
         coefficient_errors=tuple(_coefficient_errors(m, samples, j, seen, slopes) for j, m in enumerate(models)),
-        remainders={m: _remainder(tests, options, m) for m in POWERS},
-        offset_remainder=_remainder(tests, replace(options, offset=True), options.slopes),
-        thermal_rms=float(np.sqrt(np.mean(thermal**2))) if thermal.size else 0.0,
+        remainders={m: remainder(used, options, m) for m in POWERS},
+        offset_remainder=remainder(used, replace(options, offset=True), options.slopes),
+        thermal_rms=remainder(used, replace(options, offset=False), 0),
     )
 
 
-def slope_samples(tests: Sequence[Profiles], options: PositionOptions) -> tuple[Samples, tuple[Slopes, ...]]:
+def slope_samples(
+    tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
+) -> tuple[Samples, tuple[Slopes, ...]]:
     """Return what the factors are learned from: one row per state, the measured factors as targets.
 
     Parameters
     ----------
     tests : sequence of Profiles
     options : PositionOptions
+    learn : ndarray of bool of shape (n_states,), optional
+        States that may be learned from; see `fit_position`.
 
     Returns
     -------
@@ -226,13 +188,14 @@ def slope_samples(tests: Sequence[Profiles], options: PositionOptions) -> tuple[
     for test in tests[1:]:
         if (test.target, test.unit, test.axis) != (first.target, first.unit, first.axis):
             raise InputError(f"profiles of {first.target} and of {test.target}: fit one component at a time")
-    zero_at = reference_position(tests, options)
+    tests = counted(tests, options, learn)
+    zero_at, highest = reference_position(tests, options), options.slopes or (0 if options.offset else 1)
     slopes = tuple(
-        test.slopes(options.slopes, offset=options.offset, reference=options.reference, reference_position=zero_at)
+        test.slopes(highest, offset=options.offset, reference=options.reference, reference_position=zero_at)
         for test in tests
     )
     names = [f"{first.target}_k{k}" for k in slopes[0].powers]
-    recordings = [_with_factors(test, s, names) for test, s in zip(tests, slopes, strict=True)]
+    recordings = [_with_factors(test, s, names, options) for test, s in zip(tests, slopes, strict=True)]
     samples = stack(recordings, names, options.inputs, rezero=options.rezero)
     zero = np.stack(
         [
@@ -240,21 +203,10 @@ def slope_samples(tests: Sequence[Profiles], options: PositionOptions) -> tuple[
             for k, test in enumerate(tests)
         ]
     )
+    if not options.rezero:
+        mine = [learn is None or learn[samples.test == k].any() for k in range(len(tests))]
+        zero = np.tile(zero[mine].mean(axis=0), (len(tests), 1))
     return replace(samples, zero=zero, hashes=tuple(test.fingerprint for test in tests)), slopes
-
-
-def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> float:
-    """Return where q is zero [mm]: see `PositionOptions`.
-
-    Parameters
-    ----------
-    tests : sequence of Profiles
-    options : PositionOptions
-    """
-    if options.reference_position is not None:
-        return options.reference_position
-    low, high = min(t.position.min() for t in tests), max(t.position.max() for t in tests)
-    return float(min(max(0.0, low), high))
 
 
 def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) -> None:
@@ -268,34 +220,31 @@ def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) ->
             )
 
 
-def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str]) -> Recording:
-    """Return the thermal states with the factors as channels; a factor counts as an error at 1 m."""
-    channels = tuple(Channel(name, QUANTITY[test.unit], test.unit) for name in names)
-    table = test.states.table.assign(**dict(zip(names, slopes.factors.T, strict=True)))
-    return replace(test.states, table=table, channels=(*test.states.channels, *channels))
+def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str], options: PositionOptions) -> Recording:
+    """Return the thermal states, inputs and factors alone; a factor counts as an error at 1 m."""
+    states = test.states
+    if options.inputs is not None:
+        inputs = [states.channel(name) for name in options.inputs]
+    else:
+        inputs = [*states.temperatures, *states.of_quantity("spindle_speed")]
+    inputs = list(dict.fromkeys(inputs))
+    channels = (*inputs, *(Channel(name, QUANTITY[test.unit], test.unit) for name in names))
+    values = np.column_stack([states.values(inputs), slopes.factors])
+    return replace(states, table=pd.DataFrame(values, columns=[c.name for c in channels]), channels=channels)
 
 
 def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
     """Return what the inputs are counted from."""
     values = samples.values[rows]
     there = np.isfinite(values)
-    missing = np.flatnonzero(samples.rezeroed & ~there.any(axis=0))
+    counted = np.array([c.quantity == "temperature" for c in samples.inputs])
+    missing = np.flatnonzero(counted & ~there.any(axis=0))
     if missing.size:
         raise RecordingError(
             f"{samples.test_names[int(samples.test[rows[0]])]}: {samples.inputs[missing[0]].name} has no value in the "
             "reference state: take another state, or leave the channel out"
         )
     return np.asarray(np.where(there, values, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1))
-
-
-def _remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
-    """Return what powers up to m leave; nan if there are not enough positions."""
-    turn = reference_position(tests, options)
-    try:
-        fits = [t.slopes(m, offset=options.offset, reference=options.reference, reference_position=turn) for t in tests]
-    except InputError:
-        return float("nan")
-    return float(np.sqrt(np.mean([f.remainder**2 for f in fits])))
 
 
 def _coefficient_errors(
@@ -322,6 +271,19 @@ def _coefficient_errors(
         common = s.shared * float(np.nanmean(s.errors[:, target] ** 2))
         variance = variance + common * inverse[:, samples.test[rows] == k].sum(axis=1) ** 2
     return dict(zip(model.coefficients_by_name(), np.sqrt(variance).tolist(), strict=False))
+
+
+def _profile_alone(samples: Samples, seen: BoolArray) -> Provenance:
+    """Return where a model without factors comes from."""
+    tests: Sequence[int] = np.unique(samples.test[seen]).tolist()
+    return Provenance(
+        method="cold profile alone",
+        parameters={},
+        data_sha256=tuple(samples.hashes[t] for t in tests),
+        cycles=tuple(samples.cycle_names[c] for c in np.unique(samples.cycle[seen])),
+        rows=int(seen.sum()),
+        version=__version__,
+    )
 
 
 def _provenance(made: Provenance | None, geometric: ProfileFit, options: PositionOptions) -> Provenance | None:

@@ -69,6 +69,8 @@ class Profiles:
         Actual minus commanded [unit]; nan where a point was missed.
     states : Recording
         The thermal states, one row each: time, temperatures, spindle speed; cycles.
+    zero : ndarray of shape (n_points,), optional
+        Profile that counts as cold, in place of those of its own reference states [unit].
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Profiles:
     points: FloatArray
     values: FloatArray
     states: Recording
+    zero: FloatArray | None = None
 
     def __post_init__(self) -> None:
         owner = self._owner
@@ -203,6 +206,8 @@ class Profiles:
         ndarray of shape (n_points,)
             [unit]; nan where no reference state has a value.
         """
+        if self.zero is not None:
+            return self.zero
         rows = self.values[self.reference_rows(reference)]
         count = np.isfinite(rows).sum(axis=0)
         return np.where(count > 0, np.nansum(rows, axis=0) / np.maximum(count, 1), np.nan)
@@ -256,29 +261,34 @@ class Profiles:
             )
         q = 1e-3 * (self.position - reference_position)
         reach = float(np.abs(q).max())
+        # the columns are scaled, for powers of metres differ by much
+        columns = np.stack([(q / reach) ** k for k in powers], axis=1)
+        scale = np.array([reach**-k for k in powers])
         thermal = self.thermal(reference)
         factors = np.full((len(self), len(powers)), np.nan)
         errors, residual = factors.copy(), np.full(thermal.shape, np.nan)
-        cold = self.reference_rows(reference)
+        warm = np.ones(len(self), dtype=np.bool_)
+        warm[self.reference_rows(reference)] = False
         freedom, squares = 0, 0.0
-        for state, part in enumerate(thermal):
-            there = np.isfinite(part)
-            # the columns are scaled, for powers of metres differ by much
-            columns = np.stack([(q[there] / reach) ** k for k in powers], axis=1)
-            if there.sum() <= len(powers) or np.linalg.matrix_rank(columns) < len(powers):
+        # states with the same points are fitted together
+        pattern, kind = np.unique(np.isfinite(thermal), axis=0, return_inverse=True)
+        for k, there in enumerate(pattern):
+            mine, n = kind.ravel() == k, int(there.sum())
+            if n <= len(powers) or np.linalg.matrix_rank(columns[there]) < len(powers):
                 continue
-            Q, R = np.linalg.qr(columns)
-            inverse, scale = np.linalg.inv(R), np.array([reach**-k for k in powers])
-            found = inverse @ (Q.T @ part[there])
-            left = part[there] - columns @ found
-            spare = int(there.sum()) - len(powers)
-            factors[state] = found * scale
-            errors[state] = np.sqrt((left @ left) / spare * (inverse**2).sum(axis=1)) * scale
-            residual[state, there] = left
-            if state not in cold:
-                freedom, squares = freedom + spare, squares + float(left @ left)
+            Q, R = np.linalg.qr(columns[there])
+            inverse = np.linalg.inv(R)
+            parts = thermal[np.ix_(mine, there)]
+            found = parts @ Q @ inverse.T
+            left = parts - found @ columns[there].T
+            rest = (left**2).sum(axis=1)
+            factors[mine] = found * scale
+            errors[mine] = np.sqrt(np.outer(rest / (n - len(powers)), (inverse**2).sum(axis=1))) * scale
+            residual[np.ix_(mine, there)] = left
+            freedom += (n - len(powers)) * int(warm[mine].sum())
+            squares += float(rest[warm[mine]].sum())
         remainder = float(np.sqrt(squares / freedom)) if freedom else float("nan")
-        return Slopes(powers, factors, errors, residual, remainder, 1.0 / (1.0 + len(cold)))
+        return Slopes(powers, factors, errors, residual, remainder, 1.0 / (1.0 + int((~warm).sum())))
 
 
 def _place(point: FloatArray) -> str:

@@ -50,7 +50,8 @@ class Samples:
     rezero : bool
         Temperatures are counted from the first row of each test, or from `zero`.
     zero : ndarray of shape (n_tests, n_inputs), optional
-        What they are counted from, if it is not the first complete row of each test.
+        What they are counted from, if it is not the first complete row of each test; without `rezero` it is the same
+        for all tests, and holds live too.
     """
 
     inputs: tuple[Channel, ...]
@@ -83,7 +84,7 @@ class Samples:
     def reference(self) -> FloatArray:
         """Return what counts as zero, (n_tests, n_inputs): each test's first complete row, or 0 for absolute inputs."""
         if self.zero is not None:
-            return np.where(self.rezeroed, self.zero, 0.0)
+            return np.where([c.quantity == "temperature" for c in self.inputs], self.zero, 0.0)
         zero = np.zeros((len(self.test_names), len(self.inputs)))
         for k in range(len(self.test_names)):
             rows = np.flatnonzero((self.test == k) & self.valid)
@@ -252,11 +253,9 @@ def _refuse_different_inputs(recordings: Sequence[Recording], inputs: Sequence[C
 
 def _refuse_the_absurd(recording: Recording, channels: Sequence[Channel]) -> None:
     """Refuse numbers that no sensor means and that sums of squares cannot hold."""
-    for c in channels:
-        values = recording.values([recording.channel(c.name)])[:, 0]
-        beyond = np.flatnonzero(np.abs(values) > ABSURD)
-        if beyond.size:
-            raise RecordingError(
-                f"{recording.source or recording.name}: {c.name} is {values[beyond[0]]:g} {c.unit} in row {beyond[0]}: "
-                "correct it, or mark it as missing by a mapping"
-            )
+    values = recording.values([recording.channel(c.name) for c in channels])
+    for row, k in np.argwhere(np.abs(values) > ABSURD)[:1]:
+        raise RecordingError(
+            f"{recording.source or recording.name}: {channels[k].name} is {values[row, k]:g} {channels[k].unit} in row "
+            f"{row}: correct it, or mark it as missing by a mapping"
+        )

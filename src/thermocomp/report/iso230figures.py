@@ -204,7 +204,8 @@ def positioning(result: PositioningResult) -> str:
                 runs = result.test.directions[name]
                 ax.fill_between(positions, d.mean - 2 * d.s, d.mean + 2 * d.s, color=colour, alpha=0.15, lw=0)
                 ax.plot(np.tile(positions, len(runs)), runs.ravel(), ".", color=colour, ms=3, alpha=0.6)
-                ax.plot(positions, d.mean, "-o", color=colour, ms=3.5, label=f"mean {arrow}, band ± 2 s {arrow}")
+                band = f", band ± 2 s {arrow}" if len(runs) > 1 else " of a single run"
+                ax.plot(positions, d.mean, "-o", color=colour, ms=3.5, label=f"mean {arrow}{band}")
         if result.mean is not None:
             ax.plot(positions, result.mean, ":", color="black", lw=1.4, label="mean of both")
         _spans(ax, result)
@@ -229,7 +230,8 @@ def _spans(ax: Axes, result: PositioningResult) -> None:
     if result.mean is not None:
         spans.append(("M", float(result.mean.min()), float(result.mean.max())))
     low, high = float(result.test.positions[0]), float(result.test.positions[-1])
-    for k, (symbol, bottom, top) in enumerate(spans):
+    # a single run tells no A
+    for k, (symbol, bottom, top) in enumerate(s for s in spans if np.isfinite(s[1:]).all()):
         x = high + (0.045 + 0.075 * k) * (high - low)
         ax.annotate("", (x, top), (x, bottom), arrowprops={"arrowstyle": "<->", "lw": 1.1, "shrinkA": 0, "shrinkB": 0})
         ax.text(x, top, f"{symbol} {top - bottom:.3g}", ha="center", va="bottom", fontsize=8)

@@ -48,7 +48,7 @@ class SimulatedTest:
     truth : ndarray of shape (n_rows, n_displacements)
         The displacements without noise and faults, in the order of their channels [um].
     observables : ndarray of shape (n_rows, n_observables) or None
-        All that the machine tells of itself, less what it told at the start, if that was asked for: see
+        All that the machine tells of itself, from 20 degC on, if that was asked for: see
         `thermocomp.simulation.volume`.
     """
 
@@ -162,7 +162,7 @@ def run(
     drives = [s.drive for s in programme.segments for _ in range(round(s.duration / tick))]
 
     state, sky, true, at_start = _soaked(machine, programme, weights, weather)
-    shift = np.array([i.cold for i in instruments]) - np.where(moves, true, 0.0)
+    shift = np.array([i.cold for i in instruments]) - np.where([i.zeroed for i in instruments], true, 0.0)
     recorded = np.empty((len(time), len(sensors) + len(channels)))
     recorded[:, len(sensors) :] = driven
     truth = np.empty((len(time), int(moves.sum())))
@@ -170,7 +170,7 @@ def run(
     felt = true
     recorded[0, : len(sensors)] = read(sensors, (felt + shift)[None], time[:1], noise)
     truth[0] = (true + shift)[moves]
-    told = np.zeros((len(time), len(machine.observables))) if whole else None
+    told = np.tile(at_start, (len(time), 1)) if whole else None
     block = max(BLOCK // every, 1) * every
     for first in range(0, len(drives), block):
         part = drives[first : first + block]
@@ -183,7 +183,7 @@ def run(
         recorded[rows, : len(sensors)] = read(sensors, followed[every - 1 :: every] + shift, time[rows], noise)
         truth[rows] = (values[every - 1 :: every] + shift)[:, moves]
         if told is not None:
-            told[rows] = done.observables[every - 1 :: every] - at_start
+            told[rows] = done.observables[every - 1 :: every]
 
     if programme.touch:
         idle = ~programme.touch.rows(time, driven[:, 0] == 0.0)

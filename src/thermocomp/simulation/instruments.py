@@ -63,7 +63,9 @@ class Instrument:
     air : tuple of float
         Of `Air.values`.
     cold : float
-        Value in the state in which the test begins [um]; a displacement is counted from there.
+        Value in the state from which it counts [um].
+    zeroed : bool
+        It counts from the state in which the test begins; False: from what the machine and the air tell at zero.
     touches : bool
         It says something in probing cycles only.
     """
@@ -72,6 +74,7 @@ class Instrument:
     reads: Mapping[str, float] = field(default_factory=dict)
     air: tuple[float, float, float] = (0.0, 0.0, 0.0)
     cold: float = 0.0
+    zeroed: bool = False
     touches: bool = False
 
 
@@ -117,7 +120,7 @@ def displacement(label: str, probe: Probe, *, perfect: bool) -> Instrument:
     channel = Channel(f"{label}_{probe.unit}", quantity, probe.unit, probe.place)
     drift = float(np.random.default_rng([*label.encode()]).uniform(-0.15, 0.15))
     sensor = Sensor(channel) if perfect else Sensor(channel, noise=probe.noise, resolution=0.01, drift=drift)
-    return Instrument(sensor, probe.reads, cold=probe.cold)
+    return Instrument(sensor, probe.reads, cold=probe.cold, zeroed=probe.zeroed)
 
 
 @dataclass(frozen=True)
@@ -169,6 +172,7 @@ class Touch:
                     resolution=0.0 if perfect else self.resolution,
                 ),
                 touched(axis, dict(zip(AXES, point, strict=True))),
+                zeroed=True,
                 touches=True,
             )
             for label, point in self.points.items()

@@ -4,10 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import SettingError
 from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL, between
 from thermocomp.simulation.geometry import SQUARENESS, cold, cold_profile
+
+FloatArray = NDArray[np.float64]
 
 #: distance of the two probes of X, and of Y, along the test bar [m]
 PROBE_DISTANCE = 0.1
@@ -28,6 +31,8 @@ class Probe:
     unit : {'um', 'urad'}
     noise : float
         Standard deviation, in its unit.
+    zeroed : bool
+        Its value is counted from the start of the test, where it is `cold`; False: from the machine at 20 degC.
     """
 
     place: str
@@ -35,6 +40,7 @@ class Probe:
     cold: float = 0.0
     unit: str = "um"
     noise: float = 0.15
+    zeroed: bool = True
 
 
 def positioning(axis: str, position: float) -> dict[str, float]:
@@ -142,11 +148,16 @@ def station(code: str, position: int) -> tuple[str, ...]:
     return () if name in STILL else (name,)
 
 
-def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Probe:
-    """Return a component of an axis as a laser with six degrees of freedom, and levels, read it.
+#: axes between each axis and the workpiece: the structure is ``w X' b Z Y (C1) t``
+NEARER = {"x": "", "z": "x", "y": "xz"}
 
-    They were set to zero at the test position, when the test began. The tool point is that of the test bar, and the
-    other axes stand at `TEST_POSITION`.
+
+def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Probe:
+    """Return a component of an axis as a laser with six degrees of freedom between table and spindle reads it.
+
+    It is set to zero at the test position, in each run. The tool point is that of the test bar, and the other axes
+    stand at `TEST_POSITION`. Turns of the axes that stand nearer to the workpiece swing the way of the axis that moves;
+    the laser sees that too.
 
     Parameters
     ----------
@@ -155,33 +166,72 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
     position : float
         Of its axis [mm].
     z : float
-        Where Z stands instead [mm]: the bed gives way under the column. What the turns do by the lever is taken off.
+        Where Z stands instead [mm]; the bed gives way under the column. Only X can be measured so: what its turns do by
+        the lever is read too.
 
     Raises
     ------
     SettingError
-        A position is beyond the travel.
+        A position is beyond the travel, or Z stands elsewhere while another axis than X is measured.
     """
     axis, unit = code[2].lower(), "um" if code[1] in "XYZ" else "urad"
     for a, p in ((axis, position), ("z", z)):
         if not 0.0 <= p <= TRAVEL[a]:
             raise SettingError(f"{a.upper()} = {p:g} mm is beyond the travel from 0 to {TRAVEL[a]:g} mm")
-    weights = between(axis, [position])[0]
+    if axis != "x" and z != TEST_POSITION["z"]:
+        raise SettingError(f"{code} cannot be measured with Z at {z:g} mm: only X can")
+    test, point = (np.array([TEST_POSITION[a] for a in AXES], dtype=np.float64) for _ in range(2))
+    point[AXES.index(axis)], point[2] = position, position if axis == "z" else z
+    weights, geometry = _between_two(code, position), float(cold(code, point))
     if unit == "um":
-        # A laser counts from where it was set to zero, again in each run; a level does not.
-        weights = weights - between(axis, [TEST_POSITION[axis]])[0]
-    found = zip(STATIONS[axis], weights.tolist(), strict=True)
-    reads = {name: w for p, w in found if w for name in station(code, p)}
-    point = np.array([TEST_POSITION["x"], TEST_POSITION["y"], z], dtype=np.float64)
-    point[AXES.index(axis)] = position
+        for turn, arm in swing(code[1], point - test):
+            # of the axes nearer to the workpiece, which stand still; of X itself if Z stands elsewhere
+            for nearer in NEARER[axis]:
+                weights = _summed((1.0, weights), (arm, _at_station(f"E{turn}{nearer.upper()}", TEST_POSITION[nearer])))
+        if axis == "x":
+            for turn, arm in swing(code[1], np.array([0.0, 0.0, z - TEST_POSITION["z"]])):
+                weights = _summed((1.0, weights), (arm, _between_two(f"E{turn}X", position)))
+                geometry += arm * float(cold(f"E{turn}X", point))
     aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
     words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
-    return Probe(words, reads, float(cold(code, point)), unit, SIX_NOISE[unit])
+    return Probe(words, weights, geometry, unit, SIX_NOISE[unit], zeroed=False)
+
+
+def _between_two(code: str, position: float) -> dict[str, float]:
+    """Return the weights of the observables in what a component is at a position less that at the test position."""
+    axis = code[2].lower()
+    weights = between(axis, [position])[0] - between(axis, [TEST_POSITION[axis]])[0]
+    found = zip(STATIONS[axis], weights.tolist(), strict=True)
+    return {name: w for p, w in found if w for name in station(code, p)}
+
+
+def _at_station(code: str, position: int) -> dict[str, float]:
+    """Return the weight of the observable that is a component at a station."""
+    return dict.fromkeys(station(code, position), 1.0)
+
+
+def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
+    """Return which turns move the end of a way along an axis, and by how much: turn x way.
+
+    Parameters
+    ----------
+    along : {'X', 'Y', 'Z'}
+    way : ndarray of shape (3,)
+        [mm]
+
+    Returns
+    -------
+    list of (str, float)
+        A, B or C, and um per urad; those that do not move it are left out.
+    """
+    x, y, z = (1e-3 * way).tolist()
+    arms = {"X": (("B", z), ("C", -y)), "Y": (("C", x), ("A", -z)), "Z": (("A", y), ("B", -x))}
+    return [(turn, arm) for turn, arm in arms[along] if arm]
 
 
 def square(code: str) -> Probe:
-    """Return the squareness of two axes, by an artefact; the thermal part is in the slopes of the straightness."""
-    return Probe(f"{code}: squareness, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
+    """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
+    return Probe(f"{code}: squareness at 20 degC, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
 
 
 #: X1 and Y1 at the tip of the test bar, X2 and Y2 towards the spindle: tilts A = (y1 - y2) / L, B = (x2 - x1) / L

@@ -56,9 +56,8 @@ class VolumetricTruth:
         Parameters
         ----------
         rows : ndarray of shape (n_observables,) or (n, n_observables)
-            Observables in one state, or in one for each point: how they have changed since the machine had its cold
-            geometry. That is, since 20 degC, as ``Truth.observables`` are, or since the start of a test, from where
-            displacements count, as ``SimulatedTest.observables`` are.
+            Observables in one state, or in one for each point, such as ``SimulatedTest.observables``: from the machine
+            at 20 degC on, which has its cold geometry.
         points : array-like of shape (n, 3)
             Positions of X, Y and Z [mm].
 

@@ -31,8 +31,9 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
 
     Notes
     -----
-    From the workpiece to the tool each body is moved by its position along its guide and by its translations, then
-    turned about its reference point.
+    Every body is turned about its reference point, which goes with it, and then moved by its position along its guide
+    and by its translations. Where the reference point stays with the workpiece's side, the body is moved by its
+    position first and then turned about that point.
     """
     tip = np.asarray(machine.tool if tool is None else tool, dtype=np.float64)
     shape = np.broadcast_shapes(values.shape[:-1], points.shape[:-1])
@@ -41,8 +42,12 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
     levers = Kinematics(machine)
     for name in machine.structure.axes:
         point = levers.reference(name)
-        move, turn = _moved(machine, name, values, points), _turned(_three(values, f"EA{name}"))
-        chain = chain @ _shifted(np.broadcast_to(point - at, (*shape, 3))) @ move @ turn
+        way, beside = _moved(machine, name, values, points)
+        turn = _turned(_three(values, f"EA{name}"))
+        if machine.axis(name).measured_on == "workpiece":
+            chain = chain @ _shifted(point - at + beside) @ turn @ _shifted(way)
+        else:
+            chain = chain @ _shifted(point - at + beside + way) @ turn
         at = point
     origins = sum((_three(values, f"XO{a}") for a in "XY" if a in machine.structure.axes), np.zeros((*shape, 3)))
     spindle = np.asarray(machine.spindle_tool, dtype=np.float64)
@@ -54,8 +59,8 @@ def error(machine: Machine, values: FloatArray, points: FloatArray, tool: ArrayL
     return np.asarray(1e3 * (there[..., :3] - wanted))
 
 
-def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the motion along an axis: along its guide, which is not square, and its three translations."""
+def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the way along an axis, and what its guide, which is not square, and its three translations add [mm]."""
     position = points[..., "XYZ".index(name)]
     way = position - machine.axis(name).reference_position
     square = np.zeros((*position.shape, 3))
@@ -64,8 +69,8 @@ def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) 
     elif name == "Z":
         square[..., 0], square[..., 1] = values[..., INDEX["A0Z"]], values[..., INDEX["B0Z"]]
     guide = _turned(square)[..., :3, :3] @ _UNIT[name]
-    beside = way[..., None] * (guide - _UNIT[name])
-    return _shifted(position[..., None] * _UNIT[name] + beside + 1e-3 * _three(values, f"EX{name}"))
+    beside = way[..., None] * (guide - _UNIT[name]) + 1e-3 * _three(values, f"EX{name}")
+    return position[..., None] * _UNIT[name], beside
 
 
 def _three(values: FloatArray, first: str) -> FloatArray:

@@ -49,8 +49,13 @@ class ErrorField:
         -------
         ndarray of shape (..., 32)
             In the order of `thermocomp.core.components.COMPONENTS` [um, urad].
+
+        Raises
+        ------
+        InputError
+            A position is not finite.
         """
-        places = np.asarray(points, dtype=np.float64)
+        places = finite("positions", points)
         xyz = coordinates(places)
         # component by component in memory: each is computed at all points in one go
         values = np.empty((len(self.uniform), *places.shape[:-1]))
@@ -75,9 +80,16 @@ class ErrorField:
         -------
         ndarray of shape (..., 3)
             Actual minus commanded, along X, Y, Z [um].
+
+        Raises
+        ------
+        InputError
+            A position or the tool is not finite.
         """
         places = np.asarray(points, dtype=np.float64)
         values = self.components(places)
+        if tool is not None:
+            finite("tool", tool)
         if exact:
             return transforms.error(self.kinematics.machine, values, places, tool)
         return self.kinematics.synthesize(values, places, tool)[0]
@@ -94,6 +106,11 @@ class ErrorField:
         -------
         ndarray of shape (..., 3)
             About X, Y, Z [urad].
+
+        Raises
+        ------
+        InputError
+            A position is not finite.
         """
         places = np.asarray(points, dtype=np.float64)
         return self.kinematics.synthesize(self.components(places), places)[1]
@@ -120,15 +137,16 @@ class ErrorField:
         Raises
         ------
         InputError
-            It does not settle within ten steps: the errors are no small ones.
+            It does not settle within ten steps: the errors are no small ones. Or a position or the tool is not finite.
 
         Notes
         -----
         Moved by c the machine errs by e(P + c), not by e(P): c = -e(P + c), by exact transforms, solved by inserting.
-        Along an axis that is not there nothing moves: c is zero in each step, and what is left is e(P + c).
+        Along an axis that is not there nothing moves: c is zero in each step, and what is left is e(P + c). Beyond the
+        travel the correction at its end is held: nothing was measured there, and levers and slopes must not go on.
         """
-        places = np.asarray(points, dtype=np.float64)
         machine = self.kinematics.machine
+        places = np.clip(finite("positions", points), *self.kinematics.travel)
         there = np.array([float(a in machine.structure.axes) for a in "XYZ"])
         found = 0.0 - there * self.error(places, tool)
         for _ in range(_STEPS):
@@ -155,5 +173,18 @@ class ErrorField:
         -------
         ndarray of shape (32, 3)
             [um per um, um per urad]
+
+        Raises
+        ------
+        InputError
+            A position or the tool is not finite.
         """
-        return self.kinematics.sensitivity(point, tool)
+        return self.kinematics.sensitivity(finite("position", point), None if tool is None else finite("tool", tool))
+
+
+def finite(what: str, numbers: ArrayLike) -> FloatArray:
+    """Return an array of positions or a tool [mm]; raise `InputError` if a number in it is not finite."""
+    found = np.asarray(numbers, dtype=np.float64)
+    if not np.isfinite(found).all():
+        raise InputError(f"{what}: must be finite numbers, found {found[~np.isfinite(found)][0]}")
+    return found

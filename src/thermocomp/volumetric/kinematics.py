@@ -36,6 +36,14 @@ class Kinematics:
         self.structure = machine.structure
         self.axes = {a.name: a for a in machine.axes}
 
+    @cached_property
+    def travel(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest positions, of shape (3,) each; infinite along an axis that is not there [mm]."""
+        low, high = np.full(3, -np.inf), np.full(3, np.inf)
+        for name, axis in self.axes.items():
+            low["XYZ".index(name)], high["XYZ".index(name)] = axis.travel
+        return low, high
+
     def lever(self, axis: str, points: FloatArray, tool: ArrayLike | None = None) -> FloatArray:
         """Return the way from an axis' reference point to the tool's tip.
 
@@ -52,14 +60,23 @@ class Kinematics:
         ndarray of shape (..., 3)
             [mm]
         """
-        moving = np.array([float(a in self.structure.beyond(axis)) for a in "XYZ"])
-        return moving * points + (self._tool(tool) - self.reference(axis))
+        return self._moving(axis) * points + (self._tool(tool) - self.reference(axis))
 
     def reference(self, axis: str) -> FloatArray:
         """Return an axis' reference point from the gauge point while all axes stand at 0, of shape (3,) [mm]."""
-        moving = np.array([float(a in self.structure.beyond(axis)) for a in "XYZ"])
         found = self.axes[axis]
-        return np.asarray(moving * np.asarray(found.measured_at) + np.asarray(found.measured_tool))
+        return np.asarray(self._moving(axis) * np.asarray(found.measured_at) + np.asarray(found.measured_tool))
+
+    def ways(self, axis: str) -> tuple[str, ...]:
+        """Return the axes whose ways since `Axis.measured_at` are levers of an axis.
+
+        Those beyond it; and itself, if the place where it was measured stays with the workpiece while it moves.
+        """
+        itself = (axis,) if self.axes[axis].measured_on == "workpiece" else ()
+        return (*itself, *self.structure.beyond(axis))
+
+    def _moving(self, axis: str) -> FloatArray:
+        return np.array([float(a in self.ways(axis)) for a in "XYZ"])
 
     def synthesize(
         self, values: FloatArray, points: FloatArray, tool: ArrayLike | None = None
@@ -130,7 +147,7 @@ class Kinematics:
             once[turn : turn + 3] = _turning(-self.reference(name))
             for k, unit in enumerate(np.eye(3)):
                 tool[k, turn : turn + 3] = _turning(unit)
-                if "XYZ"[k] in self.structure.beyond(name):
+                if "XYZ"[k] in self.ways(name):
                     position[k, turn : turn + 3] = _turning(unit)
             if name != "Z":
                 once[INDEX[f"XO{name}"] : INDEX[f"XO{name}"] + 3] = np.eye(3)

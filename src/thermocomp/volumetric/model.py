@@ -38,7 +38,7 @@ class VolumetricModel:
     Raises
     ------
     InputError
-        Two models take a channel of the same name for different quantities.
+        Two models take a channel of the same name for different quantities, or the do-no-harm gate refused one.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -58,6 +58,8 @@ class VolumetricModel:
             else:
                 self._constants[INDEX[code]] = source
         self._of_time = [k for k, _ in uniform], [m for _, m in uniform]
+        for model in models:
+            model.check_not_refused()
         self.stack = Stack(models)
 
     @property

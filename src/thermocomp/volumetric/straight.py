@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.machine import Vector
 from thermocomp.core.size import Size
-from thermocomp.volumetric.field import ErrorField
+from thermocomp.volumetric.field import ErrorField, finite
 
 FloatArray = NDArray[np.float64]
 
@@ -90,12 +90,17 @@ def straight_lines(
     -------
     StraightLines
 
+    Raises
+    ------
+    InputError
+        A position or the tool is not finite.
+
     Notes
     -----
     What a correction c leaves at a position P is e(P + c) + c: the machine errs as it does where it then stands.
     """
     machine = field.kinematics.machine
-    place = np.asarray(at, dtype=np.float64)
+    place = finite("at", at)
     axes = [(k, machine.axis(name)) for k, name in enumerate("XYZ") if name in machine.structure.axes]
 
     sides = [np.array([p]) for p in place]

@@ -69,7 +69,7 @@ def learn(seed: int) -> Learned:
     fits = dict(zip(COMPONENTS, found, strict=False))
     sources: dict[str, Source] = {code: fit.model for code, fit in fits.items()}
     for code in ("C0Y", "B0Z", "A0Z"):
-        sources[code] = float(np.mean([test.table[f"{code}_urad"].mean() for test in rounds]))
+        sources[code] = float(np.mean([test.table[f"{code}_urad"].iloc[list(COLD)].mean() for test in rounds]))
     return Learned(_machine(sources | _spindle(tests, inputs)), fits, found[-1])
 
 
@@ -85,9 +85,9 @@ def _component(code: str, rounds: Sequence[Recording], inputs: Sequence[str], co
     options = PositionOptions(
         method=METHOD,
         inputs=inputs,
-        offset=BY_CODE[code].unit == "urad",  # levels keep their zero, lasers do not
         coordinates=coordinates,
         reference=COLD,
+        rezero=False,  # the machine is not the same every morning
         reference_position=float(TEST_POSITION[code[2].lower()]),
     )
     profiles = [_profiles(code, test, flat=bool(flat)) for test in rounds]
@@ -99,22 +99,28 @@ def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
     """Return the profiles of a component; of EYX with Z at both ends of its travel too."""
     axis, unit = code[2], BY_CODE[code].unit
     stations = STATIONS[axis.lower()]
-    lines = [("", {})] if code != "EYX" or flat else [("_z0", {"z": 0}), ("", {}), ("_z600", {"z": 600})]
-    points = [[{**TEST_POSITION, **aside, axis.lower(): p}[a] for a in AXES] for _, aside in lines for p in stations]
-    columns = [f"{code}{suffix}_{p}_{unit}" for suffix, _ in lines for p in stations]
-    values = test.table[columns].to_numpy(dtype=np.float64)
-    return Profiles(code, unit, axis, np.array(points, dtype=np.float64), values, test)
+    lines: list[tuple[str, dict[str, float]]] = (
+        [("", {})] if code != "EYX" or flat else [("_z0", {"z": 0.0}), ("", {}), ("_z600", {"z": 600.0})]
+    )
+    points, values = [], []
+    for suffix, aside in lines:
+        reading = test.table[[f"{code}{suffix}_{p}_{unit}" for p in stations]].to_numpy(dtype=np.float64)
+        if aside:  # X with Z elsewhere: its roll has a lever
+            roll = test.table[[f"EAX_{p}_urad" for p in stations]].to_numpy(dtype=np.float64)
+            reading = reading + 1e-3 * (aside["z"] - TEST_POSITION["z"]) * roll
+        values.append(reading)
+        points += [[{**TEST_POSITION, **aside, axis.lower(): p}[a] for a in AXES] for p in stations]
+    return Profiles(code, unit, axis, np.array(points, dtype=np.float64), np.hstack(values), test)
 
 
 def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Source]:
-    """Learn the drifts of the spindle from the nest of probes; the tilts of the axes are not its own."""
+    """Learn the drifts at the test position from the nest of probes: of spindle, axes and their references together."""
     tilts = {
         "A0C": {"y1_um": 1.0 / PROBE_DISTANCE, "y2_um": -1.0 / PROBE_DISTANCE},
         "B0C": {"x2_um": 1.0 / PROBE_DISTANCE, "x1_um": -1.0 / PROBE_DISTANCE},
     }
     for code, weights in tilts.items():
-        levels = {f"E{code[0]}{a.upper()}_{TEST_POSITION[a]}_urad": -1.0 for a in AXES}
-        tests = [common.derived(test, Channel(code, "angle", "urad"), weights | levels) for test in tests]
+        tests = [common.derived(test, Channel(code, "angle", "urad"), weights) for test in tests]
     channels = {"X0C": "x1_um", "Y0C": "y1_um", "Z0C": "z_um", "A0C": "A0C", "B0C": "B0C"}
     samples = stack(list(tests), list(channels.values()), inputs)
     seen = np.ones(len(samples), dtype=np.bool_)

@@ -1,0 +1,87 @@
+"""What a user should know of a machine before its errors are added up: what may be counted twice, what is only held."""
+
+import numpy as np
+
+from thermocomp.core.components import BY_CODE
+from thermocomp.core.machine import Machine, Source
+from thermocomp.core.position import PositionModel
+from thermocomp.volumetric.kinematics import Kinematics
+
+#: a lever effect that nobody sees [um]
+NEGLIGIBLE = 0.05
+#: what is nearer to the end of a travel than that reaches it [mm]
+_NEAR = 1e-3
+
+
+def notes(machine: Machine) -> tuple[str, ...]:
+    """Return what is to be said of a machine, in sentences: `counted_twice`, then `held`."""
+    return (*counted_twice(machine), *held(machine))
+
+
+def counted_twice(machine: Machine) -> tuple[str, ...]:
+    """Return the turns that were not zero while another axis was measured.
+
+    An instrument between table and spindle that measures an axis j sees what the turn of an axis i nearer to the
+    workpiece does, turn times way of j, because the way of j is a lever of i. If the turn is not counted from the
+    position at which i stood then, readings and turn hold the same error.
+
+    Parameters
+    ----------
+    machine : Machine
+        In its reference state: constants and profiles; what models of time add begins at zero.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each turn and axis.
+    """
+    kinematics, found = Kinematics(machine), []
+    for axis in machine.structure.axes:
+        for other in kinematics.ways(axis):
+            stood = machine.axis(other).measured_at
+            low, high = machine.axis(other).travel
+            for about, letter in enumerate("ABC"):
+                along = "XYZ".index(other)
+                if about == along:  # a way along the axis of the turn is no lever
+                    continue
+                code, towards = f"E{letter}{axis}", "XYZ"[3 - about - along]
+                turn = _static(machine.components.get(code), np.array(stood))
+                effect = 1e-3 * abs(turn) * (high - low)
+                if effect < NEGLIGIBLE:
+                    continue
+                straightness, square = f"E{towards}{other}", _squareness(letter, other)
+                found.append(
+                    f"{code} is {turn:.3g} urad at {axis} {stood['XYZ'.index(axis)]:g} mm, where {axis} stood while "
+                    f"{other} was measured: over the travel of {other} it moves the tip by {effect:.3g} um along "
+                    f"{towards}. {' or '.join((straightness, *square))} holds that already if it was read between "
+                    f"table and spindle: then count {code} from {axis} {stood['XYZ'.index(axis)]:g} mm"
+                )
+    return tuple(found)
+
+
+def held(machine: Machine) -> tuple[str, ...]:
+    """Return the profiles and slopes that are known in a part of the travel only, one sentence each."""
+    found = []
+    for code, source in machine.components.items():
+        if not isinstance(source, PositionModel):
+            continue
+        for what, name, (low, high) in source.ranges():
+            first, last = machine.axis(name).travel
+            if low > first + _NEAR or high < last - _NEAR:
+                found.append(
+                    f"{code}: its {what} is known from {name} {low:g} to {high:g} mm, the axis goes from {first:g} to "
+                    f"{last:g} mm: beyond, the value at the end is held"
+                )
+    return tuple(found)
+
+
+def _static(source: Source | None, point: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    """Return what a component is at a point in the reference state."""
+    if isinstance(source, PositionModel):
+        return float(source.at(point, np.zeros(len(source.models))))
+    return float(source) if isinstance(source, float | int) else 0.0
+
+
+def _squareness(letter: str, axis: str) -> tuple[str, ...]:
+    code = f"{letter}0{axis}"
+    return (code,) if code in BY_CODE else ()
