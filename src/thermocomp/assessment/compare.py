@@ -235,7 +235,9 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.judge(measured, predicted, list(_segments(samples, rows))),
+        verdict=harm.judge(
+            measured, predicted, [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
+        ),
         sensors=model.sensors,
         n_sensors=(len(model.sensors), len(model.sensors)),
         fit_s=fit_s,

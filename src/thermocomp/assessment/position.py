@@ -29,7 +29,7 @@ MIN_STATES = 8
 
 @dataclass(frozen=True)
 class CycleErrors:
-    """Errors of the profiles of one thermal cycle.
+    """Errors of the profiles of one thermal cycle, or of a whole test that was left out.
 
     Parameters
     ----------
@@ -64,8 +64,9 @@ class PositionAssessment:
         Of all of them together.
     harmless : Verdict
     useful : Verdict or None
-        The do-no-harm gate: beside no compensation, in each cycle; and, over all of them together, beside the cold
-        profile alone, which tells whether the thermal part is of use. None if there is none.
+        The do-no-harm gate: beside no compensation, in each cycle or, if files were left out, in each of these; and,
+        over all of them together, beside the cold profile alone, which tells whether the thermal part is of use. None
+        if there is none.
     factors : tuple of HonestError
         Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
@@ -81,7 +82,7 @@ class PositionAssessment:
 
     @property
     def accepted(self) -> bool:
-        """True if the model is surely better than none in every cycle, and than its cold profile alone over all."""
+        """True if it is surely better than none wherever it was judged, and over all than its cold profile alone."""
         return self.harmless.accepted and (self.useful is None or self.useful.accepted)
 
     @property
@@ -318,8 +319,14 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
     if not filled.any():
         raise FitError(f"{tests[0].target}: no profile is left to judge on")
     rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
-    cycle = samples.cycle[rows]
-    segments = [(samples.cycle_names[k], filled & (cycle == k)) for k in np.unique(cycle)]
+    segments: list[tuple[str, BoolArray]] = []
+    for split, part in zip(one.judging.splits, parts, strict=True):
+        mine = filled & np.isin(rows, part.state)
+        if split.whole:
+            segments.append((split.name, mine))
+        else:
+            cycle = samples.cycle[rows]
+            segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
     none, geometric, left = rms.T
     # The gate looks at residual and drift of each row; those of a profile are its RMS.
     harmless = harm.judge(none, none - left, segments, least=MIN_STATES, unit=unit)

@@ -22,11 +22,19 @@ class Split:
     block : str
         Name of the unseen block.
     learn, judge : ndarray of bool of shape (n_rows,)
+    whole : bool
+        The gate judges the block as one; without it, each thermal cycle in it.
     """
 
     block: str
     learn: BoolArray
     judge: BoolArray
+    whole: bool = False
+
+    @property
+    def name(self) -> str:
+        """What was left out, without the word for what it is."""
+        return self.block.partition(" ")[2]
 
 
 @dataclass(frozen=True)
@@ -150,7 +158,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, learn from all others.
+    """Judge on each file in turn, learn from all others; what a day of several jobs leaves is judged as one.
 
     Raises
     ------
@@ -160,7 +168,9 @@ def leave_one_file_out(samples: Samples) -> Judging:
     n = len(samples.test_names)
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings")
-    splits = [Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k) for k in range(n)]
+    splits = [
+        Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
+    ]
     return Judging(f"leave one file out ({n} files)", tuple(splits))
 
 

@@ -107,12 +107,12 @@ class Moment:
         return self.field.error(points, self.tool, exact=True)
 
     def after_lines(self, points: FloatArray) -> FloatArray:
-        """Return what is left behind the straight lines of the axes, of shape (..., 3) [um]."""
+        """Return what is left after the straight lines of the axes, of shape (..., 3) [um]."""
         lines = {line.axis: line.correction for line in self.straight.lines}
         return left_by(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
-        """Return what is left behind the whole correction, a vector at every point, of shape (..., 3) [um]."""
+        """Return what is left after the whole correction, a vector at every point, of shape (..., 3) [um]."""
         correction = self.field.correction(points, self.tool)
         return self.error(points + 1e-3 * correction) + correction
 

@@ -106,7 +106,8 @@ def position(
     leave_one_file_out : bool
         Judge on each recording in turn (what is done with three and more).
     absolute : bool
-        Take temperatures as they are; without it they are counted from the cold states of each test.
+        Count all tests from one cold state, the mean of theirs, with temperatures as they are: for a machine that is
+        not the same every morning. Without it each test counts from its own.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     output : Path

@@ -78,27 +78,23 @@ def show_all(
     console.print(f"{len(found)} components, {states} profiles of each in {len(tests[0])} recording(s)")
     table = Table(
         caption="order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
-        "RMS over all points of unseen profiles, um or urad: without compensation, behind the cold profile, behind "
-        "the model"
+        "RMS over all points of unseen profiles, um or urad: without compensation, less the cold profile, less the "
+        "model; profile: the cold profile alone is taken"
     )
-    table.add_column("", no_wrap=True)
-    for heading in ("points", "order", "factors", "at, mm", "none", "cold profile", "model"):
-        table.add_column(heading, justify="left" if heading == "factors" else "right")
-    table.add_column("unit")
-    table.add_column("verdict", no_wrap=True)
-    for f, mine in zip(found, tests, strict=True):
+    for heading in ("", "order", "factors", "at", "none", "cold", "model", "verdict"):
+        left = heading in ("", "factors", "verdict")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=heading != "factors")
+    for f in found:
         model, overall = f.fit.model, f.assessment.overall
         turn = f"{model.reference_position:g}" if model.slopes else ""
         errors = (f"{v:.2f}" for v in (overall.none, overall.geometric, overall.model))
         table.add_row(
-            model.target,
-            str(len(mine[0].points)),
+            f"{model.target}, {model.unit}",
             "spline" if f.fit.profile.through else "+".join(str(o) for o in f.fit.profile.order if o) or "0",
             " ".join(f"k{k}" for k in model.powers) or "-",
             turn,
             *errors,
-            model.unit,
-            _verdict(f),
+            _verdict(f).replace("cold profile", "profile"),
         )
     console.print(table)
     _show_judging(found[0], left_open, console)
@@ -182,10 +178,10 @@ def _chosen(found: PositionStudy, left_open: Collection[Setting]) -> str:
 
 def _cycle_table(found: PositionStudy) -> Table:
     judged = found.assessment
-    told, heading = judged.cycles, "unseen cycle"
+    told, heading = judged.cycles, "unseen"
     if len(told) > FEW:
         told = tuple(sorted(told, key=lambda c: c.none and -c.model / c.none)[:WORST])
-        heading = f"unseen cycle: {WORST} worst of {len(judged.cycles)}"
+        heading = f"unseen: {WORST} worst of {len(judged.cycles)}"
     table = Table(caption=f"RMS over all points in {judged.unit}; max: largest error")
     table.add_column(heading)
     for column in ("profiles", "none", "cold profile", "model", "none max", "model max"):

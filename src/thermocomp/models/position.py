@@ -121,13 +121,13 @@ def fit_position(
     samples, slopes = slope_samples(tests, options, learn)
     seen = np.ones(len(samples), dtype=np.bool_) if learn is None else learn
     used = learned(tests, options, learn)
-    points = np.concatenate([test.points for test in used])
     position = np.concatenate([test.position for test in used])
-    cold = np.concatenate([test.cold(options.reference) for test in used])
-    _refuse_unreached(position, cold, tests[0])
+    _refuse_unreached(position, np.concatenate([test.cold(options.reference) for test in used]), tests[0])
+    # every cold state by itself: repeats tell the noise
+    rows = [test.values[test.reference_rows(options.reference)] for test in used]
     geometric = fit_profile(
-        points,
-        cold,
+        np.concatenate([np.tile(test.points, (len(r), 1)) for test, r in zip(used, rows, strict=True)]),
+        np.concatenate([r.ravel() for r in rows]),
         tests[0].axis,
         kind=options.profile,
         order=options.order,

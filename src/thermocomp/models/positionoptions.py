@@ -106,7 +106,8 @@ def suited(
     FitError
         No state may be looked at.
     """
-    tests = learned((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    tests = counted((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    tests = learned(tests, options, learn)
     thermal = remainder(tests, replace(options, offset=False), 0)
     shifted = {m: remainder(tests, replace(options, offset=True), m) for m in POWERS}
     if "reference_position" in left_open:

@@ -271,9 +271,12 @@ class Profiles:
         warm[self.reference_rows(reference)] = False
         freedom, squares = 0, 0.0
         # states with the same points are fitted together
-        pattern, kind = np.unique(np.isfinite(thermal), axis=0, return_inverse=True)
-        for k, there in enumerate(pattern):
-            mine, n = kind.ravel() == k, int(there.sum())
+        alike: dict[bytes, list[int]] = {}
+        for state, there in enumerate(np.isfinite(thermal)):
+            alike.setdefault(there.tobytes(), []).append(state)
+        for mine in alike.values():
+            there = np.isfinite(thermal[mine[0]])
+            n = int(there.sum())
             if n <= len(powers) or np.linalg.matrix_rank(columns[there]) < len(powers):
                 continue
             Q, R = np.linalg.qr(columns[there])

@@ -25,8 +25,8 @@ def headline(study: Volumetric) -> str:
     when = f"after {study.worst.time / 3600:.2f} h" if len(study.course.time) > 1 else "in the reference state"
     left = f"{everything.largest:.2f}" if everything.largest >= SETTLED else f"less than {SETTLED:g}"
     return (
-        f"Largest error in the work volume {none.largest:.1f} um, RMS {none.rms:.1f} um, {when}; behind the best "
-        f"straight line of each axis {lines.largest:.1f} um, RMS {lines.rms:.1f} um; behind a correction "
+        f"Largest error in the work volume {none.largest:.1f} um, RMS {none.rms:.1f} um, {when}; after the best "
+        f"straight line of each axis {lines.largest:.1f} um, RMS {lines.rms:.1f} um; after a correction "
         f"that is another one at every point {left} um"
     )
 

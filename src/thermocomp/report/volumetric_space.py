@@ -238,5 +238,9 @@ def _scale(ax: Axes, study: Volumetric, magnified: float, largest: float) -> Non
     x, y = corners[:, 0].min(), corners[:, 1].min() - 0.12 * float(np.ptp(corners[:, 1]))
     ax.plot([x, x + length], [y, y], color=MEASURED, lw=1.6, marker="|", ms=6)
     ax.text(
-        x + 1.15 * length, y, f"{size:g} um of error: drawn {magnified:,.0f} times as large", va="center", fontsize=8
+        x + length + 0.03 * float(np.ptp(corners[:, 0])),
+        y,
+        f"{size:g} um of error: drawn {magnified:,.0f} times as large",
+        va="center",
+        fontsize=8,
     )

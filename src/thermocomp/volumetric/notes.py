@@ -8,7 +8,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.volumetric.kinematics import Kinematics
 
 #: a lever effect that nobody sees [um]
-NEGLIGIBLE = 0.05
+NEGLIGIBLE = 0.5
 #: what is nearer to the end of a travel than that reaches it [mm]
 _NEAR = 1e-3
 

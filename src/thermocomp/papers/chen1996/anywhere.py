@@ -249,7 +249,7 @@ def claims(found: Volume) -> list[Claim]:
             "points, tools and thermal states of tests that were not learned from (RMS)",
             "ten times",
             f"{Errors.of(found.sizes[WITHOUT]).rms:.1f} -> {Errors.of(found.sizes[WITH]).rms:.2f} um, "
-            f"{found.gain():.1f} times, at the median point {median:.0f} times, at {share:.0%} of them ten times or more; "
+            f"{found.gain():.1f} times, at the median point {median:.0f} times, at {share:.0%} ten times or more; "
             f"{limits}; by component: {told}",
             found.gain() >= TENFOLD,
             "temperatures do not tell all that the screws and the spindle's shaft do",
