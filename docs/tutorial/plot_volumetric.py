@@ -6,7 +6,7 @@ A drift test tells the error at one place. A part is cut all over the table. Her
 has measured all three axes of the virtual machining centre again and again while it worked, probes have watched the
 tool at one place, and an artefact has told the squareness. From that we learn all 18 components of the axes, add them
 up anywhere in the work volume, and correct. The virtual machine knows its true error at every point, so we can judge
-what a shop never sees. The same with files and four commands: :doc:`../position`.
+what a shop never sees. The same with files and commands: :doc:`../position`.
 """
 
 # %%

@@ -113,15 +113,22 @@ def test_a_laser_of_six_degrees_reads_the_components() -> None:
     assert CENTRE.probe("EYY_550").reads == {"EYY@550": 1.0, "EYY@250": -1.0}
     assert CENTRE.probe("EYY_550").cold == pytest.approx(-18.53 + 2.24, abs=0.01)
     assert CENTRE.probe("EXX_300").reads == {}
-    # a level keeps its zero: a table that tilts alike wherever it stands is seen
-    assert CENTRE.probe("EAX_300").reads == {"EAX@300": 1.0}
+    assert CENTRE.probe("EAX_300").reads == {}
     assert CENTRE.probe("EAX_300").cold == 0.0
+    # 300 mm behind the test position Z is swung by the roll of X: a table that tilts moves what stands on it
+    assert CENTRE.probe("EYZ_600").reads == {"EYZ@600": 1.0, "EYZ@300": -1.0, "EAX@300": pytest.approx(-0.3)}
+    assert CENTRE.probe("EZY_350").reads["EAX@300"] == pytest.approx(0.1)
+    assert CENTRE.probe("EZY_350").reads["EAZ@300"] == pytest.approx(0.1)
     assert CENTRE.probe("EBZ_600").reads == {}
     assert CENTRE.probe("EBZ_600").cold != 0.0
     between = CENTRE.probe("EAY_75").reads
-    assert sum(between.values()) == pytest.approx(1.0)
-    assert {"EAY@50", "EAY@100"} < set(between)
-    assert CENTRE.probe("EYX_z600_0").reads == CENTRE.probe("EYX_0").reads
+    assert sum(between.values()) == pytest.approx(0.0)
+    assert {"EAY@50", "EAY@100", "EAY@250"} < set(between)
+    # with Z elsewhere the roll of X has a lever
+    roll = {"EAX@0": pytest.approx(-0.3), "EAX@300": pytest.approx(0.3)}
+    assert CENTRE.probe("EYX_z600_0").reads == CENTRE.probe("EYX_0").reads | roll
+    assert not CENTRE.probe("EYX_0").zeroed
+    assert CENTRE.probe("z").zeroed
     assert CENTRE.probe("C0Y").cold == 14.0
     for name, unit, noise in (("EXX_0", "um", 0.3), ("ECX_0", "urad", 0.5), ("A0Z", "urad", 0.5)):
         sensor = displacement(name, CENTRE.probe(name), perfect=False).sensor
@@ -130,6 +137,7 @@ def test_a_laser_of_six_degrees_reads_the_components() -> None:
     for wrong, message in (
         ("EYY_600", "Y = 600 mm is beyond"),
         ("EYX_z700_0", "Z = 700 mm is beyond"),
+        ("EYY_z0_100", "only X can"),
         ("EXW_0", "no probe 'EXW_0'"),
     ):
         with pytest.raises(InputError, match=message):
