@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from profilemachine import day, planted, profiles
-from thermocomp.assessment.position import MIN_STATES, study
-from thermocomp.assessment.splits import by_rows, leave_one_file_out
+from thermocomp.assessment.position import MIN_STATES, n_pieces, study, study_all
+from thermocomp.assessment.splits import by_rows, leave_one_cycle_out, leave_one_file_out
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Support
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.position import PositionOptions, fit_position
+from thermocomp.models.positionoptions import SETTINGS, suited
+from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.profiles import Profiles
 
 # each day is warmer than the one before, so the last one goes beyond what was learned
@@ -72,6 +74,7 @@ def test_a_model_that_is_no_better_than_its_cold_profile_is_refused() -> None:
     still = replace(made, values=made.values[0] + 0.3 * np.random.default_rng(0).normal(size=made.values.shape))
     judged = study(still, PositionOptions(method="ols")).assessment
     assert judged.harmless.accepted
+    assert judged.useful is not None
     assert not judged.useful.accepted
     assert not judged.accepted
     assert "beside its cold profile alone" in judged.reason
@@ -151,3 +154,96 @@ def test_replay_counts_from_the_reference_state_too() -> None:
     found = study(profiles(noise=0.1), replace(OLS, reference=(8, 9)))
     assert found.assessment.accepted
     assert found.assessment.overall.model < 0.2
+
+
+# -- settings left open, several components ---------------------------------------------------------------------------
+
+
+def test_settings_left_open_are_chosen_in_each_split_from_what_is_learned_there() -> None:
+    """The last day is bent: all together ask for m = 2, the two others for m = 1, and they are what it is judged by."""
+    straight, bent = profiles(noise=0.1), profiles(noise=0.1, second=60.0)
+    last = np.arange(72) >= 48
+    made = replace(straight, values=np.where(last[:, None], bent.values, straight.values))
+    found = study(made, OLS, left_open=SETTINGS)
+    assert found.options.slopes == 2
+    assert len(found.fit.model.slopes) == 2
+    others = suited(made, OLS, learn=~last)
+    assert others.slopes == 1
+    blind = fit_position(made, others, learn=~last)
+    change = (made.states.table - made.states.table.iloc[0]).to_numpy()[last]
+    k1 = change @ list(blind.model.slopes[0].coefficients_by_name().values())
+    left = [v - blind.model.at(made.points, np.array([k])) for v, k in zip(made.values[last], k1, strict=True)]
+    assert found.assessment.cycles[2].model == pytest.approx(np.sqrt(np.mean(np.square(left))))
+    # its factors are told in the powers of the whole, though it was predicted by one alone: the other was zero
+    honest = found.fit.model.slopes[1].honest_error
+    assert honest is not None
+    k2 = found.fit.slopes[0].factors[last, 1]
+    assert honest.cycles["day 3"] == pytest.approx(np.sqrt(np.mean(k2**2)), rel=1e-6)
+
+
+def test_predicted_factors_are_those_of_the_model_where_all_splits_agree() -> None:
+    made = profiles(noise=0.1)
+    left_open, fixed = (study(made, OLS, left_open=names) for names in (SETTINGS, ()))
+    assert left_open.assessment.cycles == fixed.assessment.cycles
+    learn = np.arange(72) >= 24
+    model = fit_position(made, OLS, learn=learn).model
+    change = (made.states.table - made.states.table.iloc[0]).to_numpy()[1:24]
+    k1 = change @ list(model.slopes[0].coefficients_by_name().values())
+    (honest,) = (m.honest_error for m in fixed.fit.model.slopes)
+    assert honest is not None
+    measured = made.slopes().factors[1:24, 0]
+    assert honest.cycles["day 1"] == pytest.approx(np.sqrt(np.mean((measured - k1) ** 2)))
+
+
+def test_noise_has_no_thermal_part() -> None:
+    made = profiles(noise=0.1)
+    noise = 0.3 * np.random.default_rng(0).normal(size=made.values.shape)
+    found = study(replace(made, values=made.values[0] + noise), PositionOptions(method="ols"), left_open=SETTINGS)
+    assert found.assessment.accepted
+    assert found.assessment.useful is None
+    assert found.dropped == "it is noise"
+    assert found.fit.model.models == ()
+    assert found.assessment.overall.model == found.assessment.overall.geometric
+    assert found.assessment.factors == ()
+
+
+def test_a_thermal_part_that_is_refused_leaves_the_cold_profile() -> None:
+    """Temperatures say nothing of this slope: it goes up and down as it likes, within what the cold profile is."""
+    made = profiles(noise=0.1)
+    rng = np.random.default_rng(3)
+    slope = np.concatenate([[0.0], 1.5 * rng.normal(size=71)])
+    wild = replace(made, values=made.cold() + np.outer(slope, 1e-3 * made.position) + 20.0)
+    options = PositionOptions(method="ols")
+    assert suited(wild, options).slopes == 1
+    refused = study(wild, options)
+    assert not refused.assessment.accepted
+    found = study(wild, options, left_open=SETTINGS)
+    assert found.assessment.accepted
+    assert found.fit.model.models == ()
+    assert "beside its cold profile alone" in found.dropped
+    # one that is refused with its profile stays refused
+    assert not study(replace(wild, values=wild.values - 1.5 * made.cold() - 20.0), options).assessment.accepted
+
+
+def test_a_file_that_is_left_out_is_judged_as_one() -> None:
+    """Each of its cycles is too short to prove anything."""
+    tests = [profiles(noise=0.1, seed=s, n_cycles=1) for s in range(3)]
+    short = [
+        replace(t, states=t.states.with_cycles([Cycle(f"job {k}", 4 * k, 4 * k + 4) for k in range(6)])) for t in tests
+    ]
+    assert not study(short, OLS).assessment.accepted
+    judged = study(short, OLS, judging=leave_one_file_out).assessment
+    assert judged.accepted
+    assert [(c.cycle, c.n_states) for c in judged.cycles] == [("made#1", 24), ("made#2", 24), ("made#3", 24)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_several_components_are_judged_as_each_alone(jobs: int) -> None:
+    first = profiles(noise=0.1)
+    second = replace(profiles(noise=0.1, second=20.0), target="EXY")
+    told: list[str] = []
+    both = study_all([[first], [second]], OLS, left_open=SETTINGS, jobs=jobs, progress=told.append)
+    alone = [study(p, OLS, left_open=SETTINGS) for p in (first, second)]
+    assert [f.assessment.cycles for f in both] == [f.assessment.cycles for f in alone]
+    assert [f.options.slopes for f in both] == [1, 2]
+    assert len(told) == n_pieces([[first], [second]], OLS, leave_one_cycle_out) == 8

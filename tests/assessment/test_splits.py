@@ -1,10 +1,14 @@
 """Splits: nothing judged was learned from, and never at random."""
 
+import itertools
+
+import numpy as np
 import pytest
 
 from smallmachine import small_machine
-from thermocomp.assessment import splits
+from thermocomp.assessment import splits, study
 from thermocomp.core.exceptions import InputError
+from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
@@ -41,6 +45,48 @@ def test_files(recording: Recording) -> None:
     judging = splits.leave_one_file_out(two)
     assert [s.judge.sum() for s in judging.splits] == [800, 400]
     assert two.test_names == ("small#1", "small#2")
+
+
+def test_cycles_too_short_to_judge_by_go_with_the_one_before() -> None:
+    lengths = [(5, 30, 10, 10, 25, 3), (12, 9, 40), (7,)]
+    cycle, test, k = [], [], 0
+    for n, mine in enumerate(lengths):
+        for rows in mine:
+            cycle += [k] * rows
+            test += [n] * rows
+            k += 1
+    found = splits.stretches(np.array(cycle), np.array(test), least=20)
+    assert [block.tolist() for block in found] == [[0, 1, 2, 3], [4, 5], [6, 7], [8], [9]]
+    assert [b.tolist() for b in splits.stretches(np.array(cycle), np.array(test), least=1)] == [[j] for j in range(k)]
+
+
+def test_short_cycles_are_left_out_together(recording: Recording) -> None:
+    ends = [0, 200, 210, 215, 500, 790, 800]
+    cut = recording.with_cycles([Cycle(str(k), a, b) for k, (a, b) in enumerate(itertools.pairwise(ends))])
+    samples = stack([cut], ["z_um"])
+    judging = splits.leave_one_cycle_out(samples)
+    assert [s.block for s in judging.splits] == ["cycle 0 and 2 more", "cycle 3", "cycle 4 and 1 more"]
+    assert [int(s.judge.sum()) for s in judging.splits] == [215, 285, 300]
+    assert judging.name == "leave one thermal cycle out (6 cycles, 3 of them too short: out with the one before)"
+    fitted = study.fit(samples, "ols", judging)
+    (model,) = fitted.models
+    assert model.honest_error is not None
+    assert set(model.honest_error.cycles) == {"0 and 2 more", "3", "4 and 1 more"}
+    assert np.isfinite(list(model.honest_error.cycles.values())).all()
+    judged = study.assess([model], [cut])
+    assert [a.block for a in judged.assessments] == [
+        "cycle 0 and 2 more",
+        "cycle 3",
+        "cycle 4 and 1 more",
+        "all cycles",
+    ]
+
+
+def test_a_file_is_judged_as_one(recording: Recording) -> None:
+    two = stack([recording, small_machine((1500.0, 500.0), seed=1)], ["z_um"])
+    fitted = study.fit(two, "ols", splits.leave_one_file_out(two))
+    (whole,) = fitted.comparison.overall()
+    assert [c.cycle for c in whole.verdict.cycles] == ["small#1", "small#2"]
 
 
 @pytest.mark.parametrize("text", ["0.75", "a/b", "0.9/0.2", "0/1", "3h/x", "500h/3h", "0.75/0.25/0.1", "nan/0.1"])

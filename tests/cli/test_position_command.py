@@ -3,10 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from profilemachine import profiles
+from thermocomp.cli import positiontables
 from thermocomp.cli.app import run
 from thermocomp.files import positionfile
 
@@ -119,6 +121,103 @@ def test_nothing_is_written_over(wide: Path, tmp_path: Path, capsys: pytest.Capt
     assert run(["position", str(wide), "--component", "EYY", "-o", str(wide), "--overwrite"]) == 2
     assert "is also an input" in capsys.readouterr().err
     assert output.read_text(encoding="utf-8") == "precious"
+
+
+# -- several components ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> list[Path]:
+    """Return three days: EYY warms by a slope, EXY is noise, EAY shifts as a whole; EYY with Z elsewhere too."""
+    paths = []
+    for day in range(3):
+        made = profiles(noise=0.1, seed=day, n_cycles=1)
+        change = (made.states.table - made.states.table.iloc[0]).to_numpy()[:, :1]
+        rng = np.random.default_rng(day)
+        still = np.linspace(-3, 3, 12) + 0.2 * rng.normal(size=made.values.shape)
+        errors = {
+            "EYY_{}_um": made.values,
+            "EXY_{}_um": still,
+            "EAY_{}_urad": still + 2.0 * change,
+            "EYY_z600_{}_um": made.values,
+        }
+        columns = {
+            name.format(f"{p:g}"): values[:, k] for name, values in errors.items() for k, p in enumerate(made.position)
+        }
+        table = pd.concat([made.states.table, pd.DataFrame(columns)], axis=1)
+        table.insert(0, "time_s", made.states.time)
+        paths.append(tmp_path / f"day{day}.csv")
+        table.to_csv(paths[-1], index=False)
+    return paths
+
+
+def test_all_components_in_one_file(machine: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "axes.json"
+    assert run(["position", *map(str, machine), "--component", "all", "--model", "ols", "-o", str(output)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "3 components, 72 profiles of each in 3 recording(s)" in said
+    assert "note not taken: EYY_z600_0_um to EYY_z600_550_um" in said
+    assert "Judged on: leave one file out (3 files); settings are chosen anew in each" in said
+    assert "cold profile alone EXY: thermal part: it is noise" in said
+    models = {m.target: m for m in positionfile.read(output)}
+    assert {code: m.powers for code, m in models.items()} == {"EXY": (), "EYY": (1,), "EAY": (0,)}
+    assert all(part.accepted for m in models.values() for part in m.models)
+
+
+def test_several_for_machines(machine: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["position", *map(str, machine), "--component", "EYY", "EAY", "--model", "ols", "--json"]
+    assert run([*arguments, "--no-offset", "--leave-one-cycle-out", "--absolute", "--jobs", "1"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [c["target"] for c in told["components"]] == ["EYY", "EAY"]
+    assert told["components"][0]["chosen_by_profiles"] == ["slopes", "reference_position"]
+    assert told["components"][1]["factors"][0]["power"] == 1
+    assert "thermal cycle" in told["judging"]
+    assert told["file"] is None
+
+
+def test_settings_are_told_and_can_be_given(machine: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["position", *map(str, machine), "--component", "EYY", "--model", "ols"]
+    assert run(arguments) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Chosen by the profiles: --slopes 1 --no-offset --reference-position 0" in said
+    assert run([*arguments, "--slopes", "1", "--no-offset", "--reference-position", "300"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Chosen by" not in said
+    assert "chosen anew" not in said
+    assert "do not turn about 300 mm" in said
+    assert run([*arguments, "--slopes", "0"]) == 0
+    assert "k1 [um/m] =" not in capsys.readouterr().out
+
+
+def test_long_formulas_and_many_cycles_are_shortened(
+    machine: list[Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(positiontables, "FORMULA", 30)
+    monkeypatch.setattr(positiontables, "FEW", 2)
+    monkeypatch.setattr(positiontables, "WORST", 1)
+    assert run(["position", *map(str, machine), "--component", "EYY", "--model", "ols"]) == 0
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "... and 1 terms more (--json has them)" in said
+    assert "standard errors" not in said
+    assert "the 1 worst of 3; RMS over all points in um" in said
+    assert said.count(" day0 ") + said.count(" day1 ") + said.count(" day2 ") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["all", "--columns", "y_*"], "are for one component"),
+        (["EYY", "EXY", "--layout", "long"], "are for one component"),
+        (["EYY", "EBY"], "no column is called after EBY, such as EBY_250_urad"),
+        (["all", "--jobs", "0"], "--jobs 0"),
+        (["all", "--split", "0.5/0.5", "--leave-one-cycle-out"], "exclude each other"),
+    ],
+)
+def test_what_cannot_be_done_with_several(
+    options: list[str], message: str, machine: list[Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["position", *map(str, machine), "--component", *options]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_help_is_the_docstring(capsys: pytest.CaptureFixture[str]) -> None:

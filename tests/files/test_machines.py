@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from thermocomp.core.machine import Axis, Source
 from thermocomp.core.model import ErrorModel, HonestError, Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
+from thermocomp.core.profile import PolynomialProfile
 from thermocomp.core.structure import Structure
 from thermocomp.core.terms import Variable
 from thermocomp.files import modelfile, positionfile
@@ -345,3 +347,29 @@ def test_numbers_in_another_unit_are_seen(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=re.escape(message)):
             read_machine(written(tmp_path, WHOLE + text))
     read_machine(written(tmp_path, WHOLE + 'EXX = "10 mm"\nC0Y = "-10 mrad"'))
+
+
+def test_the_virtual_machine_takes_18_components_from_one_file(tmp_path: Path) -> None:
+    """docs/files/virtual.toml, with what `thermocomp position --component all` and `thermocomp fit` write."""
+    shutil.copy(Path(__file__).parents[2] / "docs" / "files" / "virtual.toml", tmp_path)
+    axes = [c for c in COMPONENTS if c.group == "axis"]
+    low, high = (0.0, 0.0, 0.0), (600.0, 550.0, 600.0)
+    models = [
+        PositionModel(
+            target=c.code,
+            unit=c.unit,
+            axis=c.depends_on or "",
+            travel=(0.0, 550.0),
+            profile=PolynomialProfile(exponents=((0, 0, 0),), coefficients=(float(k),), low=low, high=high),
+        )
+        for k, c in enumerate(axes)
+    ]
+    positionfile.write(models[::-1], tmp_path / "axes.json")
+    drifts = [drift(name) for name in ("x1_um", "y1_um", "z_um")]
+    modelfile.write(drifts, tmp_path / "spindle.json")
+    machine = read_machine(tmp_path / "virtual.toml")
+    assert [machine.components[c.code] for c in axes] == models
+    assert {code: machine.components[code] for code in ("C0Y", "B0Z", "A0Z")} == {"C0Y": 14, "B0Z": -21, "A0Z": 17}
+    assert [machine.components[code] for code in ("X0C", "Y0C", "Z0C")] == drifts
+    assert machine.axis("Y").measured_at == (300.0, 250.0, 300.0)
+    assert machine.tool == machine.spindle_tool == (0.0, 0.0, -150.0)

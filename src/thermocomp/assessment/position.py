@@ -1,6 +1,6 @@
 """Judge models of position-dependent errors: whole profiles, in thermal cycles that were not learned from."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -116,7 +116,7 @@ def study(
     profiles: Profiles | Sequence[Profiles],
     options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
     *,
-    left_open: Collection[Setting] = (),
+    left_open: Sequence[Setting] = (),
     judging: Callable[[Samples], Judging] = leave_one_cycle_out,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
@@ -132,7 +132,7 @@ def study(
     profiles : Profiles or sequence of Profiles
         Of one component, one per test.
     options : PositionOptions
-    left_open : collection of {'slopes', 'offset', 'reference_position'}
+    left_open : sequence of {'slopes', 'offset', 'reference_position'}
         Settings that the profiles tell, in place of `options`; see `thermocomp.models.positionoptions.suited`. If it is
         open how many slopes there are and the thermal part is refused, the cold profile alone is judged and taken.
     judging : callable
@@ -162,7 +162,7 @@ def study_all(
     components: Sequence[Sequence[Profiles]],
     options: PositionOptions = PositionOptions(),  # noqa: B008 - frozen
     *,
-    left_open: Collection[Setting] = (),
+    left_open: Sequence[Setting] = (),
     judging: Callable[[Samples], Judging] = leave_one_cycle_out,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
@@ -197,7 +197,7 @@ def study_all(
 def _studies(
     whole: Sequence["_All"],
     options: PositionOptions,
-    left_open: Collection[Setting],
+    left_open: Sequence[Setting],
     jobs: int,
     progress: Callable[[str], None],
 ) -> list[PositionStudy]:
@@ -241,7 +241,7 @@ def _splits(
 
 
 def _piece(
-    tests: tuple[Profiles, ...], options: PositionOptions, left_open: Collection[Setting], split: Split | None
+    tests: tuple[Profiles, ...], options: PositionOptions, left_open: Sequence[Setting], split: Split | None
 ) -> tuple[str, Any]:
     """Judge one split; or, without one, fit everything."""
     learn = None if split is None else split.learn

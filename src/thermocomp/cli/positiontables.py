@@ -1,7 +1,7 @@
 """What ``thermocomp position`` found, as tables for people and as plain numbers for programs."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
@@ -19,7 +19,7 @@ FEW, WORST = 12, 5
 FORMULA = 300
 
 
-def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Collection[Setting], console: Console) -> None:
+def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:
     """Print all about one component."""
     fit, judged = found.fit, found.assessment
     model, unit = fit.model, fit.model.unit
@@ -69,7 +69,7 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Collection[
 def show_all(
     found: Sequence[PositionStudy],
     tests: Sequence[Sequence[Profiles]],
-    left_open: Collection[Setting],
+    left_open: Sequence[Setting],
     console: Console,
 ) -> None:
     """Print several components, a line each."""
@@ -105,7 +105,7 @@ def show_all(
             console.print(f"[yellow]cold profile alone[/] {f.fit.model.target}: thermal part: {escape(f.dropped)}")
 
 
-def content(found: PositionStudy, left_open: Collection[Setting]) -> dict[str, Any]:
+def content(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any]:
     """Return all about one component, as plain numbers."""
     fit, judged = found.fit, found.assessment
     model = fit.model
@@ -161,12 +161,12 @@ def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
         console.print(f"[dim]note[/] {escape(note)}", soft_wrap=True)
 
 
-def _show_judging(found: PositionStudy, left_open: Collection[Setting], console: Console) -> None:
+def _show_judging(found: PositionStudy, left_open: Sequence[Setting], console: Console) -> None:
     anew = "; settings are chosen anew in each" if left_open else ""
     console.print(f"Judged on: {found.assessment.protocol}{anew}")
 
 
-def _chosen(found: PositionStudy, left_open: Collection[Setting]) -> str:
+def _chosen(found: PositionStudy, left_open: Sequence[Setting]) -> str:
     model = found.fit.model
     told = {
         "slopes": f"--slopes {len(model.slopes)}",
@@ -178,12 +178,12 @@ def _chosen(found: PositionStudy, left_open: Collection[Setting]) -> str:
 
 def _cycle_table(found: PositionStudy) -> Table:
     judged = found.assessment
-    told, heading = judged.cycles, "unseen"
+    told, which = judged.cycles, ""
     if len(told) > FEW:
         told = tuple(sorted(told, key=lambda c: c.none and -c.model / c.none)[:WORST])
-        heading = f"unseen: {WORST} worst of {len(judged.cycles)}"
-    table = Table(caption=f"RMS over all points in {judged.unit}; max: largest error")
-    table.add_column(heading)
+        which = f"the {WORST} worst of {len(judged.cycles)}; "
+    table = Table(caption=f"{which}RMS over all points in {judged.unit}; max: largest error")
+    table.add_column("unseen")
     for column in ("profiles", "none", "cold profile", "model", "none max", "model max"):
         table.add_column(column, justify="right")
     for c in (*told, judged.overall):

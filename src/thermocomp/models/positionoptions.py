@@ -1,6 +1,6 @@
 """How a position-dependent error is modelled, and what of that its own profiles tell."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -75,7 +75,7 @@ class PositionOptions:
 def suited(
     profiles: Profiles | Sequence[Profiles],
     options: PositionOptions = PositionOptions(),
-    left_open: Collection[Setting] = SETTINGS,
+    left_open: Sequence[Setting] = SETTINGS,
     *,
     learn: BoolArray | None = None,
 ) -> PositionOptions:
@@ -93,7 +93,7 @@ def suited(
         Of one component, one per test.
     options : PositionOptions
         What is not left open stays.
-    left_open : collection of {'slopes', 'offset', 'reference_position'}
+    left_open : sequence of {'slopes', 'offset', 'reference_position'}
     learn : ndarray of bool of shape (n_states,), optional
         States that may be looked at; see `thermocomp.models.position.fit_position`.
 
