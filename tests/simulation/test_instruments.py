@@ -125,8 +125,8 @@ def test_a_laser_of_six_degrees_reads_the_components() -> None:
     assert sum(between.values()) == pytest.approx(0.0)
     assert {"EAY@50", "EAY@100", "EAY@250"} < set(between)
     # with Z elsewhere the roll of X has a lever
-    roll = {"EAX@0": pytest.approx(-0.3), "EAX@300": pytest.approx(0.3)}
-    assert CENTRE.probe("EYX_z600_0").reads == CENTRE.probe("EYX_0").reads | roll
+    roll: dict[str, object] = {"EAX@0": pytest.approx(-0.3), "EAX@300": pytest.approx(0.3)}
+    assert CENTRE.probe("EYX_z600_0").reads == {**CENTRE.probe("EYX_0").reads, **roll}
     assert not CENTRE.probe("EYX_0").zeroed
     assert CENTRE.probe("z").zeroed
     assert CENTRE.probe("C0Y").cold == 14.0
