@@ -189,9 +189,9 @@ assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 # The paper's headline, on the two new tests, on another day of the Y axis, and in the whole work volume. The fit is not
 # asked any more here: these are errors that a part would have had.
 #
-# For the volume all six components of each axis are measured by lasers and levels in several thermal states, the
-# spindle's drift by a nest of probes, on eight days of work; each component becomes a cold profile and thermal slopes. On
-# two other days, at a thousand random points and moments, the machine is then corrected by what these models say of it,
+# For the volume all six components of each axis are measured by lasers in several thermal states, the drift at one
+# point by a nest of probes, on eight days of work; each component becomes a cold profile and thermal slopes. On two
+# other days, at a thousand random points and moments, the machine is then corrected by what these models say of it,
 # and judged by what it truly does.
 
 tell("C-01", "C-05", "C-06", "C-35")

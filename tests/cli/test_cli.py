@@ -49,6 +49,18 @@ def printed(capsys: pytest.CaptureFixture[str]) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
+def test_fit_predicts_a_tilt_of_two_probes(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "m.json"
+    tilt = ["--target", "z_um", "--tilt", "A0C=z_um:x_um:100mm", "--model", "ols", "--split", "0.75/0.25"]
+    assert run(["fit", str(drift), *tilt, "--jobs", "1", "-o", str(model), "--json"]) in (0, 1)
+    capsys.readouterr()
+    displacement, angle = modelfile.read(model)
+    assert (displacement.target, displacement.unit) == ("z_um", "um")
+    assert (angle.target, angle.unit) == ("A0C", "urad")
+    assert run(["fit", str(drift), "--target", "z_um", "--tilt", "A0C=z_um:100mm", "-o", str(model)]) == 2
+    assert "write name, probe at the tip" in " ".join(capsys.readouterr().err.split())
+
+
 def test_compare_as_json(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = [
         "compare",

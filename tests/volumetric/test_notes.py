@@ -8,7 +8,7 @@ from thermocomp.core.machine import Axis, Machine, Source, Vector
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
-from thermocomp.volumetric.notes import counted_twice, held, notes
+from thermocomp.volumetric.notes import counted_twice, held, notes, untilted
 from volumetricmachine import line
 
 
@@ -96,3 +96,25 @@ def test_what_is_known_of_a_part_of_the_travel_is_held() -> None:
     )
     assert notes(machine) == (*counted_twice(machine), *held(machine))
     assert len(notes(machine)) == 3
+
+
+def test_a_tool_of_another_length_wants_the_tilt() -> None:
+    def told(tool: float, **components: Source) -> tuple[str, ...]:
+        machine = Machine(
+            "mill",
+            Structure.parse("XYZ"),
+            tuple(Axis(a, (0.0, 500.0)) for a in "XYZ"),
+            components,
+            spindle_tool=(0.0, 0.0, -150.0),
+            tool=(0.0, 0.0, -tool),
+        )
+        return untilted(machine)
+
+    assert told(150.0, Z0C=5.0) == ()
+    assert told(250.0) == ()  # nothing is said of the spindle at all
+    (both,) = told(250.0, Z0C=5.0)
+    assert both.startswith("A0C and B0C are not known: the tip of the tool is 100 mm")
+    assert both.endswith("10 urad of tilt would move it by 1.0 um")
+    (one,) = told(250.0, Z0C=5.0, A0C=1.0)
+    assert one.startswith("B0C is not known")
+    assert told(250.0, Z0C=5.0, A0C=1.0, B0C=0.0) == ()

@@ -265,8 +265,17 @@ def _residuals(recording: Recording, models: Sequence[ErrorModel]) -> tuple[dict
 
 
 def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel | None) -> list[str]:
-    """Return what is missing of what the standard wants to be told."""
+    """Return what is missing of what the standard wants to be told, and what does not go with the kind of the test."""
     notes = []
+    runs = detect(recording)
+    if kind == "etve" and not (recording.speed or recording.of_quantity("feed")):
+        notes.append("neither a spindle speed nor a feed was recorded: whether the machine was at rest is not known")
+    elif runs == "spindle" and kind != "spindle":
+        notes.append("the spindle turned in this test: what it did is in the figures too")
+    elif kind == "spindle" and runs != "spindle":
+        notes.append("no turning spindle was recorded: the figures are not those of a spindle test")
+    elif kind == "etve" and runs == "axis":
+        notes.append("an axis moved in this test: the figures are not those of the environment alone")
     named, used = paired_names(recording), {n for p in pairs for n in (p.tip, p.spindle)}
     untold = [f"{named[a, 1]} and {named[a, 2]}" for a in "xy" if {(a, 1), (a, 2)} <= named.keys()]
     if untold and not used:
@@ -333,7 +342,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
     """Say what the spindle or the axis did while it ran."""
     if kind == "etve":
-        return "machine at rest"
+        return "machine at rest" if recording.of_quantity("spindle_speed") else "taken as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")
     channels = recording.of_quantity(quantity)
     values = np.abs(recording.values(channels)[start + 1 : stop + 1]) if channels else np.empty((0, 0))

@@ -21,6 +21,9 @@ from thermocomp.volumetric.model import ThermalStates, VolumetricModel
 from thermocomp.volumetric.straight import StraightLines, left_by, straight_lines
 
 FloatArray = NDArray[np.float64]
+
+#: points of a grid along each axis; more take memory and tell nothing new
+FINEST = 50
 #: rows in which the largest error is looked for
 _LOOKED_AT = 2000
 _START, _LARGEST, _END = "start", "largest", "end"
@@ -163,7 +166,7 @@ class Volumetric:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What is to be said of the machine: see `thermocomp.volumetric.notes`."""
-        return notes.notes(self.machine)
+        return notes.notes(replace(self.machine, tool=self.course.tool))
 
     @property
     def worst(self) -> Moment:
@@ -213,6 +216,8 @@ def study(
         A point or a time is outside, the recording lacks a channel, or measures something else by it.
     """
     tip = machine.tool if tool is None else tool
+    if grid > FINEST:
+        raise InputError(f"a grid of {grid} points along each axis: at most {FINEST}, that tells the same")
     if grid < 2:
         raise InputError(f"a grid of {grid} points along an axis has no extent: want at least 2")
     if recording is None and hours:

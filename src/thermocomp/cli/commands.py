@@ -4,6 +4,7 @@ What needs the training wing is imported inside the commands, so that ``thermoco
 without it.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,6 +16,7 @@ from thermocomp.cli.options import (
     Flag,
     Json,
     Names,
+    OptionalNames,
     OptionalOutput,
     Output,
     Recordings,
@@ -223,6 +225,7 @@ def fit(
     *,
     study: Study,
     model: str = "dynamic",
+    tilt: OptionalNames = None,
     output: Output,
     support: Policy = "clip",
     margin: float = 0.25,
@@ -243,6 +246,9 @@ def fit(
         What is predicted from what, and on what it is judged.
     model : str
         A method as in ``thermocomp compare``, all but gp.
+    tilt : list of str
+        Tilts to predict too, each of two probes and their distance, such as A0C=y1_um:y2_um:100mm (turn about X, the
+        probe at the tip first) or B0C=x1_um:x2_um:100mm (about Y).
     output : Path
         Model file to write (.json).
     support : str
@@ -260,6 +266,11 @@ def fit(
         0 done, 1 a component was refused, 2 unusable input.
     """
     tests = read_recordings(recordings, study.mapping)
+    if tilt:
+        with needs("study"):
+            from thermocomp.recording.tilts import with_tilts
+        tests, names = with_tilts(tests, tilt)
+        study = replace(study, target=[*study.target, *names])
     with needs("study"):
         from thermocomp.assessment import study as studies
         from thermocomp.assessment.compare import n_pieces

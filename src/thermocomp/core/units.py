@@ -91,6 +91,8 @@ _ALIASES = {
     "μm": "um",
     "micron": "um",
     "inch": "in",
+    "um/m": "urad",
+    "µm/m": "urad",
     "µrad": "urad",
     "μrad": "urad",
     "rpm": "1/min",

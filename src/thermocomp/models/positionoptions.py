@@ -66,6 +66,10 @@ class PositionOptions:
     rezero: bool = True
     support: Support = Support()
 
+    def __post_init__(self) -> None:
+        if self.reference_position is not None and not np.isfinite(self.reference_position):
+            raise InputError(f"reference position {self.reference_position} mm: must be a finite number")
+
     @property
     def powers(self) -> tuple[int, ...]:
         """Powers of q whose factors are modelled."""

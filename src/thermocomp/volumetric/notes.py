@@ -14,8 +14,27 @@ _NEAR = 1e-3
 
 
 def notes(machine: Machine) -> tuple[str, ...]:
-    """Return what is to be said of a machine, in sentences: `counted_twice`, then `held`."""
-    return (*counted_twice(machine), *held(machine))
+    """Return what is to be said of a machine, in sentences: `untilted`, `counted_twice`, `held`."""
+    return (*untilted(machine), *counted_twice(machine), *held(machine))
+
+
+def untilted(machine: Machine) -> tuple[str, ...]:
+    """Return that the spindle's tilt is not known though the tool is not as long as what its drift was measured with.
+
+    Parameters
+    ----------
+    machine : Machine
+    """
+    longer = float(np.linalg.norm(np.subtract(machine.tool, machine.spindle_tool)))
+    unknown = [code for code in ("A0C", "B0C") if code not in machine.components]
+    drifts = any(code in machine.components for code in ("X0C", "Y0C", "Z0C"))
+    if not (unknown and drifts and longer > _NEAR):
+        return ()
+    verb = "is" if len(unknown) == 1 else "are"
+    return (
+        f"{' and '.join(unknown)} {verb} not known: the tip of the tool is {longer:g} mm from where the drift of the "
+        f"spindle was measured, and 10 urad of tilt would move it by {1e-2 * longer:.1f} um",
+    )
 
 
 def counted_twice(machine: Machine) -> tuple[str, ...]:
