@@ -167,3 +167,17 @@ def test_the_documentation_shows_what_is_printed(title: str, folder: Path, capsy
     there, here = (text.split(title)[1].split("└")[0] for text in (shown, printed))
     assert re.sub(r"[-\d.\s]", "", there) == re.sub(r"[-\d.\s]", "", here)
     assert numbers(there) == pytest.approx(numbers(here), abs=0.5)
+
+
+def test_what_does_not_go_with_the_test_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "pos.csv"
+    table.write_text("y_mm,deviation_um,direction,run\n0,1,+,1\n", encoding="utf-8")
+    assert run(["iso230", str(table)]) == 2
+    assert "--positioning" in capsys.readouterr().err
+    rest = tmp_path / "rest.csv"
+    lines = [f"{60 * k},{20 + 0.01 * k},{0.1 * k}" for k in range(120)]
+    rest.write_text("time_s,t_air_C,z_um\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    assert run(["iso230", str(rest)]) == 0
+    assert "neither a spindle speed nor a feed was recorded" in " ".join(capsys.readouterr().out.split())
+    assert run(["iso230", str(rest), "--test", "spindle"]) == 0
+    assert "no turning spindle was recorded" in " ".join(capsys.readouterr().out.split())

@@ -226,3 +226,10 @@ def test_the_help_is_the_docstring(capsys: pytest.CaptureFixture[str]) -> None:
     for option in ("--component", "--columns", "--layout", "--slopes", "--reference", "--json"):
         assert option in said
     assert "States of each test that count as cold" in said
+
+
+def test_one_state_has_no_thermal_part(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text("time_s,t_nut_C,y_0_um,y_100_um,y_200_um\n0,20,0,1,2\n", encoding="utf-8")
+    assert run(["position", str(path), "--component", "EYY", "-o", str(tmp_path / "eyy.json")]) == 2
+    assert "1 thermal state(s)" in capsys.readouterr().err

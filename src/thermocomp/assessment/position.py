@@ -12,7 +12,7 @@ from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.compare import ALL
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
-from thermocomp.core.exceptions import FitError
+from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import HonestError
 from thermocomp.core.size import Size
 from thermocomp.models.position import PositionFit, fit_position, slope_samples
@@ -23,6 +23,8 @@ from thermocomp.recording.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+#: with fewer thermal states there is nothing to learn from and to judge on
+FEWEST = 4
 #: fewer profiles of a cycle than this say nothing about it; each has many points, and they are far apart in time
 MIN_STATES = 8
 
@@ -236,6 +238,11 @@ class _All(NamedTuple):
 def _splits(
     tests: Sequence[Profiles], options: PositionOptions, judging: Callable[[Samples], Judging]
 ) -> tuple[Samples, Judging]:
+    if (states := sum(len(test) for test in tests)) < FEWEST:
+        raise InputError(
+            f"{tests[0].target}: {states} thermal state(s): one is the cold profile, slopes are learned from others "
+            f"and judged on others again; measure in {FEWEST} states or more, better in 20"
+        )
     samples, _ = slope_samples(tests, options)
     return samples, judging(samples)
 

@@ -17,7 +17,7 @@ from thermocomp.cli.options import (
     refuse_existing,
     tell_trouble,
 )
-from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.units import measured
 
 if TYPE_CHECKING:
@@ -101,7 +101,12 @@ def iso230(
     given = [Path(p) for p in (model, mapping) if p is not None]
     if output is not None:
         refuse_existing([output], overwrite, [*recordings, *positioning, *given])
-    tests = read_recordings(recordings, mapping) if recordings else []
+    try:
+        tests = read_recordings(recordings, mapping) if recordings else []
+    except RecordingError as e:
+        if "no time column" in str(e):
+            raise RecordingError(f"{e}; a table of a positioning test is named by --positioning") from e
+        raise
     trouble = tell_trouble(tests)
     models = modelfile.read(model) if model is not None else ()
     thermal: list[ThermalTest] = []
