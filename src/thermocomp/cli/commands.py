@@ -204,7 +204,7 @@ def select(
         from thermocomp.assessment.splits import Judging
         from thermocomp.cli import output as out
     if output is not None:
-        refuse_existing([output], overwrite, recordings)
+        refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
@@ -277,7 +277,7 @@ def fit(
         from thermocomp.cli import output as out
         from thermocomp.core.model import Support
         from thermocomp.files import modelfile
-    refuse_existing([output], overwrite, recordings)
+    refuse_existing([output], overwrite, recordings, ".json")
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     judging = study.judging(samples)
@@ -369,7 +369,7 @@ def compare(
         from thermocomp.assessment import compare as comparing
         from thermocomp.cli import output as out
     if output is not None:
-        refuse_existing([output], overwrite, recordings)
+        refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
     judging = study.judging(samples)

@@ -100,7 +100,7 @@ def iso230(
         from thermocomp.files import positioning as positioning_files
     given = [Path(p) for p in (model, mapping) if p is not None]
     if output is not None:
-        refuse_existing([output], overwrite, [*recordings, *positioning, *given])
+        refuse_existing([output], overwrite, [*recordings, *positioning, *given], ".html")
     try:
         tests = read_recordings(recordings, mapping) if recordings else []
     except RecordingError as e:

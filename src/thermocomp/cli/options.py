@@ -104,7 +104,7 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
     return reader.read_all(paths, mappings.read_mapping(mapping) if mapping is not None else None)
 
 
-def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
     """Raise `InputError` if an output cannot be written, before any work is done.
 
     Parameters
@@ -115,6 +115,8 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
         Existing files may be replaced.
     inputs : sequence of Path
         What is read: never to be replaced.
+    ending : str
+        Of the names of such files, such as ``.html``.
     """
     for path in paths:
         if not path.parent.is_dir():
@@ -125,6 +127,8 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
             raise InputError(f"{path}: is also an input; choose another name")
         if path.exists() and not overwrite:
             raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
+        if ending and path.suffix.lower() != ending:
+            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
 
 
 def tell_trouble(tests: "Sequence[Recording]") -> list[str]:

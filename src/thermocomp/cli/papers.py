@@ -103,7 +103,7 @@ def papers(
         if not measured and option in ("--mapping", "--target"):
             raise InputError(f"{option} is for measured recordings: name them by --with")
     if output is not None:
-        refuse_existing([output], overwrite, measured)
+        refuse_existing([output], overwrite, measured, ".html")
     tests = read_recordings(measured, mapping) if measured else []
     tell_trouble(tests)
     done: list[tuple[Study, float]] = []

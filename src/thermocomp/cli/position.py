@@ -125,7 +125,7 @@ def position(
     if not recordings:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
     if output is not None:
-        refuse_existing([output], overwrite, recordings)
+        refuse_existing([output], overwrite, recordings, ".json")
     with needs("study"):
         from thermocomp.assessment import position as assessing
         from thermocomp.cli import output as out

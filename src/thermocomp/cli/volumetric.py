@@ -81,7 +81,7 @@ def volumetric(
         from thermocomp.files.machines import read_machine
     inputs = [machine] if recording is None else [machine, recording]
     if output is not None:
-        refuse_existing([output], overwrite, inputs)
+        refuse_existing([output], overwrite, inputs, ".html")
     known = read_machine(machine)
     tests = read_recordings([recording], mapping) if recording is not None else []
     trouble = tell_trouble(tests)
