@@ -366,10 +366,11 @@ def test_the_virtual_machine_takes_18_components_from_one_file(tmp_path: Path) -
     ]
     positionfile.write(models[::-1], tmp_path / "axes.json")
     drifts = [drift(name) for name in ("x1_um", "y1_um", "z_um")]
+    drifts.append(drift("A0C", "urad"))
     modelfile.write(drifts, tmp_path / "spindle.json")
     machine = read_machine(tmp_path / "virtual.toml")
     assert [machine.components[c.code] for c in axes] == models
     assert {code: machine.components[code] for code in ("C0Y", "B0Z", "A0Z")} == {"C0Y": 14, "B0Z": -21, "A0Z": 17}
-    assert [machine.components[code] for code in ("X0C", "Y0C", "Z0C")] == drifts
+    assert [machine.components[code] for code in ("X0C", "Y0C", "Z0C", "A0C")] == drifts
     assert machine.axis("Y").measured_at == (300.0, 250.0, 300.0)
     assert machine.tool == machine.spindle_tool == (0.0, 0.0, -150.0)
