@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 
 #: one position, or an array of them
-Position = TypeVar("Position", float, NDArray[np.float64])
+_Position = TypeVar("_Position", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Deviation:
     def __post_init__(self) -> None:
         _check_finite("deviation", self.offset, self.slope, self.reference_position)
 
-    def at(self, position: Position) -> Position:
+    def at(self, position: _Position) -> _Position:
         """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
@@ -78,7 +78,7 @@ class Correction:
         # "0.0 -" rather than a bare minus: a zero deviation must not become -0.0 in a journal or a controller
         return cls(0.0 - deviation.offset, 0.0 - deviation.slope, deviation.reference_position)
 
-    def at(self, position: Position) -> Position:
+    def at(self, position: _Position) -> _Position:
         """Correction [um] at a position [mm]."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
