@@ -7,16 +7,16 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from thermocomp.core.components import BY_CODE
-from thermocomp.core.machine import Axis, Channel, Machine, Source
+from thermocomp.core.machine import Axis, Machine, Source
 from thermocomp.core.structure import Structure
 from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position
 from thermocomp.models.training import train
-from thermocomp.papers import common
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
+from thermocomp.recording.tilts import with_tilts
 from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL
 from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE
 
@@ -115,14 +115,10 @@ def _profiles(code: str, test: Recording, *, flat: bool) -> Profiles:
 
 def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Source]:
     """Learn the drifts at the test position from the nest of probes: of spindle, axes and their references together."""
-    tilts = {
-        "A0C": {"y1_um": 1.0 / PROBE_DISTANCE, "y2_um": -1.0 / PROBE_DISTANCE},
-        "B0C": {"x2_um": 1.0 / PROBE_DISTANCE, "x1_um": -1.0 / PROBE_DISTANCE},
-    }
-    for code, weights in tilts.items():
-        tests = [common.derived(test, Channel(code, "angle", "urad"), weights) for test in tests]
+    tilts = (f"A0C=y1_um:y2_um:{PROBE_DISTANCE:g}m", f"B0C=x1_um:x2_um:{PROBE_DISTANCE:g}m")
+    tests, _ = with_tilts(tests, tilts)
     channels = {"X0C": "x1_um", "Y0C": "y1_um", "Z0C": "z_um", "A0C": "A0C", "B0C": "B0C"}
-    samples = stack(list(tests), list(channels.values()), inputs)
+    samples = stack(tests, list(channels.values()), inputs)
     seen = np.ones(len(samples), dtype=np.bool_)
     return {code: train(METHOD, samples, k, seen).model for k, code in enumerate(channels)}
 
