@@ -61,6 +61,23 @@ class ModelFileError(InputError):
     """A model file is damaged, of an unknown version, or not a model file."""
 
 
+class ProgramError(InputError):
+    """An NC program cannot be read or revised safely; nothing is written.
+
+    Parameters
+    ----------
+    line : int
+        Number of the line, from 1.
+    reason : str
+        What stands there, why it cannot be, and what to do.
+    """
+
+    def __init__(self, line: int, reason: str) -> None:
+        super().__init__(f"line {line}: {reason}")
+        self.line = line
+        self.reason = reason
+
+
 class FitError(ThermocompError):
     """A model cannot be fitted to this data."""
 
