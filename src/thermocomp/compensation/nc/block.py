@@ -9,8 +9,8 @@ Point = tuple[float, float, float]
 Known = tuple[bool, bool, bool]
 
 #: what a block does to the position: ``none`` nothing; ``line`` G0, G1, G33; ``arc`` G2, G3; ``cycle`` G73, G81 ...;
-#: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` the place gets another name: G92, G10 L20,
-#: L10, L11; ``curve`` G5, G5.1; ``probe`` G38
+#: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` the place gets another name: G92, G10
+#: L20, L10, L11; ``curve`` G5, G5.1; ``probe`` G38
 Kind = Literal["none", "line", "arc", "cycle", "machine", "home", "set", "curve", "probe"]
 
 
