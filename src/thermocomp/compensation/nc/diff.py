@@ -1,0 +1,70 @@
+"""A unified diff made while a program is revised: lines go one to one, so nothing has to be searched for."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+
+#: unchanged lines around a change
+CONTEXT = 3
+
+
+def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: str, before: int = 0) -> Iterator[str]:
+    """Yield the lines of a unified diff.
+
+    Parameters
+    ----------
+    pairs : iterable of (str, tuple of str)
+        Lines of the original in order, each with the lines it has become; an empty text stands for no line.
+    name, revised : str
+        Of the two programs.
+    before : int
+        Lines that the revised program begins with and that are in none of the pairs.
+
+    Yields
+    ------
+    str
+    """
+    head = [f"--- {name}\n", f"+++ {revised}\n"]
+    waiting: deque[tuple[str, str]] = deque(maxlen=CONTEXT)  # unchanged lines that may come before a hunk
+    hunk: list[tuple[str, str]] = []
+    quiet = 0
+    old = new = 0  # lines seen
+    first = (0, 0)
+    for text, texts in pairs:
+        changed = texts != ((text,) if text else ())
+        if changed and not hunk:
+            first = (old - len(waiting), new - len(waiting))
+            hunk = list(waiting)
+        old += bool(text)
+        new += len(texts)
+        if changed:
+            hunk += ([("-", text)] if text else []) + [("+", t) for t in texts]
+            quiet = 0
+            waiting.clear()
+            continue
+        if hunk:
+            hunk.append((" ", text))
+            quiet += 1
+            if quiet > 2 * CONTEXT:
+                yield from _hunk(head, hunk[: len(hunk) - CONTEXT - 1], first, before)
+                waiting.extend(hunk[-CONTEXT:])
+                hunk = []
+        else:
+            waiting.append((" ", text))
+    if hunk:
+        yield from _hunk(head, hunk[: len(hunk) - max(0, quiet - CONTEXT)], first, before)
+
+
+def _hunk(head: list[str], lines: list[tuple[str, str]], first: tuple[int, int], before: int) -> Iterator[str]:
+    yield from head
+    head.clear()
+    old = sum(mark != "+" for mark, _ in lines)
+    new = sum(mark != "-" for mark, _ in lines)
+    yield f"@@ -{_range(first[0], old)} +{_range(first[1] + before, new)} @@\n"
+    for mark, text in lines:
+        body = text.rstrip("\r\n")
+        yield mark + (text if body != text else f"{text}\n\\ No newline at end of file\n")
+
+
+def _range(seen: int, length: int) -> str:
+    start = seen + 1 if length else seen
+    return f"{start},{length}" if length != 1 else str(start)
