@@ -1,0 +1,182 @@
+"""What drives the models along a program: the spindle speed of the program, all else constant or forecast."""
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.units import measured
+
+FloatArray = NDArray[np.float64]
+
+SPEED = "spindle_speed"
+#: how a value of each quantity is written, in messages
+_EXAMPLES = {
+    "temperature": "21.5degC",
+    "displacement": "3um",
+    "angle": "5urad",
+    "position": "100mm",
+    "feed": "900mm/min",
+}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A value over the time of the program: linear between its points, held before the first and after the last.
+
+    Parameters
+    ----------
+    time : tuple of float
+        Since the start of the program, rising [s].
+    values : tuple of float
+        As many.
+
+    Raises
+    ------
+    InputError
+        There is no point, a number is not finite, or the time does not rise.
+    """
+
+    time: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not self.time or len(self.time) != len(self.values):
+            raise InputError(
+                f"forecast: {len(self.time)} times and {len(self.values)} values: want as many, at least 1"
+            )
+        if not all(map(math.isfinite, (*self.time, *self.values))):
+            raise InputError("forecast: times and values must be finite numbers")
+        if any(not a < b for a, b in pairwise(self.time)):
+            raise InputError("forecast: the times must rise")
+
+    @classmethod
+    def constant(cls, value: float) -> "Signal":
+        """Return the signal that always has this value."""
+        return cls((0.0,), (value,))
+
+    @property
+    def varies(self) -> bool:
+        """False if it is constant."""
+        return len(self.time) > 1
+
+    def at(self, time: float) -> float:
+        """Return the value at a time [s]."""
+        k = bisect_right(self.time, time)
+        if k == 0:
+            return self.values[0]
+        if k == len(self.time):
+            return self.values[-1]
+        share = (time - self.time[k - 1]) / (self.time[k] - self.time[k - 1])
+        return (1.0 - share) * self.values[k - 1] + share * self.values[k]
+
+    def held(self, time: float) -> float:
+        """Return for how long of the program, up to a time, it was held beyond its points [s]."""
+        if not self.varies:
+            return 0.0
+        return max(time - self.time[-1], 0.0) + max(min(time, self.time[0]), 0.0)
+
+
+#: input name to its value over the program
+Inputs = Mapping[str, Signal]
+
+
+class Wiring:
+    """Where the inputs of one model come from.
+
+    An input of quantity ``spindle_speed`` gets the speed of the program; one without influence on the deviation needs
+    nothing.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    others : mapping of str to Signal
+        Inputs that the program does not tell.
+
+    Raises
+    ------
+    InputError
+        The model wants an input that nobody gives.
+    """
+
+    def __init__(self, model: ErrorModel, others: Inputs) -> None:
+        self._speed = [k for k, i in enumerate(model.inputs) if i.quantity == SPEED]
+        self._signals = {k: _signal(model, i, others) for k, i in enumerate(model.inputs) if i.quantity != SPEED}
+        self._varying = [(k, s) for k, s in self._signals.items() if s.varies]
+        self._values = np.zeros(len(model.inputs))
+        for k, signal in self._signals.items():
+            self._values[k] = signal.values[0]
+
+    @property
+    def varies(self) -> bool:
+        """True if there is a forecast among the inputs."""
+        return bool(self._varying)
+
+    def values(self, time: float, speed: float) -> FloatArray:
+        """Return the inputs of the model, in its order, at a time [s] and a spindle speed [1/min]."""
+        values = self._values.copy()
+        for k in self._speed:
+            values[k] = speed
+        for k, signal in self._varying:
+            values[k] = signal.at(time)
+        return values
+
+
+def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, Signal]:
+    """Read what the user says is constant.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Such as ``t3=21.5degC``: an input, with or without its unit at the end (``t3_C``), and its value with a unit.
+    models : sequence of ErrorModel
+        Whose inputs they are.
+
+    Returns
+    -------
+    dict of str to Signal
+
+    Raises
+    ------
+    InputError
+        No model has such an input, it is the spindle speed, it is there twice, or the value has no unit of it.
+    """
+    inputs = {i.name: i for m in models for i in m.inputs}
+    found: dict[str, Signal] = {}
+    for text in texts:
+        said, _, value = (part.strip() for part in text.partition("="))
+        fitting = [n for n in inputs if said in (n, n.rpartition("_")[0])]
+        if len(fitting) != 1:
+            raise unknown("input", said, [n for n, i in inputs.items() if i.quantity != SPEED])
+        channel = inputs[fitting[0]]
+        if channel.quantity == SPEED:
+            raise InputError(f"constant {text!r}: the spindle speed comes from the program")
+        if channel.name in found:
+            raise InputError(f"constant {text!r}: {channel.name} was given before")
+        number = measured(value, channel.quantity)
+        if number is None:
+            raise InputError(f"constant {text!r}: write a value with its unit, such as {_written(channel, said)}")
+        found[channel.name] = Signal.constant(number)
+    return found
+
+
+def _signal(model: ErrorModel, channel: Input, others: Inputs) -> Signal:
+    if channel.name in others:
+        return others[channel.name]
+    if channel.name not in model.sensors:
+        return Signal.constant(channel.reference)
+    kind = channel.quantity.replace("_", " ")
+    raise InputError(
+        f"model of {model.target} wants {channel.name}, a {kind}: it is not driven by the speed alone; give "
+        f"--constant {_written(channel, channel.name)} or --forecast FILE"
+    )
+
+
+def _written(channel: Input, name: str) -> str:
+    return f"{name}={_EXAMPLES.get(channel.quantity, f'1{channel.unit}')}"

@@ -1,0 +1,152 @@
+"""Which model stands for the drift of which axis, and where (P-04)."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.units import measured
+
+AXES = "XYZ"
+_NUMBER = r"-?\d+(?:\.\d+)?"
+#: x_um, z, z_at_200, x_at_z-50_um
+_NAME = re.compile(rf"([xyz])(?:_at_([xyz]?)({_NUMBER})(?:mm)?)?(?:_um)?", re.IGNORECASE)
+#: Z, X at Z 200 mm
+_PLACE = re.compile(rf"([xyz])(?:\s+at\s+([xyz])\s*=?\s*({_NUMBER}\s*[a-z]*))?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Station:
+    """A model of the drift of one axis; one of several along an axis, or the only one.
+
+    Parameters
+    ----------
+    axis : {'X', 'Y', 'Z'}
+        The direction that deviates.
+    model : ErrorModel
+        In um.
+    along : {'X', 'Y', 'Z'} or None
+        The axis whose position it depends on; None: the model holds everywhere.
+    at : float
+        Where along it the model holds, machine coordinate [mm].
+
+    Raises
+    ------
+    InputError
+        The model is not in um, or the do-no-harm gate has refused it; there is no such axis.
+    """
+
+    axis: str
+    model: ErrorModel
+    along: str | None = None
+    at: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.axis not in tuple(AXES) or self.along not in (None, *AXES):
+            raise InputError(f"model of {self.model.target}: axes are X, Y and Z, found {self.axis} and {self.along}")
+        if self.model.unit != "um":
+            raise InputError(
+                f"model of {self.model.target} predicts {self.model.unit}; a program is corrected with models in um"
+            )
+        if not abs(self.at) < float("inf"):
+            raise InputError(f"model of {self.model.target}: position {self.at} mm must be finite")
+        self.model.check_not_refused()
+
+    def __str__(self) -> str:
+        return self.axis if self.along is None else f"{self.axis} at {self.along} {self.at:g} mm"
+
+
+def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[Station]:
+    """Find out which axis each model is for.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+        Of one model file, or of several.
+    texts : sequence of str
+        What the user says: ``ch3=Z``, ``zz=X at Z 200 mm``, or only a target whose name says it. Models that no text
+        names are left out. Without any text all are taken, and the names of their targets must say it: ``x``, ``y_um``,
+        ``z_at_200``, ``x_at_z200`` (positions in mm).
+
+    Returns
+    -------
+    list of Station
+        By axis and position.
+
+    Raises
+    ------
+    InputError
+        A target is unknown, comes twice, or does not say its axis; or the stations do not fit together.
+    """
+    targets = [m.target for m in models]
+    if len(set(targets)) != len(targets):
+        raise InputError(f"two models for the same target among {', '.join(targets)}")
+    known = dict(zip(targets, models, strict=True))
+    found, named = [], set()
+    for text in texts or targets:
+        target, says, place = (part.strip() for part in text.partition("="))
+        model = known.get(target) or known.get(f"{target}_um")
+        if model is None:
+            raise unknown("model of", target, targets)
+        if model.target in named:
+            raise InputError(f"{text!r}: {model.target} was given before; a model stands for one axis at one place")
+        named.add(model.target)
+        found.append(_stated(text, place, model) if says else _by_name(model, targets))
+    return checked(found)
+
+
+def checked(found: Sequence[Station]) -> list[Station]:
+    """Return stations in their order, by axis and position.
+
+    Raises
+    ------
+    InputError
+        There is none, or an axis has neither a single one that holds everywhere nor several along one axis, each at
+        another place.
+    """
+    if not found:
+        raise InputError("there is no model to correct a program with")
+    ordered = sorted(found, key=lambda s: (s.axis, s.at))
+    for axis, group in groupby(ordered, key=lambda s: s.axis):
+        mine = list(group)
+        names = ", ".join(s.model.target for s in mine)
+        along = {s.along for s in mine}
+        if len(mine) == 1 and along != {None}:
+            raise InputError(
+                f"{axis} has one model at a position ({names}): with one it cannot be told how the drift varies along "
+                f"{mine[0].along}; give another one, or say {mine[0].model.target}={axis}"
+            )
+        if len(mine) > 1 and (len(along) > 1 or None in along):
+            raise InputError(f"{axis} has several models, {names}: want one, or one per position along a single axis")
+        if len({s.at for s in mine}) < len(mine):
+            raise InputError(f"{axis} has two models at the same position among {', '.join(map(str, mine))}: {names}")
+    return ordered
+
+
+def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
+    match = _NAME.fullmatch(model.target)
+    if match is not None:
+        axis, along, at = (part and part.upper() for part in match.groups())
+        if at is None:
+            return Station(axis, model)
+        if along or axis == "Z":  # x_at_200 could be a place along X as well as along Z
+            return Station(axis, model, along or axis, float(at))
+    raise InputError(
+        f"the name of the target {model.target!r} does not say which axis it is; say {model.target}=Z, or "
+        f'"{model.target}=Z at Z 200 mm"; targets are {", ".join(targets)}'
+    )
+
+
+def _stated(text: str, place: str, model: ErrorModel) -> Station:
+    match = _PLACE.fullmatch(place)
+    if match is None:
+        raise InputError(f'{text!r}: want an axis, such as {model.target}=Z or "{model.target}=X at Z 200 mm"')
+    axis, along, at = match.groups()
+    if along is None:
+        return Station(axis.upper(), model)
+    position = measured(at, "position")
+    if position is None:
+        raise InputError(f"{text!r}: the position {at} has no unit; write {at} mm")
+    return Station(axis.upper(), model, along.upper(), position)

@@ -1,0 +1,68 @@
+"""`JobState`: what one job leaves behind for the next one."""
+
+from dataclasses import dataclass
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import check_finite
+
+
+@dataclass(frozen=True)
+class StationState:
+    """What the model of one station remembers.
+
+    Parameters
+    ----------
+    station : str
+        Which one, such as ``Z at Z 200 mm``.
+    target : str
+        Of its model.
+    model : str
+        Which numbers the model is made of: a hash.
+    reference : tuple of float
+        What counts as zero, per input.
+    memory : tuple of float
+    deviation : float
+        Last deviation given [um].
+    zero : float
+        Deviation that counts as zero [um].
+    doubt : float
+        What the bound was widened by because the model had left its trained range [um].
+    """
+
+    station: str
+    target: str
+    model: str
+    reference: tuple[float, ...]
+    memory: tuple[float, ...]
+    deviation: float
+    zero: float
+    doubt: float
+
+    def __post_init__(self) -> None:
+        numbers = (*self.reference, *self.memory, self.deviation, self.zero, self.doubt)
+        check_finite(f"state of {self.station}", numbers=numbers)
+
+
+@dataclass(frozen=True)
+class JobState:
+    """What one job leaves behind for the next one (E-P5).
+
+    Parameters
+    ----------
+    stations : tuple of StationState
+    zero_known : bool
+        The deviation that counts as zero is no prediction: the machine was cold then, or measured.
+
+    Raises
+    ------
+    InputError
+        There is no station, or one of them is there twice.
+    """
+
+    stations: tuple[StationState, ...]
+    zero_known: bool
+
+    def __post_init__(self) -> None:
+        names = [s.station for s in self.stations]
+        if not names or len(set(names)) != len(names):
+            raise InputError(f"state of a job: want each station once, found {', '.join(names) or 'none'}")

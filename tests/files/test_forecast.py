@@ -1,0 +1,82 @@
+"""Forecasts as CSV."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thermocomp.compensation.nc.inputs import Signal
+from thermocomp.core.exceptions import InputError
+from thermocomp.files import forecast
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "room.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_units_and_gaps(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "# forecast of the hall\ntime_min,t3_C,room [degF],note,spindle_rpm\n"
+        "0,20.5,50,cold,\n\n30,,68,,100\n90,21.5,,,\n",
+    )
+    found = forecast.read(path)
+    assert found.columns["t3_C"] == ((0.0, 5400.0), (20.5, 21.5))
+    assert found.columns["room_C"][1] == pytest.approx((10.0, 20.0))
+    assert found.columns["spindle_rpm"] == ((1800.0,), (100.0,))
+    assert any("note" in text for text in found.left_out)
+    assert Signal(*found.columns["t3_C"]).at(2700.0) == 21
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_decimal_commas(tmp_path: Path, delimiter: str) -> None:
+    rows = [["time_s", "t3_C"], ["-0,5", "20,25"], ["1", "21.5"]]
+    found = forecast.read(written(tmp_path, "\r\n".join(delimiter.join(r) for r in rows)))
+    assert found.columns == {"t3_C": ((-0.5, 1.0), (20.25, 21.5))}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "found 0"),
+        ("time_s,t_C\n", "found 1"),
+        ("t3_C,t4_C\n1,2\n", "column of time such as time_s"),
+        ("time_s,cycle\n1,2\n", "column of an input"),
+        ("time,t3_C\n1,2\n", "unit in the heading: time_s"),
+        ("timestamp,t3_C\n2026-01-01,2\n", "since the start of the program"),
+        ("time_s,t3_C\n1,2\n1,3\n", r"line 3, column 'time_s': '1': the time must be there and rise"),
+        ("time_s,t3_C\n1,2\n,3\n", "must be there"),
+        ("time_s,t3_C\n1,warm\n", "line 2, column 't3_C': 'warm' is no number"),
+        ("time_s,t3_C\n1,nan\n", "no finite number"),
+        ("time_s,t3_C\n1,2,3\n", "line 2 has 3 cells where the headings are 2"),
+        ("time_s,t3_C,t3 [degC]\n1,2,3\n", "another one of t3_C"),
+        ("time_s,t3 [degX]\n1,2\n", "unknown unit"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        forecast.read(written(tmp_path, text))
+
+
+def test_a_file_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        forecast.read(tmp_path / "none.csv")
+    (tmp_path / "room.csv").write_bytes(b"time_s,t\xff_C\n1,2\n")
+    with pytest.raises(InputError, match="cannot be read"):
+        forecast.read(tmp_path / "room.csv")
+
+
+@settings(max_examples=200, deadline=None)
+@given(text=st.text(alphabet='time_s,Ct3;\n\t"0123456789.-#\r', max_size=60))
+def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_text("time_s,t3_C\n" + text, encoding="utf-8", newline="")
+    try:
+        found = forecast.read(path)
+    except InputError:
+        return
+    for time, values in found.columns.values():
+        Signal(time, values)

@@ -1,0 +1,81 @@
+"""State files of jobs: what is written comes back, everything else is refused."""
+
+import json
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+
+from driftmodels import lags, net, ticking
+from thermocomp.compensation.nc import start
+from thermocomp.compensation.nc.drift import Drift
+from thermocomp.compensation.nc.stations import Station
+from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.jobstate import JobState
+from thermocomp.files import jobstate, jsonfile, modelfile
+
+NOON = datetime(2026, 11, 21, 12, 0, 0, 250000, tzinfo=UTC)
+
+
+@pytest.fixture
+def left() -> JobState:
+    stations = [Station("X", net("x_um")), Station("Y", ticking("y_um")), Station("Z", lags())]
+    drift = Drift(stations, start.cold(stations, {}))
+    drift.advance(1234.5, 3210.0)
+    drift.advance(0.3, 0.0)
+    return drift.state()
+
+
+def test_a_state_comes_back_to_the_last_bit(left: JobState, tmp_path: Path) -> None:
+    path = tmp_path / "job.json"
+    jobstate.write(left, NOON.astimezone(timezone(timedelta(hours=2))), path)
+    saved = jobstate.read(path)
+    assert saved == jobstate.SavedJob(NOON, left)
+    assert saved.written.utcoffset() == timedelta(0)
+    assert any(s.deviation != 0 for s in saved.state.stations)
+
+
+def test_nothing_is_overwritten_unless_told(left: JobState, tmp_path: Path) -> None:
+    path = tmp_path / "job.json"
+    jobstate.write(left, NOON, path)
+    with pytest.raises(InputError, match="exists already"):
+        jobstate.write(left, NOON, path)
+    jobstate.write(left, NOON + timedelta(hours=1), path, overwrite=True)
+    assert jobstate.read(path).written == NOON + timedelta(hours=1)
+
+
+def test_a_time_without_its_zone_is_refused(left: JobState) -> None:
+    with pytest.raises(InputError, match="time zone"):
+        jobstate.dumps(left, NOON.replace(tzinfo=None))
+
+
+def test_damage_is_refused(left: JobState, tmp_path: Path) -> None:
+    text = jobstate.dumps(left, NOON)
+    content = json.loads(text)
+    content["models"][0]["state"]["stations"][2]["zero"] += 1e-9
+    with pytest.raises(ModelFileError, match="checksum"):
+        jobstate.loads(json.dumps(content))
+    with pytest.raises(ModelFileError, match="ends in the middle"):
+        jobstate.loads(text[: len(text) // 2])
+    with pytest.raises(ModelFileError, match="version 2"):
+        jobstate.loads(text.replace('"version": 1', '"version": 2'))
+    with pytest.raises(ModelFileError, match="a state file of a job but a model file"):
+        jobstate.loads(modelfile.dumps([lags()]))
+    with pytest.raises(ModelFileError, match="no such file"):
+        jobstate.read(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"written": "yesterday"}, "written"),
+        ({"written": "2026-11-21T12:00:00"}, "timezone"),
+        ({"state": {"stations": [], "zero_known": True}}, "each station once, found none"),
+        ({"more": 1}, "more"),
+    ],
+)
+def test_what_is_no_state_is_refused(left: JobState, change: dict[str, object], says: str) -> None:
+    content = json.loads(jobstate.dumps(left, NOON))
+    body = [content["models"][0] | change]
+    with pytest.raises(ModelFileError, match=says):
+        jobstate.loads(jsonfile.pack(jobstate.KIND, body))
