@@ -41,12 +41,15 @@ class Coordinates(Method):
     _cutting: bool = False
     _way: list[float] = field(default_factory=lambda: [math.inf] * 3)
     _known: tuple[bool, bool, bool] = (False, False, False)
-    _cycle: float = 0.0
+    _cycle: float = 0.0  # what depth and retract plane of the cycle in force got
+    _series: tuple[float, float] | None = None  # level at which a series of cycles began [mm], and what it carries [um]
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
         refuse_probing(block)
         kind = block.kind
-        if kind == "none":
+        if self.names_place(block):
+            text = self._named_anew(block)
+        elif kind in ("none", "set"):
             text = block.line.text
         elif kind == "machine":
             self.leave(block)
@@ -58,10 +61,8 @@ class Coordinates(Method):
                 text = self._path(block, frame, old, demand)
             elif kind == "cycle":
                 text = self._drill(block, frame, old, demand)
-            elif kind == "home":
-                text = self._homewards(block, frame, old)
             else:
-                text = self._named_anew(block, old)
+                text = self._homewards(block, frame, old)
         if block.moves:
             self._went(block)
         self._known = block.known
@@ -118,8 +119,11 @@ class Coordinates(Method):
             new[i] = goal[i]
 
     def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
+        if block.modal.motion == "G87":
+            raise ProgramError(
+                block.line.number, "G87 has levels that are not shifted; --method offset, or --expand writes it out"
+            )
         axis = PLANES[block.modal.plane][2]
-        letter = AXES[axis]
         goal = frame.words(demand)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
         for i in self.named(block):
@@ -133,34 +137,43 @@ class Coordinates(Method):
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
             raise ProgramError(block.line.number, "an optional line that drills: decide with --block-delete")
-        if block.modal.absolute:
-            plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
-            near = abs(block.start[axis] - plane) < SAME_PLANE and not self.fixed[axis]
-            depth = old[axis] if near else goal[axis]
-            first = letter in block.words and "R" in block.words
-            if depth != self._cycle or first:
-                for word in (letter, "R"):
-                    if word in block.words:
-                        shifts[word] = depth
-                    else:
-                        added[word] = block.sticky[word] + depth
-                self._cycle = depth
-            else:
-                shifts |= {word: depth for word in (letter, "R") if word in block.words}
-            within = [*new[:axis], depth, *new[axis + 1 :]]
-            if abs(block.end[axis] - plane) < 1e-6:
-                new[axis] = depth
-                self.fixed[axis] = self.doubtful[axis] = False
-            self.inner = frame.shift((within[0], within[1], within[2]))
         self._take(frame, old, new)
+        if block.modal.absolute:
+            self._levels(block, axis, frame, goal[axis], shifts, added)
         return shifted(block, shifts, added, frame.digits)
+
+    def _levels(
+        self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
+    ) -> None:
+        """Shift depth and retract plane of a cycle, together or not at all."""
+        words = (AXES[axis], "R")
+        if self._series is None:
+            self._series = block.start[axis], self.carried[axis]
+        plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
+        level, carried = self._series
+        if not self.fixed[axis] and any(abs(z - plane) < SAME_PLANE for z in (block.start[axis], level)):
+            goal = frame.words(self.carried)[axis]  # which of them is the higher one must not change
+        if goal != self._cycle or all(word in block.words for word in words):
+            added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
+            self._cycle = goal
+        shifts |= {word: goal for word in words if word in block.words}
+        within = list(frame.words(self.carried))
+        within[axis] = goal
+        self.inner = frame.shift((within[0], within[1], within[2]))
+        back = list(self.carried)
+        if abs(block.end[axis] - plane) < SAME_PLANE:
+            back[axis] = self.inner[axis]
+            self.fixed[axis] = self.doubtful[axis] = False
+        else:
+            back[axis] = carried
+        self.carried = (back[0], back[1], back[2])
 
     def _homewards(self, block: Block, frame: Frame, old: Vector) -> str:
         shifts = {AXES[i]: old[i] for i in self.named(block)} if block.modal.absolute else {}
         self.leave(block)
         return shifted(block, shifts, {}, frame.digits)
 
-    def _named_anew(self, block: Block, old: Vector) -> str:
+    def _named_anew(self, block: Block) -> str:
         for i in self.named(block):
             if self.doubtful[i]:
                 raise ProgramError(
@@ -169,6 +182,7 @@ class Coordinates(Method):
                     "decide with --block-delete",
                 )
         frame = self.frame(block)
+        old = frame.words(self.carried)
         return shifted(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
 
     # -- what may change ---------------------------------------------------------------------------------------------
@@ -229,6 +243,8 @@ class Coordinates(Method):
 
     def _went(self, block: Block) -> None:
         """Take in where a block went: a change in a cut has to wait for some way."""
+        if block.kind != "cycle":
+            self._series = None
         last = block.moves[-1]
         if last.rapid:
             self._cutting, self._way = False, [math.inf] * 3

@@ -8,6 +8,7 @@ from typing import Protocol
 from thermocomp.compensation.nc.block import Block, Point
 from thermocomp.compensation.nc.frame import Vector
 from thermocomp.core.correction import Correction, Deviation
+from thermocomp.core.exceptions import InputError
 
 #: what the tool point deviates by at a point of the machine [um]
 Field = Callable[[Point], Vector]
@@ -19,8 +20,11 @@ class Drifting(Protocol):
     def advance(self, dt: float, speed: float) -> None:
         """Let `dt` seconds pass with the spindle at `speed` [1/min]."""
 
+    def deviation(self, point: Point) -> Vector:
+        """Return by how much the tool point deviates now [um], at a place in machine coordinates [mm]."""
+
     def field(self) -> Field:
-        """Return the deviation of the tool point as it is now [um], by its place in machine coordinates [mm]."""
+        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
 
 
 @dataclass
@@ -36,32 +40,55 @@ class Demand:
         [um]
     every : float or None
         [s]; None: by tolerance alone.
+    most : float
+        A correction beyond that is no thermal drift any more [um].
     """
 
     tolerance: float
     every: float | None = None
+    most: float = 400.0
     _force: Vector = (0.0, 0.0, 0.0)
     _field: Field | None = None
     _next: float = 0.0
 
-    def at(self, time: float, now: Field, point: Point) -> Vector:
+    def at(self, time: float, drift: Drifting, point: Point) -> Vector:
         """Return the correction in force at a time [s] and place [mm, machine coordinates].
+
+        Parameters
+        ----------
+        time : float
+            [s]
+        drift : Drifting
+            At that time.
+        point : tuple of float
+            Machine coordinates [mm].
 
         Returns
         -------
         tuple of float
             [um, machine axes], minus the deviation (E-P4).
+
+        Raises
+        ------
+        InputError
+            It is larger than any thermal drift.
         """
         renewed = False
+        now: Field = drift.deviation
         if self.every is not None:
             if self._field is None or time >= self._next:
-                self._field, renewed = now, True
+                self._field, renewed = drift.field(), True
                 self._next = (math.floor(time / self.every + 1e-9) + 1) * self.every
             now = self._field
         x, y, z = (
             w if renewed or abs(w - f) > self.tolerance else f
             for w, f in zip(opposed(now(point)), self._force, strict=True)
         )
+        if not max(abs(x), abs(y), abs(z)) <= self.most:  # also refuses nan
+            raise InputError(
+                f"the correction after {time:.0f} s would be X {x:.0f}, Y {y:.0f}, Z {z:.0f} um: more than "
+                f"{self.most:g} um is no thermal drift; check the model, its unit and the start state"
+            )
         self._force = x, y, z
         return self._force
 

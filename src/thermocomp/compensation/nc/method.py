@@ -89,6 +89,28 @@ class Method(ABC):
         """Return the axes that a block names."""
         return [i for i, letter in enumerate(AXES) if letter in block.words]
 
+    def names_place(self, block: Block) -> bool:
+        """Return whether a block gives the place where the tool stands another name.
+
+        Raises
+        ------
+        ProgramError
+            It does so in a way that is not followed.
+        """
+        if "G92" in block.codes:
+            return True
+        if "G10" not in block.codes or block.values.get("L") not in (10.0, 11.0, 20.0):
+            return False
+        if block.values["L"] != 20:
+            raise ProgramError(
+                block.line.number,
+                "G10 L10 and L11 take the tool's length from where it stands, which holds the drift already; "
+                "measure tools outside the program",
+            )
+        if int(block.values.get("P", 0)) not in (0, block.modal.system):
+            raise ProgramError(block.line.number, "G10 L20 for a system that is not in force is not supported")
+        return True
+
     def leave(self, block: Block) -> None:
         """Take in a move in machine coordinates: its axes carry nothing afterwards."""
         axes = self.named(block) or ([0, 1, 2] if block.kind == "home" else [])

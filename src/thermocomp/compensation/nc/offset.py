@@ -100,10 +100,9 @@ class Offset(Method):
         if kind in ("machine", "home"):
             self.leave(block)
             return
-        if kind == "none" or not block.modal.absolute:
-            return
-        if kind == "set":
+        if self.names_place(block):
             self._refuse_mixed(block, self.named(block), "names a place")
+        if kind in ("none", "set") or not block.modal.absolute:
             return
         after = list(self.carried)
         for i in self.named(block):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from thermocomp.compensation.nc import header
 from thermocomp.compensation.nc.block import Block, Point, Setup
 from thermocomp.compensation.nc.check import Check
-from thermocomp.compensation.nc.demand import Demand, Drifting, Field, Left
+from thermocomp.compensation.nc.demand import Demand, Drifting, Left
 from thermocomp.compensation.nc.follower import follow
 from thermocomp.compensation.nc.frame import Vector
 from thermocomp.compensation.nc.line import Line
@@ -38,6 +38,7 @@ class Revised(NamedTuple):
     end: float  #: when it ends [s]
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
+    inner: Vector  #: and on the way, in a cycle that ends where it began
 
 
 @dataclass
@@ -107,8 +108,7 @@ class Revision:
         check = Check(self.setup)
         steered = _Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
-        now: Field = self.drift.field()
-        deviation = now(point)
+        deviation = self.drift.deviation(point)
         headed = ended = False
         carried = self.method.carried
         for block, start, end in timed(follow(lines, self.setup), self.kinematics):
@@ -123,22 +123,25 @@ class Revision:
             before = deviation, carried
             if block.moves:
                 point = block.moves[-1].end
-            now = self.drift.field()
-            deviation = now(point)
-            change = self.method.revise(block, self.demand.at(end, now, point))
+            deviation = self.drift.deviation(point)
+            change = self.method.revise(block, self.demand.at(end, self.drift, point))
             check.check(block, change)
             carried = change.after
             if block.moves:
                 self.left.take(block, (before, (deviation, carried)))
             ended |= block.ends
-            yield self._told(Revised(line.number, line.text, change.texts, block, start, end, deviation, carried))
+            yield self._told(
+                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner)
+            )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
         if not ended and any(carried):
             self._refuse_open()
         for line in lines:
             yield self._told(
-                Revised(line.number, line.text, (line.text,), None, self.seconds, self.seconds, deviation, carried)
+                Revised(
+                    line.number, line.text, (line.text,), None, self.seconds, self.seconds, deviation, carried, carried
+                )
             )
 
     def _guarded(self, lines: Iterable[Line]) -> Iterator[Line]:
@@ -148,7 +151,7 @@ class Revision:
             yield line
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
-        return Revised(0, "", header.blank(ending(text)), None, 0.0, 0.0, deviation, carried)
+        return Revised(0, "", header.blank(ending(text)), None, 0.0, 0.0, deviation, carried, carried)
 
     def _told(self, revised: Revised) -> Revised:
         self.lines += 1
