@@ -20,6 +20,8 @@ from thermocomp.core.units import measured, unit
         ("h", "time", 2.0, 7200.0),
         ("arcsec", "angle", 1.0, 4.84813681109536),
         ("in", "displacement", 0.001, 25.4),
+        ("m/s2", "acceleration", 5.0, 5000.0),
+        ("mm/s²", "acceleration", 800.0, 800.0),
     ],
 )
 def test_conversion(symbol: str, quantity: str, value: float, expected: float) -> None:
@@ -55,6 +57,8 @@ def test_unknown_quantity() -> None:
         ("+3. µm", "displacement", 3.0),
         ("68 °F", "temperature", 20.0),
         ("1.5 h", "time", 5400.0),
+        ("6000 1/min", "spindle_speed", 6000.0),
+        ("100 1/s", "spindle_speed", 6000.0),
     ],
 )
 def test_a_value_with_its_unit(text: str, quantity: str, value: float) -> None:

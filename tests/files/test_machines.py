@@ -83,6 +83,8 @@ travel = ["0 mm", "24 in"]
 reference_position = "300000 um"
 measured_at = ["1 mm", "2 mm", "3 mm"]
 measured_tool = ["0 mm", "0 mm", "-150 mm"]
+rapid = "30 m/min"
+acceleration = "5 m/s2"
 
 [axes.Z]
 travel = ["-500 mm", "+.5e2 mm"]
@@ -106,7 +108,9 @@ EBX = {profile = [["0 mm", "0 urad"], ["300 mm", "-0.002 mrad"], ["500 mm", "4 Â
     assert x.travel == pytest.approx((0.0, 609.6))
     assert x.reference_position == pytest.approx(300.0)
     assert (x.measured_at, x.measured_tool) == ((1.0, 2.0, 3.0), (0.0, 0.0, -150.0))
+    assert (x.rapid, x.acceleration) == (30_000.0, 5000.0)
     assert z == Axis("Z", (-500.0, 50.0), measured_on="workpiece")
+    assert (z.rapid, z.acceleration) == (None, None)
     assert machine.components["B0Z"] == pytest.approx(10 * 1e6 * np.pi / 180 / 3600)
     assert machine.components["X0C"] == -1.0
     profile = machine.components["EBX"]
@@ -180,6 +184,19 @@ MM = 'write a length with its unit, such as "600 mm"'
             HEAD.replace('"600 mm"', '"6 degC"'),
             "axes.X.travel: \"6 degC\": unit 'degC' measures temperature, not posit",
         ),
+        (
+            HEAD.replace("[axes.Y]", "rapid = 30\n[axes.Y]"),
+            'axes.X.rapid: 30: write a speed with its unit, such as "30 m',
+        ),
+        (
+            HEAD.replace("[axes.Y]", 'acceleration = "5"\n[axes.Y]'),
+            'axes.X.acceleration: "5": write an acceleration with its unit, such as "3 m/s2"',
+        ),
+        (
+            HEAD.replace("[axes.Y]", 'acceleration = "5 m/min"\n[axes.Y]'),
+            "axes.X.acceleration: \"5 m/min\": unit 'm/min' measures feed, not acceleration; for acceleration use",
+        ),
+        (HEAD.replace("[axes.Y]", 'rapid = "0 m/min"\n[axes.Y]'), "axes.X.rapid: 0: must be positive"),
         (HEAD.replace('"600 mm"', '"-1 mm"'), "axes.X.travel: goes from 0 to -1 mm: must rise"),
         (HEAD.replace('["0 mm", "600 mm"]', '"600 mm"'), "axes.X.travel: '600 mm': write 2 values, such as"),
         (HEAD.replace("[axes.Y]\n", "[axes.Y]\ntravle = 3\n"), "axes.Y.travle: there is no key 'travle'; the nearest"),

@@ -42,11 +42,16 @@ class Axis:
         What carried that place while the axis moved: the tool's side, such as a probe or a reflector in the spindle, or
         the workpiece's, such as a reflector on the table. In the second case the tool was at it with the axis at its
         own coordinate of `measured_at`, and from there the axis' own way is a lever too.
+    rapid : float or None
+        How fast it goes at most [mm/min]; None: not told.
+    acceleration : float or None
+        How hard it speeds up and slows down at most [mm/s2]; None: not told.
 
     Raises
     ------
     SettingError
-        The name is none, the travel does not rise, or `measured_on` is none of the two.
+        The name is none, the travel does not rise, `measured_on` is none of the two, or a speed or an acceleration is
+        not positive.
     """
 
     name: str
@@ -55,6 +60,8 @@ class Axis:
     measured_at: Vector = (0.0, 0.0, 0.0)
     measured_tool: Vector = (0.0, 0.0, 0.0)
     measured_on: Literal["tool", "workpiece"] = "tool"
+    rapid: float | None = None
+    acceleration: float | None = None
 
     def __post_init__(self) -> None:
         low, high = self.travel
@@ -70,6 +77,10 @@ class Axis:
             raise SettingError(f"{self.reference_position}: must be a finite number", ("reference_position",))
         if self.measured_on not in ("tool", "workpiece"):
             raise SettingError(f"{self.measured_on!r}: must be 'tool' or 'workpiece'", ("measured_on",))
+        for key in ("rapid", "acceleration"):
+            most = getattr(self, key)
+            if most is not None and not 0 < most < math.inf:
+                raise SettingError(f"{most:g}: must be positive", (key,))
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,7 @@ HOUSE_UNITS: dict[str, str] = {
     "spindle_speed": "1/min",
     "position": "mm",
     "feed": "mm/min",
+    "acceleration": "mm/s2",
     "dimensionless": "1",
 }
 
@@ -71,6 +72,8 @@ _UNITS = [
     Unit("in", "position", "mm", 25.4),
     Unit("mm/min", "feed", "mm/min", 1.0),
     Unit("m/min", "feed", "mm/min", 1e3),
+    Unit("mm/s2", "acceleration", "mm/s2", 1.0),
+    Unit("m/s2", "acceleration", "mm/s2", 1e3),
     Unit("1", "dimensionless", "1", 1.0),
 ]
 
@@ -93,6 +96,10 @@ _ALIASES = {
     "inch": "in",
     "um/m": "urad",
     "µm/m": "urad",
+    "mm/s²": "mm/s2",
+    "m/s²": "m/s2",
+    "mm/s^2": "mm/s2",
+    "m/s^2": "m/s2",
     "µrad": "urad",
     "μrad": "urad",
     "rpm": "1/min",
@@ -102,8 +109,8 @@ _ALIASES = {
     "": "1",
 }
 
-#: a number and its unit, such as 12.5 mm or 1e-3urad
-_MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?)\s*")
+#: a number and its unit, such as 12.5 mm, 1e-3urad or 6000 1/min
+_MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?|(?<=\s)1/.*?)\s*")
 
 _BY_KEY = {(u.symbol, u.quantity): u for u in _UNITS}
 

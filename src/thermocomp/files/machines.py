@@ -27,6 +27,8 @@ _SAID = {
     "displacement": ("length", "12 um"),
     "angle": ("angle", "12 urad"),
     "temperature": ("temperature", "20 degC"),
+    "feed": ("speed", "30 m/min"),
+    "acceleration": ("acceleration", "3 m/s2"),
 }
 _QUANTITY = {"um": "displacement", "urad": "angle"}
 
@@ -328,6 +330,8 @@ _AXIS: dict[str, Convert] = {
     "measured_at": _VECTOR,
     "measured_tool": _VECTOR,
     "measured_on": _text,
+    "rapid": _measure("feed"),
+    "acceleration": _measure("acceleration"),
 }
 #: keys that say from where the lever of a component in urad counts
 _COUNTED_FROM = {
