@@ -1,0 +1,257 @@
+"""The G and M codes: modal group, what they do, and why some are refused, for LinuxCNC and Fanuc.
+
+Everything that is not in these tables is unknown, and a program with it is refused.
+"""
+
+from typing import Final, Literal, NamedTuple
+
+Controller = Literal["linuxcnc", "fanuc"]
+
+#: cycles that drill, bore or tap one hole after the other
+CYCLES: Final = frozenset({"G73", "G74", "G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"})
+#: codes outside the motion group that take the axis words of their line for themselves
+TAKES_AXES: Final = frozenset({"G10", "G28", "G30", "G52", "G92"})
+AXES: Final = ("X", "Y", "Z")
+ROTARY: Final = frozenset("ABC")
+#: words whose value is a length when they stand with a motion, an offset or a cycle
+LENGTHS: Final = frozenset("XYZIJKRQ")
+#: letters that every line may have
+FREE: Final = frozenset("XYZABCFST")
+
+
+class Code(NamedTuple):
+    """One code; two codes of one group cannot stand on one line."""
+
+    name: str  #: such as ``G38.2``
+    group: str
+    does: str
+    refused: str = ""  #: why, and what to do; empty if it is supported
+
+
+_EXPAND = "--expand lets the interpreter write it out"
+_LATHE = "a lathe's cycle; write its moves out"
+
+_COMMON_G: Final = (
+    Code("G0", "motion", "rapid move"),
+    Code("G1", "motion", "straight move in feed"),
+    Code("G2", "motion", "arc, clockwise"),
+    Code("G3", "motion", "arc, counterclockwise"),
+    Code("G4", "once", "dwell"),
+    Code("G10", "once", "sets offsets"),
+    Code("G17", "plane", "plane XY"),
+    Code("G18", "plane", "plane ZX"),
+    Code("G19", "plane", "plane YZ"),
+    Code("G20", "units", "inches"),
+    Code("G21", "units", "millimetres"),
+    Code("G28", "once", "goes home"),
+    Code("G30", "once", "goes to the second reference point"),
+    Code("G40", "cutter", "cutter compensation off"),
+    Code("G41", "cutter", "cutter compensation, left"),
+    Code("G42", "cutter", "cutter compensation, right"),
+    Code("G43", "tool length", "tool length compensation"),
+    Code("G49", "tool length", "tool length compensation off"),
+    Code("G52", "once", "local offset"),
+    Code("G53", "once", "move in machine coordinates"),
+    *(Code(f"G{53 + n}", "system", f"work coordinate system {n}") for n in range(1, 7)),
+    Code("G61", "path", "exact stop"),
+    Code("G64", "path", "continuous path"),
+    Code("G73", "motion", "drilling with chip breaking"),
+    Code("G74", "motion", "left-hand tapping"),
+    Code("G80", "motion", "cycle off"),
+    Code("G81", "motion", "drilling"),
+    Code("G82", "motion", "drilling with dwell"),
+    Code("G83", "motion", "peck drilling"),
+    Code("G84", "motion", "tapping"),
+    Code("G85", "motion", "boring, out in feed"),
+    Code("G86", "motion", "boring, out with the spindle stopped"),
+    Code("G88", "motion", "boring", "boring with G88 goes out by hand: where and when is not known; use G82 or G86"),
+    Code("G89", "motion", "boring with dwell"),
+    Code("G90", "distance", "absolute"),
+    Code("G91", "distance", "incremental"),
+    Code("G92", "once", "gives the place a name"),
+    Code("G94", "feed mode", "feed per minute"),
+    Code("G95", "feed mode", "feed per turn"),
+    Code(
+        "G96",
+        "spindle mode",
+        "constant surface speed",
+        "the spindle's speed follows the diameter (constant surface speed), which is not supported; use G97",
+    ),
+    Code("G97", "spindle mode", "constant spindle speed"),
+    Code("G98", "retract", "cycles go back to the level they came from"),
+    Code("G99", "retract", "cycles go back to R"),
+    Code("G93", "feed mode", "inverse time"),
+)
+
+_LINUXCNC_G: Final = (
+    Code("G5", "motion", "cubic spline"),
+    Code("G5.1", "motion", "quadratic spline"),
+    Code("G5.2", "motion", "NURBS", "NURBS are not supported; write them as G1, G2, G3 or G5"),
+    Code("G5.3", "once", "end of a NURBS", "NURBS are not supported; write them as G1, G2, G3 or G5"),
+    Code("G7", "diameter", "X is a diameter"),
+    Code("G8", "diameter", "X is a radius"),
+    Code("G28.1", "once", "stores the home", "it changes where G28 goes, which is not followed; remove it"),
+    Code("G30.1", "once", "stores the home", "it changes where G30 goes, which is not followed; remove it"),
+    Code("G33", "motion", "move in step with the spindle"),
+    Code("G33.1", "motion", "rigid tapping"),
+    *(Code(f"G38.{n}", "motion", "probing") for n in range(2, 6)),
+    Code("G41.1", "cutter", "cutter compensation, left"),
+    Code("G42.1", "cutter", "cutter compensation, right"),
+    Code("G43.1", "tool length", "tool length compensation by the words"),
+    Code("G43.2", "tool length", "one more tool length"),
+    *(Code(f"G59.{n}", "system", f"work coordinate system {6 + n}") for n in range(1, 4)),
+    Code("G61.1", "path", "exact path"),
+    *(Code(f"G{n}", "motion", "lathe cycle", _LATHE) for n in ("70", "71", "71.1", "71.2", "72", "72.1", "72.2")),
+    Code("G76", "motion", "threading cycle", f"threading cycles are not supported; {_EXPAND}"),
+    Code("G87", "motion", "back boring"),
+    Code("G90.1", "arc distance", "centres of arcs are absolute"),
+    Code("G91.1", "arc distance", "centres of arcs are relative"),
+    Code("G92.1", "once", "no G92, forgotten"),
+    Code("G92.2", "once", "no G92, kept"),
+    Code("G92.3", "once", "G92 again"),
+)
+
+_NO_SCALING = "scaling is not supported; write the coordinates out"
+_NO_MIRROR = "mirroring is not supported; write the coordinates out"
+_NO_ROTATION = "rotated coordinates are not supported; write the coordinates out"
+_NO_POLAR = "polar coordinates are not supported; write X and Y"
+_NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
+
+_FANUC_G: Final = (
+    Code("G5", "high speed", "high precision contour control"),
+    Code("G5.1", "high speed", "AI contour control"),
+    Code("G7.1", "once", "cylindrical interpolation", "cylindrical interpolation is not supported; write X Y Z"),
+    Code("G8", "high speed", "look ahead"),
+    Code("G9", "exact", "exact stop on this line"),
+    Code("G12.1", "polar plane", "polar interpolation", "polar interpolation is not supported; write X Y Z"),
+    Code("G13.1", "polar plane", "polar interpolation off"),
+    Code("G15", "polar", "polar coordinates off"),
+    Code("G16", "polar", "polar coordinates", _NO_POLAR),
+    Code("G22", "stroke", "stored stroke check", "it takes the axis words as limits, which is not followed; remove it"),
+    Code("G23", "stroke", "stored stroke check off"),
+    Code("G31", "motion", "skip"),
+    Code("G43.4", "tool length", "tool centre point control", _NO_TCP),
+    Code("G43.5", "tool length", "tool centre point control", _NO_TCP),
+    Code("G44", "tool length", "tool length, negative", "lengths with the sign turned are not supported; use G43"),
+    Code("G50", "scaling", "scaling off"),
+    Code("G50.1", "mirror", "mirror image off"),
+    Code("G51", "scaling", "scaling", _NO_SCALING),
+    Code("G51.1", "mirror", "mirror image", _NO_MIRROR),
+    Code("G54.1", "system", "one of the additional work coordinate systems"),
+    Code("G65", "once", "macro call", "macro calls are not followed; write the moves out"),
+    Code("G66", "call", "modal macro call", "macro calls are not followed; write the moves out"),
+    Code("G67", "call", "modal macro call off"),
+    Code("G68", "rotation", "rotation", _NO_ROTATION),
+    Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
+    Code("G69", "rotation", "rotation off"),
+    Code("G76", "motion", "fine boring", "it shifts the tool at the bottom by a parameter of the control; use G86"),
+    Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
+    Code("G92.1", "once", "no G92"),
+)
+
+_CALL = "subprograms are not followed; write the moves into the program"
+
+_COMMON_M: Final = (
+    Code("M0", "stop", "stop"),
+    Code("M1", "stop", "stop if the operator wants it"),
+    Code("M2", "stop", "end"),
+    Code("M3", "spindle", "spindle on, clockwise"),
+    Code("M4", "spindle", "spindle on, counterclockwise"),
+    Code("M5", "spindle", "spindle off"),
+    Code("M6", "tool", "tool change"),
+    Code("M7", "coolant", "mist on"),
+    Code("M8", "coolant", "flood on"),
+    Code("M9", "coolant", "coolant off"),
+    Code("M19", "spindle", "spindle oriented"),
+    Code("M30", "stop", "end"),
+    Code("M48", "override", "overrides on"),
+    Code("M49", "override", "overrides off"),
+    Code("M98", "stop", "subprogram call", f"{_CALL}; in LinuxCNC {_EXPAND}"),
+    Code("M99", "stop", "end of a subprogram", f"this is a subprogram, or a program without end; {_CALL}"),
+)
+
+_LINUXCNC_M: Final = (
+    *(Code(f"M{n}", "override", "override switch") for n in range(50, 54)),
+    Code("M60", "stop", "stop, change pallets"),
+    Code("M61", "tool", "tells the number of the tool"),
+    *(Code(f"M{n}", "io", "inputs and outputs") for n in range(62, 69)),
+    *(
+        Code(f"M{n}", "state", "stores or restores modal codes", f"stored modal states are not followed; {_EXPAND}")
+        for n in range(70, 74)
+    ),
+)
+
+_FANUC_M: Final = (
+    Code("M29", "tapping", "rigid tapping"),
+    Code("M198", "stop", "subprogram call", _CALL),
+)
+
+
+def _by_number(codes: tuple[Code, ...]) -> dict[float, Code]:
+    return {float(code.name[1:]): code for code in codes}
+
+
+#: by controller, and by the number that stands in the program
+G_CODES: Final[dict[Controller, dict[float, Code]]] = {
+    "linuxcnc": _by_number(_COMMON_G + _LINUXCNC_G),
+    "fanuc": _by_number(_COMMON_G + _FANUC_G),
+}
+M_CODES: Final[dict[Controller, dict[float, Code]]] = {
+    "linuxcnc": _by_number(_COMMON_M + _LINUXCNC_M),
+    "fanuc": _by_number(_COMMON_M + _FANUC_M),
+}
+
+_ARCS: Final = frozenset({"G2", "G3"})
+
+#: by letter, the codes that can use it; a letter that nobody uses is a mistake, and the program is refused
+USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
+    "linuxcnc": {
+        "D": frozenset({"G41", "G42", "G41.1", "G42.1"}),
+        "E": frozenset({"M66", "M67", "M68"}),
+        "H": frozenset({"G43", "G43.2"}),
+        "I": _ARCS | {"G5", "G5.1", "G10", "G33.1", "G87"},
+        "J": _ARCS | {"G5", "G5.1", "G10", "G87"},
+        "K": _ARCS | {"G33", "G33.1", "G87"},
+        "L": (CYCLES - {"G74"}) | {"G10", "G41", "G42", "G41.1", "G42.1", "M66"},
+        "P": _ARCS
+        | {"G4", "G5", "G10", "G64", "G74", "G82", "G84", "G86", "G89", "M19"}
+        | {"M50", "M51", "M52", "M53", "M62", "M63", "M64", "M65", "M66"},
+        "Q": frozenset({"G5", "G10", "G64", "G73", "G83", "M19", "M61", "M66", "M67", "M68"}),
+        "R": CYCLES | _ARCS | {"G10", "G41.1", "G42.1", "M19"},
+    },
+    "fanuc": {
+        "D": frozenset({"G41", "G42"}),
+        "H": frozenset({"G43", "G49"}),
+        "I": _ARCS,
+        "J": _ARCS,
+        "K": _ARCS | CYCLES,
+        "L": CYCLES | {"G10"},
+        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1"},
+        "Q": frozenset({"G5.1", "G73", "G83", "G74", "G84"}),
+        "R": CYCLES | _ARCS | {"G5.1", "G10"},
+    },
+}
+
+#: letters that are refused whatever stands with them
+REFUSED_LETTERS: Final[dict[str, str]] = {
+    "U": "the axes U V W are not supported",
+    "V": "the axes U V W are not supported",
+    "W": "the axes U V W are not supported",
+    "@": "polar coordinates (@ ^) are not supported; write X and Y",
+    "^": "polar coordinates (@ ^) are not supported; write X and Y",
+    "$": "more than one spindle ($) is not supported",
+}
+
+
+def find(letter: str, number: float, controller: Controller) -> Code | None:
+    """Return the code of a G or M word; None if it is unknown.
+
+    Parameters
+    ----------
+    letter : {'G', 'M'}
+    number : float
+        As it stands in the program, such as 38.2.
+    controller : {'linuxcnc', 'fanuc'}
+    """
+    table = (G_CODES if letter == "G" else M_CODES)[controller]
+    return table.get(round(number, 3))
