@@ -8,7 +8,8 @@ every ten minutes, and added to its Z. A net learns the coefficients; depth diff
 after an hour fell from 7 to 2 um.
 
 Here it is done on the virtual machining centre, in a measuring room; ``thermocomp papers precompensation`` prints the
-same. The revision of NC programs themselves is not part of this: the correction is applied to the depth.
+same. The cutting tests are done twice: with the schedule of corrections, applied to the depths; and with NC programs,
+which ``thermocomp revise`` would revise in the same way, read back and milled.
 """
 
 # %%
@@ -81,6 +82,17 @@ draw("precompensation-cut")
 assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_difference_um"]
 
 # %%
+# For the second of these answers each test has its NC program: four faces at four positions of Z, an hour of moves at
+# other spindle speeds, four more faces. It is revised as a file, read back as a controller reads it, and what it
+# commands is added to the true drift of that moment and place.
+
+print(page.laid_out(study.tables[4]))
+print()
+print(page.laid_out(study.tables[5]))
+draw("precompensation-surfaces")
+assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["program_depth_difference_cold_um"]
+
+# %%
 # What it cannot know
 # -------------------
 #
@@ -89,3 +101,14 @@ assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_differenc
 print(page.text(study, "E-P5", "E-P6"))
 draw("precompensation-warm")
 assert numbers["room_peak_to_peak_um"] > 1
+
+# %%
+# The same with NC programs: a start state that is wrong by half an hour does more harm than no revision; the state that
+# the last job has left does none.
+
+print(page.laid_out(study.tables[6]))
+draw("precompensation-programs")
+wrong, carried = (
+    numbers[f"program_depth_difference_warm_{what}_revised_um"] for what in ("taken_for_cold", "carried_over")
+)
+assert carried < numbers["program_depth_difference_warm_taken_for_cold_um"] < wrong

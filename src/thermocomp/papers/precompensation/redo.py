@@ -1,7 +1,9 @@
 """Pre-compensation redone: the drift from the spindle speed alone, added to the NC program beforehand (P-01 to P-07).
 
 The text is a fragment: figures and the equation are lost (E-P1). The model is identified in one test with the speeds of
-milling jobs, and judged in free run in another one with new speeds (P-05), at four positions of Z.
+milling jobs, and judged in free run in another one with new speeds (P-05), at four positions of Z. The cutting tests
+are done twice: with the schedule of corrections applied to what was recorded, here, and with NC programs that are
+revised, read back and milled, in `thermocomp.papers.precompensation.cutting`.
 """
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.models.selection.orders import Order
 from thermocomp.papers.common import Errors, errors_table
-from thermocomp.papers.precompensation import setup
+from thermocomp.papers.precompensation import cutting, cuttingtold, setup
 from thermocomp.papers.precompensation.setup import (
     CHOSEN,
     CUTS,
@@ -19,6 +21,7 @@ from thermocomp.papers.precompensation.setup import (
     PAPERS_DEPTHS,
     PAPERS_ORDERS,
     POSITIONS,
+    SHARE,
     Computed,
     scheduled,
 )
@@ -32,8 +35,6 @@ WELL = 0.9
 AS_WELL = 1.1
 #: share of rows beyond what was identified that is worth telling
 BEYOND = 0.02
-#: cutting test, criterion: what is left of the depth difference, at most the paper's share
-SHARE = PAPERS_DEPTHS[1] / PAPERS_DEPTHS[0]
 
 
 def run(seed: int, progress: Progress) -> Study:
@@ -48,14 +49,16 @@ def run(seed: int, progress: Progress) -> Study:
     -------
     Study
     """
-    c = setup.compute(seed, progress)
+    c = setup.compute(seed, lambda share, what: progress(share / 2, what))
+    models = c.models | cutting.house_models(c.learn)
+    m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))
     return Study(
         "precompensation",
         "Pre-compensation of thermal errors by revising the NC program",
-        (*_models(c), *_free_run(c), *_cutting(c), *_limits(c)),
-        _tables(c),
-        _figures(c),
-        _numbers(c),
+        (*_models(c), *_free_run(c), *_cutting(c), *_limits(c), *cuttingtold.claims(m)),
+        (*_tables(c), *cuttingtold.tables(m)),
+        (*_figures(c), *cuttingtold.figures(m)),
+        _numbers(c) | cuttingtold.numbers(m),
     )
 
 

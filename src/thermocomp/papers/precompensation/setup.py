@@ -34,6 +34,8 @@ INTERVAL = 600.0
 INTERVALS = (60.0, 120.0, 300.0, 600.0, 1200.0)
 #: depth difference of the milled surfaces (P-07), without and with [um]
 PAPERS_DEPTHS = (7.0, 2.0)
+#: criterion of the cutting tests: what is left of the depth difference, at most the paper's share
+SHARE = PAPERS_DEPTHS[1] / PAPERS_DEPTHS[0]
 #: cutting tests
 CUTS = 8
 #: a surface is milled in the first, and in the last, so many minutes of a cutting test in which the spindle runs

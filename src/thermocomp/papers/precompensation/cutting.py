@@ -1,0 +1,263 @@
+"""The cutting tests with NC programs on the virtual machine: what is milled, and in which state of machine and room."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.model import ErrorModel
+from thermocomp.datasets.virtual import find, record
+from thermocomp.models.methods import method
+from thermocomp.papers.common import fitted
+from thermocomp.papers.precompensation import program
+from thermocomp.papers.precompensation.setup import CUTS, LEAST, MILLING, NET, NONE, POSITIONS, SPEED
+from thermocomp.papers.study import Progress
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
+from thermocomp.simulation.climate import Climate
+from thermocomp.simulation.protocol import Experiment
+from thermocomp.simulation.segments import Feed, Stretch
+
+FloatArray = NDArray[np.float64]
+
+HOUR = 3600.0
+#: what a wrong start state is wrong by: the spindle ran for so long [s], at the speed of milling [1/min]
+BEFORE, BEFORE_SPEED = 0.5 * HOUR, 2000.0
+#: what the room changes by, in the hour between the surfaces [K]
+ROOM = 2.0
+#: time between two rows of the drift: the longest step of the machine [s]
+OFTEN = 20.0
+#: states of machine and room that are true
+COLD, WARM, WARMER, COLDER = "cold", "warm", "warmer", "colder"
+#: what is true, and what the revision takes for true; warm: it ran for `BEFORE`
+RIGHT = "cold"
+UNKNOWN = "warm, taken for cold"
+CARRIED = "warm, carried over"
+FALSE = "cold, taken for warm"
+WARMS, COOLS = f"the room warms by {ROOM:g} degC", f"the room cools by {ROOM:g} degC"
+#: which is true in each case, and whether the revision begins warm
+CASES: Mapping[str, tuple[str, bool]] = {
+    RIGHT: (COLD, False),
+    UNKNOWN: (WARM, False),
+    CARRIED: (WARM, True),
+    FALSE: (COLD, True),
+    WARMS: (WARMER, False),
+    COOLS: (COLDER, False),
+}
+#: models that are tried in all cases, as the paper revises
+TRIED = (NET, LEAST)
+#: methods of the house that can do with the speed alone
+HOUSE = ("arx-free-run", "dynamic")
+
+
+@dataclass(frozen=True)
+class Changing(Climate):
+    """A room that gets warmer or colder while the test runs, beside what its air does anyway.
+
+    Parameters
+    ----------
+    change : float
+        [K]
+    since : float
+        Since the start of the test [s].
+    takes : float
+        [s]; steadily.
+    """
+
+    change: float = 0.0
+    since: float = MILLING * 60.0
+    takes: float = HOUR
+
+    def air(
+        self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the air at the end of each of some equal steps, as `Climate.air` does.
+
+        Parameters
+        ----------
+        state : ndarray of shape (2, 3)
+        start : float
+            When the first step begins, since the start of the test [s].
+        step : float
+            [s]
+        n_steps : int
+        rng : Generator
+
+        Returns
+        -------
+        state : ndarray of shape (2, 3)
+        air : ndarray of shape (n_steps, 3)
+        """
+        state, air = super().air(state, start, step, n_steps, rng)
+        time = start + step * np.arange(1, n_steps + 1)
+        air[:, 0] += self.change * np.clip((time - self.since) / self.takes, 0.0, 1.0)
+        return state, air
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What came out of all tests, milled with programs that were revised in one way.
+
+    Parameters
+    ----------
+    depth : ndarray of shape (n_tests, n_positions)
+        How far the mean of the second surface lies above that of the first [um].
+    unevenness : ndarray of shape (n_tests, 2, n_positions)
+        From the lowest to the highest place within a surface [um].
+    """
+
+    depth: FloatArray
+    unevenness: FloatArray
+
+    @property
+    def mean(self) -> float:
+        """Mean magnitude of the depth difference over tests and positions [um]."""
+        return float(np.abs(self.depth).mean())
+
+    @property
+    def most(self) -> float:
+        """Greatest magnitude of it [um]."""
+        return float(np.abs(self.depth).max())
+
+    @property
+    def by_test(self) -> FloatArray:
+        """Mean magnitude of it over the positions, (n_tests,) [um]."""
+        return np.asarray(np.abs(self.depth).mean(axis=1))
+
+    @property
+    def signed(self) -> FloatArray:
+        """Mean of it over the positions, (n_tests,) [um]."""
+        return np.asarray(self.depth.mean(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Milled:
+    """All that was milled.
+
+    Parameters
+    ----------
+    surfaces : dict of (str, str, str) to Surfaces
+        By case, model and way of revising; not revised: `NONE` and no way.
+    turning : float
+        Share of the time in which the programs have the spindle speed of the recorded tests.
+    lines : int
+        Of the first program.
+    first : dict of str to list of (Face, ndarray)
+        Of the first test, cold: faces, and where their surfaces lie [um]; by the way of revising, with the net.
+    """
+
+    surfaces: dict[tuple[str, str, str], Surfaces] = field(default_factory=dict)
+    turning: float = 0.0
+    lines: int = 0
+    first: dict[str, list[tuple[program.Face, FloatArray]]] = field(default_factory=dict)
+
+    def without(self, case: str) -> Surfaces:
+        """Return what the programs mill that nobody has revised."""
+        return self.surfaces[case, NONE, ""]
+
+    def paper(self, case: str, model: str = NET) -> Surfaces:
+        """Return what comes of the paper's way."""
+        return self.surfaces[case, model, program.EVERY]
+
+
+def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
+    """Fit what the house has for machines without sensors, as it comes, to the identification.
+
+    Parameters
+    ----------
+    learn : Samples
+
+    Returns
+    -------
+    dict of str to list of ErrorModel
+        By the name of the method, one per position.
+    """
+    timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
+    targets = [c.name for c in learn.targets]
+    return {name: [fitted(method(name).build([SPEED]), learn, [t], **timed)[t] for t in targets] for name in HOUSE}
+
+
+def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Progress) -> Milled:
+    """Write, revise and mill the programs of all cutting tests.
+
+    Parameters
+    ----------
+    models : mapping of str to sequence of ErrorModel
+        One per position.
+    seed : int
+        Of the first test; the others have the next ones.
+    progress : callable
+
+    Returns
+    -------
+    Milled
+    """
+    drifts: dict[str, list[Recording]] = {}
+    for what in (COLD, WARM, WARMER, COLDER):
+        progress(0.2 * len(drifts) / 4, f"cutting tests, {what}")
+        drifts[what] = [record(true(what), seed=seed + n)[0] for n in range(CUTS)]
+    programs = [program.written(test) for test in drifts[COLD]]
+    turns = [_turns(lines, test) for lines, test in zip(programs, drifts[COLD], strict=True)]
+    milled = Milled(turning=float(np.mean(turns)), lines=len(programs[0]))
+    _mill(milled, programs, drifts, NONE, "", list(CASES))
+    for number, (name, its) in enumerate(models.items()):
+        progress(0.2 + 0.8 * number / len(models), f"programs revised with: {name}")
+        for way in program.WAYS if name == NET else program.WAYS[:-1]:
+            revised = [program.revised(lines, its, way) for lines in programs]
+            cases = [c for c, (_, warm) in CASES.items() if not warm]
+            _mill(milled, revised, drifts, name, way, cases if way == program.EVERY and name in TRIED else [RIGHT])
+        if name in TRIED:
+            start = program.warmed(its, BEFORE, BEFORE_SPEED)
+            revised = [program.revised(lines, its, program.EVERY, start) for lines in programs]
+            _mill(milled, revised, drifts, name, program.EVERY, [c for c, (_, warm) in CASES.items() if warm])
+    return milled
+
+
+def true(what: str) -> Experiment:
+    """Return the cutting test as it truly is: no noise, and the machine or the room in one of four states."""
+    experiment = find("precompensation-cut")
+    (plan,) = experiment.tests
+    plan = replace(plan, sampling=OFTEN, perfect=True, places=())
+    if what == WARM:
+        rest = Stretch(duration=plan.soak.longest - BEFORE)
+        ran = Stretch(duration=BEFORE, speed=BEFORE_SPEED, feed=Feed(600.0, 1000.0, 600.0))
+        plan = replace(plan, soak=Stretch(segments=(rest, ran)))
+    elif what in (WARMER, COLDER):
+        change = ROOM if what == WARMER else -ROOM
+        plan = replace(plan, climate=Changing(**asdict(plan.climate), change=change))
+    return replace(experiment, tests=(plan,))
+
+
+def _turns(lines: Sequence[str], test: Recording) -> float:
+    """Return the share of the rows between which a program has the spindle speed of a test."""
+    speed = test.table[SPEED].to_numpy(dtype=np.float64)[1:]
+    middle = (test.time[1:] + test.time[:-1]) / 2
+    return float(np.mean(program.turning(lines, middle) == speed))
+
+
+def _mill(
+    milled: Milled,
+    programs: Sequence[Sequence[str]],
+    drifts: Mapping[str, Sequence[Recording]],
+    model: str,
+    way: str,
+    cases: Sequence[str],
+) -> None:
+    """Mill all tests with programs that were revised in one way, in some of the cases."""
+    cut = [program.faces(lines) for lines in programs]
+    for case in cases:
+        there = drifts[CASES[case][0]]
+        lies = [[face.surface(drift) for face in faces] for faces, drift in zip(cut, there, strict=True)]
+        milled.surfaces[case, model, way] = Surfaces(
+            np.array([_second_minus_first(f, s) for f, s in zip(cut, lies, strict=True)]),
+            np.array([np.reshape([np.ptp(v) for v in s], (2, len(POSITIONS))) for s in lies]),
+        )
+        if case == RIGHT and model in (NONE, NET):
+            milled.first[way] = list(zip(cut[0], lies[0], strict=True))
+
+
+def _second_minus_first(faces: Sequence[program.Face], lies: Sequence[FloatArray]) -> list[float]:
+    mean = {(f.number, f.position): float(v.mean()) for f, v in zip(faces, lies, strict=True)}
+    return [mean[2, float(p)] - mean[1, float(p)] for p in POSITIONS]
