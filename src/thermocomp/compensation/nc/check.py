@@ -12,6 +12,8 @@ from thermocomp.core.exceptions import ProgramError
 
 #: largest difference that is rounding [um]
 ROUNDING = 0.1
+#: characters of a line that every control reads
+LONGEST = 240
 
 
 class Check:
@@ -44,6 +46,9 @@ class Check:
         ProgramError
             A move is not where it should be. This is a fault of thermocomp, and better found here than at the machine.
         """
+        longest = max(map(len, change.texts))
+        if longest > max(LONGEST, len(block.line.text)):
+            raise ProgramError(block.line.number, f"would become a line of {longest} characters; divide it")
         self._texts.extend(change.texts)
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]
