@@ -71,7 +71,7 @@ class Demand:
         Raises
         ------
         InputError
-            It is larger than any thermal drift.
+            It is larger than any thermal drift, or not a number.
         """
         renewed = False
         now: Field = drift.deviation
@@ -80,11 +80,13 @@ class Demand:
                 self._field, renewed = drift.field(), True
                 self._next = (math.floor(time / self.every + 1e-9) + 1) * self.every
             now = self._field
-        x, y, z = (
-            w if renewed or abs(w - f) > self.tolerance else f
-            for w, f in zip(opposed(now(point)), self._force, strict=True)
+        deviation, force, near = now(point), self._force, self.tolerance
+        if not renewed and all(abs(d + f) <= near for d, f in zip(deviation, force, strict=True)):
+            return force
+        x, y, z = (  # a nan is never near, and no correction opposes it
+            f if not renewed and abs(w - f) <= near else w for w, f in zip(opposed(deviation), force, strict=True)
         )
-        if not max(abs(x), abs(y), abs(z)) <= self.most:  # also refuses nan
+        if max(abs(x), abs(y), abs(z)) > self.most:
             raise InputError(
                 f"the correction after {time:.0f} s would be X {x:.0f}, Y {y:.0f}, Z {z:.0f} um: more than "
                 f"{self.most:g} um is no thermal drift; check the model, its unit and the start state"

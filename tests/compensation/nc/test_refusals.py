@@ -1,0 +1,251 @@
+"""What is refused: always with the line, what was found, and what to do."""
+
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracle_run import Oracle
+from test_follower import needs_linuxcnc, run
+
+from thermocomp.compensation.nc.block import Setup
+from thermocomp.core.exceptions import ProgramError
+
+START = "G21 G90 F100 S100\n"
+
+
+@pytest.fixture(scope="module")
+def oracle() -> Iterator[Oracle]:
+    with Oracle() as running:
+        yield running
+
+
+#: refused by LinuxCNC too
+WRONG = [
+    ("X1", "no motion code"),
+    ("G80 X1", "axis words beside G80"),
+    ("G0 G1 X1", "exclude each other"),
+    ("G0 G92 X1", "both would use the axis words"),
+    ("G4", "G4 needs P"),
+    ("G4 P-1", "negative"),
+    ("G0 X1 R1", "no code that uses it"),
+    ("G0 X1 H1", "no code that uses it"),
+    ("G1 X1 P1", "no code that uses it"),
+    ("G0 X1 X2", "twice"),
+    ("G2 X1", "needs its centre"),
+    ("G2 X1 R1 I1", "needs its centre"),
+    ("G2 X1 I0.5 K1", "the centre is in I and J"),
+    ("G2 X0 R1", "ends where it starts"),
+    ("G2 X2 R0.9", "too small"),
+    ("G2 X2 I1.03", "check centre and end"),
+    ("G2 X0 Y0 I0.001", "no radius"),
+    ("G2 X2 I1 P0", "whole number"),
+    ("G90.1\nG2 X2 I1", "G90.1 needs"),
+    ("G91 G53 G0 X1", "G91"),
+    ("G2 X2 I1\nG53 X1", "needs G0 or G1"),
+    ("G81 X1 Z-1", "needs R"),
+    ("G82 X1 Z-1 R1", "needs P"),
+    ("G83 X1 Z-1 R1 Q0", "above 0"),
+    ("G81 X1 Z2 R1", "below the bottom"),
+    ("G81 X1 Z-1 R1 L0", "whole number"),
+    ("G81 X1 Z-1 R1 A1", "rotary"),
+    ("G81 X1 Z-1 R1\nR2", "no code that uses it"),
+    ("G84 X1 Z-1 R1", "spindle stands"),
+    ("M4\nG84 X1 Z-1 R1", "the other way"),
+    ("G93 G1 X1 F1\nX2", "needs F"),
+    ("G93 F1 G81 X1 Z-1 R1", "G93"),
+    ("G94\nG1 X1", "no F is in force"),
+    ("G1 X1 F0", "no F is in force"),
+    ("G33 Z-1", "needs K"),
+    ("M3\nG33 Z-1 K1 F1", "remove F"),
+    ("G33 Z-1 K1", "spindle stands"),
+    ("G38.2 X0", "starts where it ends"),
+    ("G5 X1", "needs P and Q"),
+    ("G10 L2 X1", "G10 L2"),
+    ("G10 P1 X1", "is not supported"),
+    ("G10 L2 P11 X1", "9 coordinate systems"),
+    ("G10 L20 P1 X1 R5", "only"),
+    ("G92", "without axis words"),
+    ("G41 D1\nG92 X1", "cutter compensation"),
+    ("G41 D1\nG54", "cutter compensation"),
+    ("G41 D1\nG18", "cutter compensation"),
+    ("G41 D1\nT1\nM6", "cutter compensation"),
+    ("G41 D1\nG28", "cutter compensation"),
+    ("G41 D1\nG42 D1", "cutter compensation"),
+    ("G41 D1\nG38.2 X5", "cutter compensation"),
+    ("M3 M4", "exclude each other"),
+    ("M61", "needs Q"),
+    ("T1.5", "whole number"),
+    ("F-1", "negative"),
+    ("S-1", "negative"),
+    ("G54.1 P1", "unknown"),
+    ("G68", "unknown"),
+    ("G0.5 X1", "unknown"),
+    ("M29", "unknown"),
+    ("M3 M8 M6 T1 M0 M48", "more than 4 M codes"),
+]
+
+#: not followed for certain, whatever LinuxCNC does
+NOT_FOLLOWED = [
+    ("G0 X#7", "unknown"),
+    ("M98 P100", "subprogram"),
+    ("M99", "subprogram"),
+    ("M101", "a code of the user"),
+    ("M70", "M70"),
+    ("G28.1", "G28"),
+    ("G5.2 X1 Y1 L3 P1", "NURBS"),
+    ("G76 P1 Z-1 I-1 J1 K1", "--expand"),
+    ("G88 X1 Z-1 R1 P1", "by hand"),
+    ("G96 S100 D500", "G97"),
+    ("G0 U1", "U V W"),
+    ("G0 @1 ^30", "polar"),
+    ("o100 if [1]", "--expand"),
+    ("o<a> call", "--expand"),
+    ("G18 M3 G84 X1 Y-1 R1", "G17"),
+    ("G10 L2 P1 R30\nG18 G2 X2 I1", "rotated"),
+    ("G43 H1\nG20\nG49", "G49 before the unit"),
+    ("G81 X1 Z-1 R1\nG18\nG81 X1 Y-1 R1 Z0", "G80 before"),
+    ("/G91", "--block-delete"),
+    ("G91 G0\n/X1", "--block-delete"),
+    ("G0\n/G1 X1", "--block-delete"),
+    ("/G92 X1", "--block-delete"),
+    ("/M3", "--block-delete"),
+    ("/M30", "--block-delete"),
+    ("/#1=5\nG0 X#1", "--block-delete"),
+    ("G81 X1 Z-1 R1\n/X2", "--block-delete"),
+]
+
+
+@pytest.mark.parametrize(("text", "reason"), WRONG + NOT_FOLLOWED)
+def test_refused_with_line_and_reason(text: str, reason: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        run(START + text + "\n")
+    assert reason in caught.value.reason
+    assert caught.value.line == 1 + len(text.splitlines())
+
+
+@needs_linuxcnc
+@pytest.mark.parametrize("text", [text for text, _ in WRONG])
+def test_linuxcnc_refuses_it_too(oracle: Oracle, text: str) -> None:
+    assert oracle.run(START + text + "\nM2\n").error
+
+
+@needs_linuxcnc
+@pytest.mark.parametrize(
+    ("arc", "right", "wrong"),
+    [
+        ("G2 X{} I1", 2.02828, 2.02829),
+        ("G2 X{} I100", 200.10010, 200.10011),
+        ("G2 X{} I10000", 20002.8284, 20002.8285),
+        ("G2 X{} R1", 2.002539, 2.002541),
+        ("G20\nG2 X{} I1", 2.002828, 2.002829),
+    ],
+)
+def test_radii_are_judged_as_linuxcnc_does(oracle: Oracle, arc: str, right: float, wrong: float) -> None:
+    text = START + arc + "\nM2\n"
+    assert not oracle.run(text.format(right)).error
+    run(text.format(right))
+    assert oracle.run(text.format(wrong)).error
+    with pytest.raises(ProgramError):
+        run(text.format(wrong))
+
+
+@pytest.mark.parametrize(
+    "text", ["G0 X1", "G92 X1", "F100", "G10 L2 P1 X1", "G28 Z1", "G0 X0\nG2 X0 I1", "G43.1 Z1", "G20 F10"]
+)
+def test_the_unit_has_to_be_told(text: str) -> None:
+    with pytest.raises(ProgramError, match=r"G20 or G21|the unit in force before"):
+        run(text, Setup())
+    run("G21\nF1\nG0\n" + text)
+
+
+def test_nothing_is_needed_before_lengths_that_are_none() -> None:
+    blocks = run("T1 M6\nG4 P1\nG91 G28 Z0\nM8\nG21 G90 G0 X1\n", Setup())
+    assert blocks[-1].end[0] == 1.0
+
+
+def test_a_speed_that_was_never_told() -> None:
+    with pytest.raises(ProgramError, match="no spindle speed was stated"):
+        run("M3")
+    assert run("S0 M3")[0].speed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("G16", "polar"),
+        ("G51 X1", "scaling"),
+        ("G51.1 X0", "mirroring"),
+        ("G68 X0 Y0 R30", "rotated"),
+        ("G43.4 H1", "tool centre point"),
+        ("G12.1", "polar interpolation"),
+        ("G7.1 C10", "cylindrical"),
+        ("G65 P9000", "macro"),
+        ("G76 X1 Z-1 R1", "G86"),
+        ("M198 P1", "subprogram"),
+        ("G28", "without axis words"),
+        ("G10 L50", "is not supported"),
+        ("G52 X1\nG92 X2", "G52 and G92"),
+        ("IF [#1 EQ 1] GOTO 10", "--expand"),
+        ("M10", "unknown"),
+    ],
+)
+def test_fanuc_refusals(text: str, reason: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        run("G21 G90\n" + text + "\n", Setup("fanuc", inch=False))
+    assert reason in caught.value.reason
+
+
+def test_integers_can_be_refused() -> None:
+    setup = Setup("fanuc", inch=False, integers="refuse")
+    with pytest.raises(ProgramError, match="no decimal point"):
+        run("G0 X10", setup)
+    assert run("G0 X10. Y0", setup)[0].end[0] == 10.0
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.lists(
+        st.lists(
+            st.one_of(
+                st.sampled_from(
+                    [
+                        "G0",
+                        "G1",
+                        "G2",
+                        "G3",
+                        "G17",
+                        "G18",
+                        "G19",
+                        "G20",
+                        "G21",
+                        "G28",
+                        "G43",
+                        "G43.1",
+                        "G5",
+                        "G5.1",
+                        "G10",
+                    ]
+                ),
+                st.sampled_from(
+                    ["G52", "G53", "G55", "G81", "G83", "G87", "G92", "G90", "G91", "G93", "G95", "G33.1", "M6"]
+                ),
+                st.builds(
+                    "{}{}".format,
+                    st.sampled_from("ABCDEFHIJKLPQRSTUVWXYZ/#"),
+                    st.sampled_from(["0", "1", "-1", "2.5", "[1/0]", "#5", "1e5", ""]),
+                ),
+                st.text(max_size=4),
+            ),
+            max_size=7,
+        ).map(" ".join),
+        max_size=6,
+    ),
+    st.sampled_from(["linuxcnc", "fanuc"]),
+)
+def test_rubbish_is_refused_and_never_crashes(lines: list[str], controller: str) -> None:
+    setup = Setup(controller, inch=False)  # type: ignore[arg-type]
+    try:
+        run("F100 S100 M3\n" + "\n".join(lines) + "\n", setup)
+    except ProgramError as error:
+        assert error.reason  # noqa: PT017
