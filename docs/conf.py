@@ -22,6 +22,7 @@ release = version = version_of("thermocomp")
 extensions = [
     "cli_help",
     "cli_run",
+    "code_table",
     "component_table",
     "method_table",
     "requirement_table",

@@ -12,6 +12,7 @@ from thermocomp.cli import commands
 from thermocomp.cli.iso230 import iso230
 from thermocomp.cli.papers import papers
 from thermocomp.cli.position import position
+from thermocomp.cli.revise import revise
 from thermocomp.cli.volumetric import volumetric
 from thermocomp.core.exceptions import ThermocompError
 
@@ -35,6 +36,7 @@ for command in (
     position,
     iso230,
     volumetric,
+    revise,
     papers,
 ):
     app.command(command)

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.cli.extras import needs
+from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     Flag,
     Json,
@@ -216,7 +217,6 @@ def _print_json(
     trouble: list[str],
 ) -> None:
     from thermocomp.assessment import iso230_tables as tables
-    from thermocomp.cli.output import print_json
 
     content = {
         "trouble": trouble,

@@ -1,6 +1,5 @@
 """What the commands print: a table for people, JSON for machines."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from thermocomp.assessment.choice import Table as ChoiceTable
 from thermocomp.assessment.compare import Assessment, Comparison
 from thermocomp.assessment.harm import CycleVerdict
 from thermocomp.assessment.study import Fitted, Judged
+from thermocomp.cli.jsonoutput import print_json
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
@@ -365,19 +365,3 @@ def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
         "notes": list(r.notes),
         "findings": [{"severity": f.severity, "kind": f.kind, "channel": f.channel, "text": f.text} for f in found],
     }
-
-
-def print_json(content: Any, console: Console) -> None:
-    """Print what a program shall read."""
-    # JSON has no nan and no infinity: what is not known is null
-    console.file.write(json.dumps(_nulled(content), indent=2, ensure_ascii=False) + "\n")
-
-
-def _nulled(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _nulled(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_nulled(v) for v in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.cli.extras import needs
+from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     Flag,
     Json,
@@ -93,7 +94,6 @@ def papers(
     if repeats < 1:
         raise InputError(f"--repeats {repeats}: must be at least 1")
     with needs("study"):
-        from thermocomp.cli.output import print_json
         from thermocomp.papers.studies import STUDIES
     chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
     asked = {"--with": measured, "--mapping": mapping, "--target": target, "--models": models}

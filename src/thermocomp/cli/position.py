@@ -8,6 +8,7 @@ from rich.console import Console
 
 from thermocomp.cli import progress
 from thermocomp.cli.extras import needs
+from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     Flag,
     Json,
@@ -128,7 +129,6 @@ def position(
         refuse_existing([output], overwrite, recordings, ".json")
     with needs("study"):
         from thermocomp.assessment import position as assessing
-        from thermocomp.cli import output as out
         from thermocomp.cli import positiontables as told
         from thermocomp.files import positionfile
         from thermocomp.models.methods import method
@@ -170,7 +170,7 @@ def position(
         entries = [told.content(f, left_open) for f in found]
         content = {"components": entries} if several else entries[0]
         file = None if output is None else str(output)
-        out.print_json({"trouble": trouble, "judging": found[0].assessment.protocol, **content, "file": file}, _console)
+        print_json({"trouble": trouble, "judging": found[0].assessment.protocol, **content, "file": file}, _console)
     else:
         if several:
             told.show_all(found, tests, left_open, _console)

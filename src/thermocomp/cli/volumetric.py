@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.cli.extras import needs
+from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, OptionalOutput, read_recordings, refuse_existing, tell_trouble
 from thermocomp.cli.progress import by_share
 from thermocomp.core.exceptions import InputError
@@ -100,8 +101,6 @@ def volumetric(
             from thermocomp.report import volumetric as pages
         pages.write(result, output)
     if json:
-        with needs("study"):
-            from thermocomp.cli.output import print_json
         print_json({"trouble": trouble, **_content(result)}, _console)
     else:
         _show(result, point=at is not None or grid is None, volume=grid is not None or at is None)

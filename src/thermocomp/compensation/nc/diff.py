@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator
 
 #: unchanged lines around a change
 CONTEXT = 3
+#: lines of a hunk that are held in memory: one that is longer comes in parts without context
+LONGEST = 4000
 
 
 def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: str, before: int = 0) -> Iterator[str]:
@@ -40,6 +42,12 @@ def unified(pairs: Iterable[tuple[str, tuple[str, ...]]], name: str, revised: st
             hunk += ([("-", text)] if text else []) + [("+", t) for t in texts]
             quiet = 0
             waiting.clear()
+            if len(hunk) > LONGEST:
+                # a hunk that ends without context may not begin with any: patch would look for it at the file's end
+                before_change = next(k for k, (mark, _) in enumerate(hunk) if mark != " ")
+                first = (first[0] + before_change, first[1] + before_change)
+                yield from _hunk(head, hunk[before_change:], first, before)
+                hunk = []
             continue
         if hunk:
             hunk.append((" ", text))

@@ -1,0 +1,24 @@
+"""What the commands print for a program to read; nothing of the training wing is needed for it."""
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+
+def print_json(content: Any, console: Console) -> None:
+    """Print what a program shall read."""
+    # JSON has no nan and no infinity: what is not known is null
+    console.file.write(json.dumps(_nulled(content), indent=2, ensure_ascii=False) + "\n")
+
+
+def _nulled(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _nulled(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_nulled(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value

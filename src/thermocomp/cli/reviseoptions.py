@@ -1,0 +1,364 @@
+"""What ``thermocomp revise`` can be told, and the objects that come of it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Group, Parameter
+
+from thermocomp.cli.options import Flag, OptionalNames
+from thermocomp.compensation.nc import start
+from thermocomp.compensation.nc.block import Point, Setup
+from thermocomp.compensation.nc.coordinates import Coordinates
+from thermocomp.compensation.nc.demand import Demand
+from thermocomp.compensation.nc.drift import Drift
+from thermocomp.compensation.nc.inputs import SPEED, Signal, constants
+from thermocomp.compensation.nc.method import Method
+from thermocomp.compensation.nc.offset import Offset
+from thermocomp.compensation.nc.start import Start
+from thermocomp.compensation.nc.stations import Station, stations
+from thermocomp.compensation.nc.text import DIGITS
+from thermocomp.compensation.nc.timeline import Kinematics
+from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.units import measured as with_unit
+from thermocomp.files import forecast as forecasts
+from thermocomp.files import jobstate, modelfile
+from thermocomp.files.machines import read_machine
+
+Zero = Literal["start", "cold", "last"]
+Models = Annotated[list[Path], Parameter(consume_multiple=True, negative=())]
+
+_SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
+_COUNTED: dict[Zero, str] = {
+    "start": "from the start of the program",
+    "cold": "from the cold machine",
+    "last": "from where the last job counted it",
+}
+
+
+def _group(name: str, order: int) -> Group:
+    return Group(name, sort_key=order)
+
+
+@Parameter(name="*", group=_group("The drift", 1))
+@dataclass(frozen=True, kw_only=True)
+class Drifting:
+    """What makes the tool drift.
+
+    Parameters
+    ----------
+    model : list of Path
+        Model files of thermocomp fit (.json).
+    axis : list of str
+        Which axis a model is for, such as ch3=Z, or "zz=X at Z 200 mm" for one of several places; models that are not
+        named are left out. Not needed where the targets are called x_um, z or z_at_200.
+    constant : list of str
+        Inputs that the program does not tell, such as "ambient=22 degC".
+    forecast : Path
+        CSV file with such inputs over the time since the start of the program (columns such as time_min, ambient_C).
+    """
+
+    model: Models
+    axis: OptionalNames = None
+    constant: OptionalNames = None
+    forecast: Path | None = None
+
+    def stations(self) -> list[Station]:
+        """Return which model stands for which axis."""
+        return stations([m for path in self.model for m in modelfile.read(path)], self.axis or ())
+
+    def others(self, found: Sequence[Station]) -> tuple[dict[str, Signal], list[str]]:
+        """Return the inputs that the program does not tell, and what was not read of them."""
+        models = [s.model for s in found]
+        if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
+            raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
+        signals = constants(self.constant or (), models)
+        if self.forecast is None:
+            return signals, []
+        read = forecasts.read(self.forecast)
+        twice = sorted(set(signals) & set(read.columns))
+        if twice:
+            raise InputError(f"{self.forecast}: {twice[0]} is given by --constant too; take one of them away")
+        wanted = {i.name for m in models for i in m.inputs}
+        notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
+        notes += [f"{self.forecast}: {text}" for text in read.left_out]
+        return signals | {n: Signal(*column) for n, column in read.columns.items() if n in wanted}, notes
+
+    def hashes(self) -> dict[str, str]:
+        """Return the name of the file and the beginning of its SHA-256 by target."""
+        return {
+            m.target: f"{path.name} {sha256(path.read_bytes()).hexdigest()[:8]}"
+            for path in self.model
+            for m in modelfile.read(path)
+        }
+
+
+@Parameter(name="*", group=_group("The state at the start: exactly one of cold, carried, measured", 2))
+@dataclass(frozen=True, kw_only=True)
+class Starting:
+    """How warm the machine is when the program starts.
+
+    Parameters
+    ----------
+    cold : bool
+        It has stood still for long.
+    carried : Path
+        It is as the last job has left it: the file OUT.job.json of that revision.
+    pause : str
+        How long the spindle stood still since then, such as "30 min"; not at all if not given.
+    measured : list of str
+        How far the tool point has drifted from the cold machine, such as z=12um.
+    zero : str
+        What the drift counts from, that is when the work offsets were set. start: at the start of the program; cold: on
+        the cold machine; last: when those of the last job were. If not given, nobody has touched them since the machine
+        was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
+    """
+
+    cold: Flag = False
+    carried: Path | None = None
+    pause: str | None = None
+    measured: OptionalNames = None
+    zero: Zero | None = None
+
+    def check(self) -> None:
+        """Raise `InputError` if the state is not stated, or more than once."""
+        given = self.cold + (self.carried is not None) + (self.measured is not None)
+        if given != 1:
+            found = "it is not stated" if not given else f"it is stated {given} times"
+            raise InputError(
+                f"how warm is the machine when the program starts? {found}: give one of --cold, --carried JOB.json and "
+                "--measured z=12um"
+            )
+        if self.pause is not None and self.carried is None:
+            raise InputError("--pause is the time since the last job: it goes with --carried")
+
+    def start(self, found: Sequence[Station], others: Mapping[str, Signal]) -> Start:
+        """Return the state of the models."""
+        if self.carried is not None:
+            pause = 0.0 if self.pause is None else value(self.pause, "time", "--pause", "30 min")
+            return start.carried(found, jobstate.read(self.carried).state, pause)
+        if self.measured is not None:
+            return start.measured(found, start.deviations(self.measured), others)
+        return start.cold(found, others)
+
+    def drift(self, found: Sequence[Station], others: Mapping[str, Signal]) -> Drift:
+        """Return the drift at the start of the program."""
+        return Drift(found, self.start(found, others), others, zero=self._zero)
+
+    @property
+    def _zero(self) -> Zero:
+        return self.zero or ("start" if self.cold else "cold" if self.carried is None else "last")
+
+    def words(self) -> str:
+        """Return the start state in words."""
+        if self.carried is not None:
+            after = f", {self.pause} later" if self.pause else ""
+            return f"as {self.carried.name} left it{after}"
+        return f"measured {', '.join(self.measured)}" if self.measured else "cold"
+
+    def counted(self) -> str:
+        """Return what the drift counts from, in words."""
+        return _COUNTED[self._zero]
+
+
+@Parameter(name="*", group=_group("The revision", 3))
+@dataclass(frozen=True, kw_only=True)
+class Way:
+    """How the correction gets into the program.
+
+    Parameters
+    ----------
+    method : str
+        coordinates: it is added to the words of X, Y and Z; offset: G52 shifts the work coordinates, where the tool is
+        up only.
+    every : str
+        Renew the correction every so often, such as "10 min".
+    tolerance : str
+        Renew it as soon as the drift has moved by that much; with --every only along the way, where the drift depends
+        on the place.
+    step : str
+        In a cut it changes by that much at most, per block and per 10 mm.
+    largest : str
+        A correction beyond that is refused: it is no thermal drift any more.
+    safe_z : str
+        For --method offset: the tool is up at and above this Z of the work coordinates. If not given, at tool changes,
+        and where Z was moved in machine coordinates.
+    expand : bool
+        Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
+    interpreter : str
+        Prove the result by LinuxCNC's interpreter: auto, where it is installed; off; required.
+    """
+
+    method: Literal["coordinates", "offset"] = "coordinates"
+    every: str | None = None
+    tolerance: str = "1 um"
+    step: str = "1 um"
+    largest: str = "400 um"
+    safe_z: str | None = None
+    expand: Flag = False
+    interpreter: Literal["auto", "off", "required"] = "auto"
+
+    def demand(self) -> Demand:
+        """Return when the correction is renewed."""
+        every = None if self.every is None else positive(self.every, "time", "--every", "10 min")
+        tolerance = positive(self.tolerance, "displacement", "--tolerance", "1 um")
+        return Demand(tolerance, every, positive(self.largest, "displacement", "--largest", "400 um"))
+
+    def made(self, controller: Literal["linuxcnc", "fanuc"], axes: Sequence[str]) -> Method:
+        """Return the method."""
+        digits, step = DIGITS[controller], positive(self.step, "displacement", "--step", "1 um")
+        if self.method == "coordinates":
+            if self.safe_z is not None:
+                raise InputError("--safe-z is for --method offset: the coordinates are changed anywhere")
+            return Coordinates(digits, step)
+        safe = None if self.safe_z is None else value(self.safe_z, "position", "--safe-z", "5 mm")
+        x, y, z = (name in axes for name in "XYZ")
+        return Offset(digits, step, safe_z=safe, axes=(x, y, z))
+
+    def words(self) -> str:
+        """Return the method in words."""
+        often = f"every {self.every}" if self.every else f"by {self.tolerance}"
+        return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
+
+
+@Parameter(name="*", group=_group("The controller: what does not stand in the program", 4))
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """What stands at the controller and not in the program.
+
+    Parameters
+    ----------
+    controller : str
+        Whose habits the program has; the ISO programs of most machining centres are like Fanuc's.
+    units : str
+        Unit when the program starts; without it the program has to say G20 or G21.
+    speed : str
+        Spindle speed when the program starts, such as "6000 1/min"; without it the program has to say S and M3.
+    origin : list of str
+        Where work coordinates begin, such as "G54=100 mm, 50 mm, 0 mm": it counts where the drift depends on the place.
+    tool : list of str
+        Lengths of tools, such as "1=120 mm".
+    home : str
+        Where G28 goes, such as "0 mm, 0 mm, 400 mm".
+    integers : str
+        What a length without a decimal point is: whole millimetres or inches; the least increment; or a reason to
+        refuse the program. If not given, whole for linuxcnc, refuse for fanuc.
+    least : str
+        The least increment.
+    block_delete : str
+        on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused.
+    """
+
+    controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
+    units: Literal["mm", "inch"] | None = None
+    speed: str | None = None
+    origin: OptionalNames = None
+    tool: OptionalNames = None
+    home: str | None = None
+    integers: Literal["whole", "least", "refuse"] | None = None
+    least: str = "1 um"
+    block_delete: Literal["on", "off"] = "off"
+
+    def setup(self) -> Setup:
+        """Return it as the follower wants it."""
+        return Setup(
+            controller=self.controller,
+            inch=None if self.units is None else self.units == "inch",
+            speed=0.0 if self.speed is None else positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
+            offsets=dict(_origin(text) for text in self.origin or ()),
+            tools=dict(_tool(text) for text in self.tool or ()),
+            home=(0.0, 0.0, 0.0) if self.home is None else _point(self.home, f"--home {self.home!r}"),
+            integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
+            least=positive(self.least, "position", "--least", "1 um"),
+            skip_optional=self.block_delete == "on",
+        )
+
+
+@Parameter(name="*", group=_group("The time it takes", 5))
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """How fast the machine is.
+
+    Parameters
+    ----------
+    machine : Path
+        Machine file (.toml) with rapids and accelerations of the axes.
+    tool_change : str
+        How long a tool change takes.
+    stop : str
+        How long the operator lets it stand at M0 and M1.
+    """
+
+    machine: Path | None = None
+    tool_change: str = "8 s"
+    stop: str = "60 s"
+
+    def kinematics(self) -> tuple[Kinematics, list[str]]:
+        """Return how fast the machine is, and what of it is a guess."""
+        change = value(self.tool_change, "time", "--tool-change", "8 s")
+        stop = value(self.stop, "time", "--stop", "60 s")
+        if self.machine is None:
+            guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
+            return Kinematics(tool_change=change, stop=stop), [guess]
+        machine = read_machine(self.machine)
+        silent = [a.name for a in machine.axes if a.name in "XYZ" and None in (a.rapid, a.acceleration)]
+        notes = [f"{self.machine}: no rapid or acceleration of {', '.join(silent)}: taken as 30 m/min and 3 m/s2"]
+        return Kinematics.of(machine, tool_change=change, stop=stop), notes if silent else []
+
+
+def value(text: str, quantity: str, option: str, example: str) -> float:
+    """Return the value of an option in house units.
+
+    Raises
+    ------
+    InputError
+        It is no value with a unit of that quantity.
+    """
+    try:
+        number = with_unit(text, quantity)
+    except UnitError as e:
+        raise InputError(f"{option} {text!r}: {e}") from e
+    if number is None:
+        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
+    return number
+
+
+def positive(text: str, quantity: str, option: str, example: str) -> float:
+    """Return the value of an option that must be positive; see `value`."""
+    number = value(text, quantity, option, example)
+    if not number > 0:
+        raise InputError(f"{option} {text!r}: must be positive")
+    return number
+
+
+def _origin(text: str) -> tuple[int, Point]:
+    name, _, place = text.partition("=")
+    found = _SYSTEM.fullmatch(name.strip())
+    if found is None or (found[2] and found[3] and found[2] != "1"):
+        raise InputError(f'--origin {text!r}: want a work coordinate system, such as "G54=100 mm, 50 mm, 0 mm"')
+    base, decimal, extra = int(found[1]), found[2], found[3]
+    point = _point(place, f"--origin {text!r}")
+    if extra:  # G54.1 P3
+        return 100 + int(extra), point
+    if decimal and base != 9:
+        raise InputError(f"--origin {text!r}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
+    return (6 + int(decimal) if decimal else base - 3), point
+
+
+def _point(text: str, said: str) -> Point:
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
+    x, y, z = (value(part, "position", said, "100 mm") for part in parts)
+    return x, y, z
+
+
+def _tool(text: str) -> tuple[int, float]:
+    name, _, length = (part.strip() for part in text.partition("="))
+    number = name.upper().removeprefix("T")
+    if not number.isdecimal():
+        raise InputError(f'--tool {text!r}: want the number of a tool and its length, such as "1=120 mm"')
+    return int(number), value(length, "position", f"--tool {text!r}", "120 mm")

@@ -1,0 +1,143 @@
+"""What ``thermocomp revise`` prints: a table for people, or all numbers for a program."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from thermocomp.cli.reviserun import Bound, Done, Job
+from thermocomp.compensation.nc.inputs import SPEED
+
+#: lines from which on the time that one takes can be told
+MANY = 1000
+
+
+def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
+    """Print what was done to a program, and how far the tool may still be off."""
+    revision = job.revision
+    console.print(
+        f"[bold]{escape(str(job.program))}[/]: {_many(revision.lines, 'line')}, {revision.changed} of them changed; "
+        f"runs {duration(revision.seconds)}; {_spindle(job)}; {_many(len(revision.tool_changes), 'tool change')}",
+        soft_wrap=True,
+    )
+    console.print(f"Start: {escape(job.start)}; {escape(job.method)}", soft_wrap=True)
+    console.print(_bounds(done.bounds))
+    if done.proof is not None:
+        console.print(
+            f"[green]proved[/] LinuxCNC's interpreter ran both programs: {_many(done.proof.moves, 'move')}, each that "
+            f"of the original plus its correction, within {max(done.proof.largest, 0.001):.3f} um",
+            soft_wrap=True,
+        )
+    for warning in warnings(job, done):
+        console.print(f"[yellow]but[/] {escape(warning)}", soft_wrap=True)
+    for note in notes:
+        console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
+    took = f"revised in {done.seconds:.1f} s"
+    if revision.lines >= MANY:
+        took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
+    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    console.print(f"Written: {escape(', '.join(map(str, job.paths.all())))}", soft_wrap=True)
+
+
+def warnings(job: Job, done: Done) -> list[str]:
+    """Return why the result may be worse than its bound says."""
+    drift = job.drift
+    found = [
+        f"{o.name} went to {o.farthest:g} {o.unit}, and a model was trained from {o.low:g} to {o.high:g} {o.unit}: "
+        f"outside its range for {duration(o.seconds)}, the bound is widened by all it says since"
+        for o in drift.outside
+    ]
+    found += [
+        f"the forecast of {name} ends before the program: its last value was held for {duration(seconds)}"
+        for name, seconds in drift.held.items()
+    ]
+    found += [
+        f"{axis} was asked for {far:.1f} mm beyond its outermost station: the value there was held"
+        for axis, far in drift.beyond.items()
+    ]
+    for b in done.bounds:
+        if math.isnan(b.model):
+            found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")
+    if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
+        found.append("the models know the spindle speed alone: a change of the room is in no bound")
+    if done.unproved:
+        found.append(f"not proved by LinuxCNC's interpreter: {done.unproved}")
+    if job.paths.picture is None:
+        found.append("no picture was drawn: matplotlib is not installed (pip install 'thermocomp[study]')")
+    return found
+
+
+def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
+    """Return all numbers, units in the names."""
+    revision, paths = job.revision, job.paths
+    return {
+        "program": str(job.program),
+        "files": {name: None if path is None else str(path) for name, path in zip(paths._fields, paths, strict=True)},
+        "lines": revision.lines,
+        "changed": revision.changed,
+        "run_time_s": revision.seconds,
+        "spindle_1_per_min": [revision.slowest, revision.fastest],
+        "tool_changes_s": revision.tool_changes,
+        "models": list(job.models),
+        "start": job.start,
+        "method": job.method,
+        "axes": [
+            {
+                "axis": b.axis,
+                "drift_low_um": b.low,
+                "drift_high_um": b.high,
+                "without_um": b.without,
+                "left_um": b.left,
+                "left_line": b.line,
+                "model_um": b.model,
+                "bound_um": b.most,
+            }
+            for b in done.bounds
+        ],
+        "proof": None if done.proof is None else {"moves": done.proof.moves, "largest_um": done.proof.largest},
+        "warnings": warnings(job, done),
+        "notes": list(notes),
+        "us_per_line": 1e6 * done.seconds / max(revision.lines, 1),
+        "revising_s": done.seconds,
+        "proving_s": done.proving,
+    }
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _bounds(bounds: Sequence[Bound]) -> Table:
+    table = Table(
+        caption="um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    )
+    table.add_column("axis")
+    for heading in ("drift from", "to", "in the cuts", "left in the cuts", "at line", "model", "bound"):
+        table.add_column(heading, justify="right")
+    for b in bounds:
+        cells = (b.low, b.high, b.without, b.left)
+        rest = ("not known",) * 2 if math.isnan(b.model) else (_um(b.model), _um(b.most))
+        table.add_row(b.axis, *map(_um, cells), str(b.line or ""), *rest)
+    return table
+
+
+def _um(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'s' * (n != 1)}"
+
+
+def _spindle(job: Job) -> str:
+    slowest, fastest = job.revision.slowest, job.revision.fastest
+    if not fastest:
+        return "the spindle stands still"
+    return f"spindle {slowest:g} 1/min" if slowest == fastest else f"spindle {slowest:g} to {fastest:g} 1/min"

@@ -1,0 +1,54 @@
+"""NC programs as files: any bytes and line endings come through, and a header can be filled in when all is known."""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TextIO
+
+from thermocomp.core.exceptions import InputError
+
+
+def opened(path: Path) -> TextIO:
+    """Open a program for reading; its lines come with their endings.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name an NC program")
+    try:
+        return path.open(encoding="latin-1", newline="")
+    except FileNotFoundError as e:
+        raise InputError(f"{path}: no such file") from e
+
+
+def created(path: Path) -> TextIO:
+    """Open a program for writing: what is written is what the file holds."""
+    return path.open("w", encoding="latin-1", newline="")
+
+
+def fill(draft: Path, target: Path, lines: Mapping[str, str]) -> None:
+    """Copy a program, or a diff of it, with some of its lines replaced.
+
+    Parameters
+    ----------
+    draft, target : Path
+    lines : mapping of str to str
+        New lines by old ones, with their endings. Each old one is there once, in this order.
+
+    Raises
+    ------
+    ValueError
+        One of them is not there.
+    """
+    waiting = [(old.encode("latin-1"), new.encode("latin-1")) for old, new in lines.items()]
+    with draft.open("rb") as source, target.open("wb") as written:
+        while waiting and (line := source.readline()):
+            if line == waiting[0][0]:
+                line = waiting.pop(0)[1]
+            written.write(line)
+        if waiting:
+            raise ValueError(f"there is no line {waiting[0][0]!r} in {draft}")
+        shutil.copyfileobj(source, written)

@@ -1,0 +1,105 @@
+"""The picture of a revised program: how far the tool would drift, and what is left of it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from thermocomp.compensation.nc.course import Run
+from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL, drawing
+
+FloatArray = NDArray[np.float64]
+
+TAKEN_OFF = COLOURS[0]
+#: of so many tool changes every one gets its mark [per picture]
+MANY_CHANGES = 60
+#: runs longer than that are shown in hours [s]
+LONG = 2 * 3600.0
+#: least half of the scale of a drift [um]
+_SMALL = 1.0
+
+
+def draw(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: str) -> Figure:
+    """Show the drift of each axis, what the program takes off, and what is left in the cuts; the spindle speed below.
+
+    Parameters
+    ----------
+    run : Run
+    axes : sequence of str
+        Those that have a model, such as ``["Z"]``.
+    tool_changes : sequence of float
+        When [s].
+    title : str
+
+    Returns
+    -------
+    Figure
+    """
+    unit, name = (3600.0, "h") if run.time[-1] > LONG else (60.0, "min")
+    time = run.time / unit
+    with drawing("revision"):
+        n = len(axes)
+        figure = Figure(figsize=(9.6, 1.5 + 2.1 * n + 1.1), layout="constrained")
+        *panels, below = figure.subplots(n + 1, 1, sharex=True, height_ratios=[2.0] * n + [1.0], squeeze=False)[:, 0]
+        for axis, ax in zip(axes, panels, strict=True):
+            _drift(ax, axis, time, run)
+        ends = np.concatenate([[0.0], time])
+        below.plot(np.repeat(ends, 2)[1:-1], np.repeat(run.speed[:, 1], 2), color=MEASURED)
+        below.set_ylabel("1/min")
+        below.set_ylim(bottom=0)
+        below.set_title("spindle speed")
+        below.set_xlabel(f"time since the start of the program [{name}]")
+        shown = tool_changes if len(tool_changes) <= MANY_CHANGES else ()
+        for ax in (*panels, below):
+            ax.margins(x=0)
+            for moment in shown:
+                ax.axvline(moment / unit, color="#999", lw=0.8, ls=":")
+        if len(tool_changes):
+            panels[0].plot([], [], color="#999", lw=0.8, ls=":", label=_changes(len(tool_changes)))
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
+        figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize=10)
+        return figure
+
+
+def write(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: str, path: Path) -> None:
+    """Write the picture as PNG.
+
+    Parameters
+    ----------
+    run, axes, tool_changes, title
+        See `draw`.
+    path : Path
+        An existing file is replaced.
+    """
+    draw(run, axes, tool_changes, title).savefig(path, format="png", dpi=150, metadata={"Software": None})
+
+
+def _drift(ax: Axes, axis: str, time: FloatArray, run: Run) -> None:
+    k = "XYZ".index(axis)
+    drift, carried, left = run.deviation[:, :, k], run.carried[:, :, k], run.left[:, :, k]
+    ax.axhline(0, color="#aaa", lw=0.8)
+    ax.plot(*_within(time, drift), color=MEASURED, lw=1.6, label="drift")
+    taken = -carried[:, ::-1]
+    starts = np.concatenate([[0.0], time[:-1]])
+    stretches = np.stack([starts, time], axis=1).ravel()
+    ax.plot(stretches, taken.ravel(), color=TAKEN_OFF, lw=1.0, label="taken off by the program (minus the correction)")
+    ax.plot(stretches, left.ravel(), color=RESIDUAL, lw=1.4, solid_capstyle="butt", label="left in the cuts")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -_SMALL), max(high, _SMALL))
+    ax.set_ylabel(f"{axis} [um]")
+    far = float(np.abs(drift).max())
+    cut = np.isfinite(left)
+    rest = f"at most {np.abs(left[cut]).max():.1f} um of it is left in the cuts" if cut.any() else "nothing is cut"
+    ax.set_title(f"{axis}: the tool drifts by up to {far:.1f} um, {rest}")
+
+
+def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a curve that has the lowest and the highest value of each stretch at its end."""
+    return np.concatenate([[0.0], np.repeat(time, 2)]), np.concatenate([values[0, :1], values.ravel()])
+
+
+def _changes(n: int) -> str:
+    return "tool change" if n <= MANY_CHANGES else f"{n} tool changes, not shown"

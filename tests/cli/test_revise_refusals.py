@@ -1,0 +1,118 @@
+"""``thermocomp revise`` refuses what it cannot do safely, and leaves nothing behind."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from driftmodels import lags
+from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
+from thermocomp.core.model import ErrorModel
+
+# -- refusals --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("program", "message"),
+    [
+        ("G90\nG0 X1\nM2\n", "part.ngc: line 2:"),  # unit
+        ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 and no spindle speed was stated"),
+        (
+            "G21\nG0 X1\nG1 X2 F100\nM2\n",
+            "part.ngc: line 3: the program cuts, but has not said how fast the spindle turns",
+        ),
+        ("G21 S100 M3\nG0 X1\nG77 X2\nM2\n", "part.ngc: line 3:"),  # unknown code
+        ("G21 S100 M3\nG0 X1\nM123\nM2\n", "part.ngc: line 3:"),
+        ("G21 S100 M3\no1 while [#1 LT 3]\no1 endwhile\nM2\n", "--expand lets the interpreter unroll"),
+        ("0 BEGIN PGM T MM\n1 L X+1 R0 FMAX\n", "part.ngc: this is Heidenhain Klartext"),
+        ("", "part.ngc: the file is empty"),
+        ("(nothing)\n\0\n", "part.ngc: the file is binary"),
+    ],
+)
+def test_programs_that_are_refused(
+    folder: Path, program: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("part.ngc").write_bytes(program.encode("latin-1"))
+    before = set(folder.iterdir())
+    assert revise() == 2
+    assert message in said(capsys)
+    assert set(folder.iterdir()) == before
+
+
+def test_what_the_program_does_not_say_can_be_given(folder: Path) -> None:
+    Path("part.ngc").write_text("G0 X1 Z5\nM3\nG1 Z2 F100\nM5\nM2\n", encoding="ascii")
+    assert revise() == 2
+    assert revise("--units", "inch", "--speed", "3000 1/min") == 0
+    assert {float(r["drift_z_um"]) > 0 for r in table()[2:3]} == {True}
+
+
+def test_a_revised_program_is_not_revised_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert revise() == 0
+    assert revise(program="out.ngc", out="twice.ngc") == 2
+    assert "out.ngc: line 2: has been revised by thermocomp already" in said(capsys)
+    assert not [p for p in folder.iterdir() if p.name.startswith(("twice", "."))]
+
+
+@pytest.mark.parametrize("name", ["out.ngc", "out.ngc.diff", "out.ngc.csv", "out.ngc.job.json"])
+def test_nothing_is_written_over(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path(name).write_text("precious", encoding="ascii")
+    before = set(folder.iterdir())
+    assert revise() == 2
+    assert f"{name}: exists already" in said(capsys)
+    assert Path(name).read_text(encoding="ascii") == "precious"
+    assert set(folder.iterdir()) == before
+    assert revise("--overwrite") == 0
+    assert Path(name).read_text(encoding="latin-1") != "precious"
+
+
+def test_the_program_is_never_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert revise("--overwrite", out="part.ngc") == 2
+    assert "is also an input" in said(capsys)
+    assert Path("part.ngc").read_text(encoding="ascii") == PLATE
+    assert revise("--overwrite", program="gone.ngc") == 2
+    assert "gone.ngc: no such file" in said(capsys)
+
+
+def test_a_refusal_leaves_an_earlier_run_as_it_was(folder: Path) -> None:
+    assert revise() == 0
+    first = {p.name: p.read_bytes() for p in folder.iterdir()}
+    Path("bad.ngc").write_text(PLATE.replace("G80", "G77"), encoding="ascii")
+    assert revise("--overwrite", program="bad.ngc") == 2
+    Path("bad.ngc").unlink()
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == first
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "message"),
+    [
+        (replace(lags("z_um"), honest_error=replace(HONEST, verdict="refused", reason="harm")), [], "was refused"),
+        (judged(lags("z_um", room=True)), [], "wants t3_C, a temperature: it is not driven by the speed alone"),
+        (judged(lags("height_um")), [], "does not say which axis it is"),
+        (judged(lags("z_um")), ["--axis", "zz=Z"], "there is no model of 'zz'"),
+        (judged(lags("z_um")), ["--constant", "t3=20degC"], "driven by the spindle speed alone"),
+        (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
+        (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "want X, Y and Z"),
+        (judged(lags("z_um")), ["--tool", "one=1 mm"], "want the number of a tool"),
+        (judged(lags("z_um")), ["--tolerance", "0 um"], "must be positive"),
+        (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is no thermal drift"),
+        (judged(lags("z_um")), ["--every", "10"], "write a value with its unit, such as"),
+        (judged(lags("z_um")), ["--speed", "6 mm"], "--speed '6 mm': unit 'mm' measures"),
+        (judged(lags("z_um")), ["--safe-z", "5 mm"], "--safe-z is for --method offset"),
+        (judged(lags("z_um")), ["--date", "today"], "write year-month-day"),
+        (
+            judged(lags("z_um")),
+            ["--controller", "fanuc", "--interpreter", "required"],
+            "does not read Fanuc's programs",
+        ),
+        (judged(lags("z_um")), ["--controller", "fanuc", "--expand"], "does not read Fanuc's programs"),
+        (judged(lags("z_um")), ["--machine", "gone.toml"], "gone.toml"),
+    ],
+)
+def test_models_and_options_that_are_refused(
+    folder: Path, model: ErrorModel, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_models([model], "other.json")
+    before = set(folder.iterdir())
+    assert revise("--model", "other.json", *options) == 2
+    assert message in said(capsys)
+    assert set(folder.iterdir()) == before

@@ -1,0 +1,170 @@
+"""``thermocomp revise`` tells how far to trust it, and the interpreter proves it."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from driftmodels import lags, static
+from reviseruns import PLATE, judged, revise, said, table, write_models
+from thermocomp.compensation.nc.header import LINES, MARK
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.files import ncprogram
+from thermocomp.shopfloor import rs274
+
+# -- how far to trust it ---------------------------------------------------------------------------------------------
+
+
+def bound(options: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[dict[str, Any], list[str]]:
+    capsys.readouterr()
+    assert revise(*options, "--json", "--overwrite") == 0
+    told = json.loads(capsys.readouterr().out)
+    (axis,) = told["axes"]
+    return axis, told["warnings"]
+
+
+def test_a_speed_outside_the_trained_range_widens_the_bound(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    inside, warnings = bound([], capsys)
+    assert not any("outside its range" in w for w in warnings)
+    Path("part.ngc").write_text(PLATE.replace("S6000", "S12000"), encoding="ascii")
+    outside, warnings = bound([], capsys)
+    (warning,) = [w for w in warnings if "outside its range" in w]
+    assert "spindle_rpm went to 12000 1/min, and a model was trained from 0 to 6000 1/min" in warning
+    assert outside["model_um"] > inside["model_um"] + 5
+
+
+def test_a_model_that_was_never_judged_gives_no_bound(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_models([lags("z_um")], "unjudged.json")
+    axis, warnings = bound(["--model", "unjudged.json"], capsys)
+    assert axis["bound_um"] is None
+    assert any("never judged" in w for w in warnings)
+    assert "bound Z not known" in Path("out.ngc").read_text(encoding="ascii")
+
+
+def test_temperatures_can_be_given(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_models([judged(lags("z_um", room=True))], "room.json")
+    still, warnings = bound(["--model", "room.json", "--constant", "t3=20degC"], capsys)
+    assert not any("speed alone" in w for w in warnings)
+    Path("room.csv").write_text("time_min,t3_C,other_C\n0,20,1\n10,23,1\n", encoding="ascii")
+    assert revise("--model", "room.json", "--forecast", "room.csv", "--json", "--overwrite") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["axes"][0]["drift_high_um"] > still["drift_high_um"] + 1
+    assert any("the forecast of t3_C ends before the program" in w for w in told["warnings"])
+    assert "room.csv: other_C is no input of the models" in told["notes"]
+    given = ["--model", "room.json", "--forecast", "room.csv", "--constant", "t3=20degC"]
+    assert revise(*given, "--overwrite") == 2
+    assert "t3_C is given by --constant too" in said(capsys)
+
+
+def test_models_along_an_axis(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_models([judged(lags("a_um")), judged(lags("b_um", 2.0))], "along.json")
+    along = ["--model", "along.json", "--axis", "a=Z at Z 0 mm", "b=Z at Z 40 mm", "--origin", "G54=0 mm, 0 mm, 0 mm"]
+    axis, warnings = bound(along, capsys)
+    assert axis["axis"] == "Z"
+    assert any("Z was asked for 10.0 mm beyond its outermost station" in w for w in warnings)
+    rows = table()
+    assert float(rows[11]["drift_z_um"]) > 1.5 * float(rows[10]["drift_z_um"])
+
+
+def test_a_machine_file_tells_the_times(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    head = 'structure = "w X\' b Z Y (C1) t"\n'
+    slow = 'travel = ["-500 mm", "500 mm"]\nrapid = "1 m/min"\nacceleration = "0.5 m/s2"\n'
+    text = head + "".join(f"[axes.{name}]\n{slow}" for name in "XYZ")
+    Path("mill.toml").write_text(text, encoding="ascii")
+    assert revise("--json") == 0
+    fast = json.loads(capsys.readouterr().out)
+    assert revise("--machine", "mill.toml", "--tool-change", "30 s", "--json", "--overwrite") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["run_time_s"] > fast["run_time_s"] + 2 * 22
+    assert told["notes"] == []
+    Path("mill.toml").write_text(text.replace('acceleration = "0.5 m/s2"\n', "", 1), encoding="ascii")
+    assert revise("--machine", "mill.toml", "--json", "--overwrite") == 0
+    (note,) = json.loads(capsys.readouterr().out)["notes"]
+    assert "no rapid or acceleration of X" in note
+
+
+def test_a_fanuc_program(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program = (
+        "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z-1. F300.\nX100. F50.\nG0 Z50.\nM30\n%\n"
+    )
+    Path("50%.nc").write_bytes(program.replace("\n", "\r\n").encode("ascii"))
+    assert revise("--controller", "fanuc", "--interpreter", "auto", program="50%.nc", out="out.nc") == 0
+    assert "not proved by LinuxCNC's interpreter: a Fanuc program" in " ".join(capsys.readouterr().out.split())
+    lines = Path("out.nc").read_bytes().decode("ascii").split("\r\n")
+    assert lines[:2] == ["%", "O1234"]
+    header = lines[2 : 2 + LINES]
+    assert all(line.startswith(f"({MARK} ") and line == line.upper() and "%" not in line for line in header)
+    words = [w for line in lines[2 + LINES :] for w in line.split() if w.startswith("Z-")]
+    assert words
+    assert all(len(w.partition(".")[2]) <= 3 for w in words)
+
+
+def test_a_model_without_memory_follows_the_speed(folder: Path) -> None:
+    model = judged(static("z_um"))
+    assert isinstance(model, Polynomial)
+    write_models([model], "static.json")
+    assert revise("--model", "static.json", "--tolerance", "0.5 um") == 0
+    assert {round(float(r["drift_z_um"]), 1) for r in table()} >= {0.0, 4.0, 6.0}
+
+
+# -- the interpreter -------------------------------------------------------------------------------------------------
+
+interpreter = pytest.mark.skipif(rs274.installed() is not None, reason=f"{rs274.installed()}")
+
+
+@interpreter
+@pytest.mark.parametrize("method", ["coordinates", "offset"])
+def test_the_interpreter_proves_it(folder: Path, method: str, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--interpreter", "required", "--method", method]
+    assert revise(*options, *(["--safe-z", "20 mm"] if method == "offset" else []), "--json") == 0
+    proof = json.loads(capsys.readouterr().out)["proof"]
+    assert proof["moves"] > 12
+    assert proof["largest_um"] < 1e-3
+
+
+@interpreter
+def test_what_the_interpreter_does_not_run_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("part.ngc").write_text(PLATE.replace("T2 M6", "T2 M6\nM198"), encoding="ascii")
+    before = set(folder.iterdir())
+    code = revise("--interpreter", "required")
+    assert code == 2
+    assert "part.ngc:" in said(capsys)
+    assert set(folder.iterdir()) == before
+
+
+@interpreter
+def test_a_wrong_move_is_found_and_nothing_is_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The last line of defence: a program that was spoilt behind all other checks."""
+    fill = ncprogram.fill
+
+    def spoil(draft: Path, target: Path, lines: Any) -> None:
+        fill(draft, target, lines)
+        target.write_bytes(target.read_bytes().replace(b"\nX20", b"\nX21"))
+
+    monkeypatch.setattr(ncprogram, "fill", spoil)
+    before = set(folder.iterdir())
+    assert revise("--interpreter", "auto") == 2
+    assert "part.ngc: line 18: LinuxCNC's interpreter disagrees: it moves X by 1000.00 um instead of 0.00 um" in said(
+        capsys
+    )
+    assert set(folder.iterdir()) == before
+
+
+@interpreter
+def test_loops_are_unrolled_where_asked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    loop = (
+        "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\n#1=0\no1 while [#1 LT 3]\nG1 Z-1 F100\nX[10+#1] F50\nG0 Z5\n"
+        "#1=[#1+1]\no1 endwhile\nM5\nM2\n"
+    )
+    Path("part.ngc").write_text(loop, encoding="ascii")
+    assert revise() == 2
+    assert revise("--expand", "--interpreter", "required", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["proof"]["moves"] >= 10
+    assert told["files"]["expanded"] == "out.ngc.expanded"
+    assert "X12" in Path("out.ngc.expanded").read_text(encoding="ascii")
+    assert any("Z-1.0" in line for line in Path("out.ngc").read_text(encoding="ascii").splitlines())
