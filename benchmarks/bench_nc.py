@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from thermocomp.compensation.nc.tokens import read_lines, split_lines
+from thermocomp.compensation.nc.reading.tokens import read_lines, split_lines
 
 GOAL = 100_000.0
 INSTALLED = Path("/usr/share/linuxcnc/ncfiles/3D_Chips.ngc")

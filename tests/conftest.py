@@ -5,9 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from driftmodels import lags
+from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
+from thermocomp.cli import reviserun
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.shopfloor import rs274
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -31,3 +35,22 @@ def recording() -> Recording:
 def samples(recording: Recording) -> Samples:
     """The same, stacked, with targets z_um and x_um."""
     return stack([recording], ["z_um", "x_um"])
+
+
+@pytest.fixture(scope="session")
+def interpreter() -> None:
+    """LinuxCNC's interpreter is here; `make test` installs it, so on a build server it has to be."""
+    if (reason := rs274.installed()) is not None:
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+
+
+@pytest.fixture
+def job_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a program and a model, where commands run; nothing is drawn and no interpreter starts."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reviserun, "find_spec", lambda _: None)
+    write_models([judged(lags("z_um"))], "model.json")
+    Path("part.ngc").write_text(PLATE, encoding="ascii")
+    return tmp_path

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
-from thermocomp.compensation.nc.block import Point, Setup
-from thermocomp.compensation.nc.coordinates import Coordinates
-from thermocomp.compensation.nc.demand import Demand, Field
-from thermocomp.compensation.nc.frame import Vector
-from thermocomp.compensation.nc.method import Method
-from thermocomp.compensation.nc.offset import Offset
-from thermocomp.compensation.nc.revise import Revised, Revision
-from thermocomp.compensation.nc.text import DIGITS
-from thermocomp.compensation.nc.timeline import Kinematics
+from thermocomp.compensation.nc.following.block import Point, Setup
+from thermocomp.compensation.nc.revising.coordinates import Coordinates
+from thermocomp.compensation.nc.revising.demand import Demand, Field
+from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.compensation.nc.revising.method import Method
+from thermocomp.compensation.nc.revising.offset import Offset
+from thermocomp.compensation.nc.revising.revise import Revised, Revision
+from thermocomp.compensation.nc.revising.text import DIGITS
+from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.shopfloor import rs274
 
 #: what the programs do not say: that the controller starts in mm, and the spindle turns

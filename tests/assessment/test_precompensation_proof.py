@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from thermocomp.assessment.precompensation import Ledger, Shift, prove, stored
-from thermocomp.compensation.nc.block import Block, Modal, Setup
-from thermocomp.compensation.nc.line import Line
-from thermocomp.compensation.nc.revise import Revised
+from thermocomp.compensation.nc.following.block import Block, Modal, Setup
+from thermocomp.compensation.nc.reading.line import Line
+from thermocomp.compensation.nc.revising.revise import Revised
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.shopfloor import rs274
 

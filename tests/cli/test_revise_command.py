@@ -12,13 +12,13 @@ import pytest
 
 from driftmodels import lags
 from reviseruns import HONEST, PLATE, judged, revise, said, table, without_header, write_models
-from thermocomp.compensation.nc.header import LINES, MARK
+from thermocomp.compensation.nc.revising.header import LINES, MARK
 from thermocomp.files import jobstate
 
 # -- what is written -------------------------------------------------------------------------------------------------
 
 
-def test_the_files_of_a_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert revise("--date", "2026-01-31") == 0
     text = " ".join(capsys.readouterr().out.split())
     assert "part.ngc: 23 lines" in text
@@ -29,7 +29,7 @@ def test_the_files_of_a_run(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "but no picture was drawn: matplotlib is not installed" in text
     assert "note no --machine: the times are those of a medium machining centre" in text
     expected = {"model.json", "part.ngc", "out.ngc", "out.ngc.diff", "out.ngc.csv", "out.ngc.job.json"}
-    assert {p.name for p in folder.iterdir()} == expected
+    assert {p.name for p in job_folder.iterdir()} == expected
     assert Path("part.ngc").read_text(encoding="ascii") == PLATE
     lines = Path("out.ngc").read_text(encoding="ascii").splitlines()
     assert lines[0] == "%"
@@ -42,14 +42,14 @@ def test_the_files_of_a_run(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert any("bound Z" in line and " um" in line for line in header)
 
 
-def test_the_same_run_writes_the_same_bytes(folder: Path) -> None:
+def test_the_same_run_writes_the_same_bytes(job_folder: Path) -> None:
     assert revise("--date", "2026-01-31") == 0
-    first = {p.name: p.read_bytes() for p in folder.iterdir()}
+    first = {p.name: p.read_bytes() for p in job_folder.iterdir()}
     assert revise("--date", "2026-01-31", "--overwrite") == 0
-    assert {p.name: p.read_bytes() for p in folder.iterdir()} == first
+    assert {p.name: p.read_bytes() for p in job_folder.iterdir()} == first
 
 
-def test_the_table_follows_the_lines(folder: Path) -> None:
+def test_the_table_follows_the_lines(job_folder: Path) -> None:
     assert revise() == 0
     rows = table()
     original = PLATE.splitlines()
@@ -72,7 +72,7 @@ def test_the_table_follows_the_lines(folder: Path) -> None:
 @pytest.mark.skipif(shutil.which("patch") is None, reason="the tool patch is not installed")
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 @pytest.mark.parametrize("last", ["", "(no end of line)"])
-def test_the_diff_makes_the_revised_program(folder: Path, ending: str, last: str) -> None:
+def test_the_diff_makes_the_revised_program(job_folder: Path, ending: str, last: str) -> None:
     Path("part.ngc").write_bytes((PLATE + last).replace("\n", ending).encode("ascii"))
     assert revise() == 0
     difference = Path("out.ngc.diff").read_bytes()
@@ -85,7 +85,7 @@ def test_the_diff_makes_the_revised_program(folder: Path, ending: str, last: str
     assert Path("out.ngc").read_bytes().count(ending.encode()) == (PLATE + last).count("\n") + LINES
 
 
-def test_bytes_that_are_no_ascii_come_through(folder: Path) -> None:
+def test_bytes_that_are_no_ascii_come_through(job_folder: Path) -> None:
     before, after = PLATE.encode().split(b"(a plate)")
     Path("part.ngc").write_bytes(before + b"(Platte f\xfcr M\xc3\xbcller \xff)" + after)
     assert revise() == 0
@@ -94,7 +94,7 @@ def test_bytes_that_are_no_ascii_come_through(folder: Path) -> None:
 
 @pytest.mark.parametrize("method", ["coordinates", "offset"])
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
-def test_no_drift_changes_nothing_but_the_header(folder: Path, method: str, ending: str) -> None:
+def test_no_drift_changes_nothing_but_the_header(job_folder: Path, method: str, ending: str) -> None:
     nothing = replace(lags("z_um", 0.0), honest_error=HONEST)
     write_models([nothing], "zero.json")
     Path("part.ngc").write_bytes(PLATE.replace("\n", ending).encode("ascii"))
@@ -104,7 +104,7 @@ def test_no_drift_changes_nothing_but_the_header(folder: Path, method: str, endi
     assert {r["changed"] for r in table()} == {"0"}
 
 
-def test_the_offset_method_leaves_the_words_alone(folder: Path) -> None:
+def test_the_offset_method_leaves_the_words_alone(job_folder: Path) -> None:
     assert revise("--method", "offset", "--safe-z", "20 mm") == 0
     lines = without_header("out.ngc").decode().splitlines()
     offsets = [line for line in lines if line.startswith("G52")]
@@ -114,7 +114,7 @@ def test_the_offset_method_leaves_the_words_alone(folder: Path) -> None:
     assert offsets[-1] == "G52 Z0.0"
 
 
-def test_numbers_for_programs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_for_programs(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("x_um", -0.5)), judged(lags("z_um"))], "two.json")
     assert revise("--model", "two.json", "--json", "--every", "5 min") == 0
     told = json.loads(capsys.readouterr().out)
@@ -147,7 +147,7 @@ def test_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
 # -- the state at the start ------------------------------------------------------------------------------------------
 
 
-def test_a_job_begins_where_the_last_one_ended(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert revise("--date", "2026-01-31") == 0
     saved = jobstate.read("out.ngc.job.json")
     assert saved.written.isoformat()[:4] == "2026"
@@ -167,7 +167,7 @@ def test_a_job_begins_where_the_last_one_ended(folder: Path, capsys: pytest.Capt
     assert float(table("again.ngc.csv")[0]["drift_z_um"]) == 0.0
 
 
-def test_a_measured_start(folder: Path) -> None:
+def test_a_measured_start(job_folder: Path) -> None:
     assert revise("--measured", "z=12um", start="") == 0
     assert float(table()[0]["drift_z_um"]) == pytest.approx(12.0, abs=1e-3)
 
@@ -185,15 +185,15 @@ def test_a_measured_start(folder: Path) -> None:
     ],
 )
 def test_the_start_has_to_be_stated(
-    folder: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    job_folder: Path, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     assert revise(*options, start="") == 2
     assert message in said(capsys)
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before
 
 
-def test_it_runs_beside_a_controller(folder: Path) -> None:
+def test_it_runs_beside_a_controller(job_folder: Path) -> None:
     """In a Python that cannot see the extras of the training wing."""
     blocked = "import sys\nfor m in ('pandas', 'sklearn', 'scipy', 'joblib', 'matplotlib'): sys.modules[m] = None\n"
     code = blocked + "from thermocomp.cli.app import run\nsys.exit(run(sys.argv[1:]))"

@@ -30,42 +30,42 @@ from thermocomp.core.model import ErrorModel
     ],
 )
 def test_programs_that_are_refused(
-    folder: Path, program: str, message: str, capsys: pytest.CaptureFixture[str]
+    job_folder: Path, program: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("part.ngc").write_bytes(program.encode("latin-1"))
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     assert revise() == 2
     assert message in said(capsys)
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before
 
 
-def test_what_the_program_does_not_say_can_be_given(folder: Path) -> None:
+def test_what_the_program_does_not_say_can_be_given(job_folder: Path) -> None:
     Path("part.ngc").write_text("G0 X1 Z5\nM3\nG1 Z2 F100\nM5\nM2\n", encoding="ascii")
     assert revise() == 2
     assert revise("--units", "inch", "--speed", "3000 1/min") == 0
     assert {float(r["drift_z_um"]) > 0 for r in table()[2:3]} == {True}
 
 
-def test_a_revised_program_is_not_revised_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_revised_program_is_not_revised_again(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert revise() == 0
     assert revise(program="out.ngc", out="twice.ngc") == 2
     assert "out.ngc: line 2: has been revised by thermocomp already" in said(capsys)
-    assert not [p for p in folder.iterdir() if p.name.startswith(("twice", "."))]
+    assert not [p for p in job_folder.iterdir() if p.name.startswith(("twice", "."))]
 
 
 @pytest.mark.parametrize("name", ["out.ngc", "out.ngc.diff", "out.ngc.csv", "out.ngc.job.json"])
-def test_nothing_is_written_over(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_is_written_over(job_folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path(name).write_text("precious", encoding="ascii")
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     assert revise() == 2
     assert f"{name}: exists already" in said(capsys)
     assert Path(name).read_text(encoding="ascii") == "precious"
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before
     assert revise("--overwrite") == 0
     assert Path(name).read_text(encoding="latin-1") != "precious"
 
 
-def test_the_program_is_never_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_program_is_never_written_over(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert revise("--overwrite", out="part.ngc") == 2
     assert "is also an input" in said(capsys)
     assert Path("part.ngc").read_text(encoding="ascii") == PLATE
@@ -73,13 +73,13 @@ def test_the_program_is_never_written_over(folder: Path, capsys: pytest.CaptureF
     assert "gone.ngc: no such file" in said(capsys)
 
 
-def test_a_refusal_leaves_an_earlier_run_as_it_was(folder: Path) -> None:
+def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
     assert revise() == 0
-    first = {p.name: p.read_bytes() for p in folder.iterdir()}
+    first = {p.name: p.read_bytes() for p in job_folder.iterdir()}
     Path("bad.ngc").write_text(PLATE.replace("G80", "G77"), encoding="ascii")
     assert revise("--overwrite", program="bad.ngc") == 2
     Path("bad.ngc").unlink()
-    assert {p.name: p.read_bytes() for p in folder.iterdir()} == first
+    assert {p.name: p.read_bytes() for p in job_folder.iterdir()} == first
 
 
 @pytest.mark.parametrize(
@@ -109,10 +109,10 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(folder: Path) -> None:
     ],
 )
 def test_models_and_options_that_are_refused(
-    folder: Path, model: ErrorModel, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    job_folder: Path, model: ErrorModel, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_models([model], "other.json")
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     assert revise("--model", "other.json", *options) == 2
     assert message in said(capsys)
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before

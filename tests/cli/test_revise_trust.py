@@ -9,7 +9,7 @@ import pytest
 
 from driftmodels import lags, static
 from reviseruns import PLATE, judged, revise, said, table, write_models
-from thermocomp.compensation.nc.header import LINES, MARK
+from thermocomp.compensation.nc.revising.header import LINES, MARK
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import ncprogram
 from thermocomp.shopfloor import rs274
@@ -25,7 +25,9 @@ def bound(options: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[d
     return axis, told["warnings"]
 
 
-def test_a_speed_outside_the_trained_range_widens_the_bound(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_speed_outside_the_trained_range_widens_the_bound(
+    job_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     inside, warnings = bound([], capsys)
     assert not any("outside its range" in w for w in warnings)
     Path("part.ngc").write_text(PLATE.replace("S6000", "S12000"), encoding="ascii")
@@ -35,7 +37,7 @@ def test_a_speed_outside_the_trained_range_widens_the_bound(folder: Path, capsys
     assert outside["model_um"] > inside["model_um"] + 5
 
 
-def test_a_model_that_was_never_judged_gives_no_bound(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_that_was_never_judged_gives_no_bound(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([lags("z_um")], "unjudged.json")
     axis, warnings = bound(["--model", "unjudged.json"], capsys)
     assert axis["bound_um"] is None
@@ -43,7 +45,7 @@ def test_a_model_that_was_never_judged_gives_no_bound(folder: Path, capsys: pyte
     assert "bound Z not known" in Path("out.ngc").read_text(encoding="ascii")
 
 
-def test_temperatures_can_be_given(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("z_um", room=True))], "room.json")
     still, warnings = bound(["--model", "room.json", "--constant", "t3=20degC"], capsys)
     assert not any("speed alone" in w for w in warnings)
@@ -58,7 +60,7 @@ def test_temperatures_can_be_given(folder: Path, capsys: pytest.CaptureFixture[s
     assert "t3_C is given by --constant too" in said(capsys)
 
 
-def test_models_along_an_axis(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("a_um")), judged(lags("b_um", 2.0))], "along.json")
     along = ["--model", "along.json", "--axis", "a=Z at Z 0 mm", "b=Z at Z 40 mm", "--origin", "G54=0 mm, 0 mm, 0 mm"]
     axis, warnings = bound(along, capsys)
@@ -68,7 +70,7 @@ def test_models_along_an_axis(folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert float(rows[11]["drift_z_um"]) > 1.5 * float(rows[10]["drift_z_um"])
 
 
-def test_a_machine_file_tells_the_times(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_machine_file_tells_the_times(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     head = 'structure = "w X\' b Z Y (C1) t"\n'
     slow = 'travel = ["-500 mm", "500 mm"]\nrapid = "1 m/min"\nacceleration = "0.5 m/s2"\n'
     text = head + "".join(f"[axes.{name}]\n{slow}" for name in "XYZ")
@@ -85,7 +87,7 @@ def test_a_machine_file_tells_the_times(folder: Path, capsys: pytest.CaptureFixt
     assert "no rapid or acceleration of X" in note
 
 
-def test_a_fanuc_program(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     program = (
         "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z-1. F300.\nX100. F50.\nG0 Z50.\nM30\n%\n"
     )
@@ -101,7 +103,7 @@ def test_a_fanuc_program(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert all(len(w.partition(".")[2]) <= 3 for w in words)
 
 
-def test_a_model_without_memory_follows_the_speed(folder: Path) -> None:
+def test_a_model_without_memory_follows_the_speed(job_folder: Path) -> None:
     model = judged(static("z_um"))
     assert isinstance(model, Polynomial)
     write_models([model], "static.json")
@@ -116,7 +118,7 @@ interpreter = pytest.mark.skipif(rs274.installed() is not None, reason=f"{rs274.
 
 @interpreter
 @pytest.mark.parametrize("method", ["coordinates", "offset"])
-def test_the_interpreter_proves_it(folder: Path, method: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_interpreter_proves_it(job_folder: Path, method: str, capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--interpreter", "required", "--method", method]
     assert revise(*options, *(["--safe-z", "20 mm"] if method == "offset" else []), "--json") == 0
     proof = json.loads(capsys.readouterr().out)["proof"]
@@ -125,18 +127,18 @@ def test_the_interpreter_proves_it(folder: Path, method: str, capsys: pytest.Cap
 
 
 @interpreter
-def test_what_the_interpreter_does_not_run_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_the_interpreter_does_not_run_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("part.ngc").write_text(PLATE.replace("T2 M6", "T2 M6\nM198"), encoding="ascii")
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     code = revise("--interpreter", "required")
     assert code == 2
     assert "part.ngc:" in said(capsys)
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before
 
 
 @interpreter
 def test_a_wrong_move_is_found_and_nothing_is_written(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    job_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The last line of defence: a program that was spoilt behind all other checks."""
     fill = ncprogram.fill
@@ -146,16 +148,16 @@ def test_a_wrong_move_is_found_and_nothing_is_written(
         target.write_bytes(target.read_bytes().replace(b"\nX20", b"\nX21"))
 
     monkeypatch.setattr(ncprogram, "fill", spoil)
-    before = set(folder.iterdir())
+    before = set(job_folder.iterdir())
     assert revise("--interpreter", "auto") == 2
     assert "part.ngc: line 18: LinuxCNC's interpreter disagrees: it moves X by 1000.00 um instead of 0.00 um" in said(
         capsys
     )
-    assert set(folder.iterdir()) == before
+    assert set(job_folder.iterdir()) == before
 
 
 @interpreter
-def test_loops_are_unrolled_where_asked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_loops_are_unrolled_where_asked(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     loop = (
         "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\n#1=0\no1 while [#1 LT 3]\nG1 Z-1 F100\nX[10+#1] F50\nG0 Z5\n"
         "#1=[#1+1]\no1 endwhile\nM5\nM2\n"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermocomp.compensation.nc.inputs import Signal
+from thermocomp.compensation.nc.drifting.inputs import Signal
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import forecast
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from driftmodels import lags, net, ticking
-from thermocomp.compensation.nc import start
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.stations import Station
+from thermocomp.compensation.nc.drifting import start
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.drifting.stations import Station
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.jobstate import JobState
 from thermocomp.files import jobstate, jsonfile, modelfile

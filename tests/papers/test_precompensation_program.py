@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.start import cold
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.drifting.start import cold
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermocomp.compensation.nc.course import Run
+from thermocomp.compensation.nc.revising.course import Run
 from thermocomp.report import revision
 
 

@@ -9,9 +9,9 @@ from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.block import Setup
-from thermocomp.compensation.nc.frame import Vector
-from thermocomp.compensation.nc.revise import Revised
+from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.compensation.nc.revising.revise import Revised
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.shopfloor import rs274
 from thermocomp.shopfloor.rs274 import Canonical, Place
@@ -193,7 +193,7 @@ def _told(path: Path, setup: Setup, whose: str) -> Generator[_Told]:
             raise _fault(e.line, f"does not run the {whose}: {e.reason}") from e
         raise InputError(f"LinuxCNC's interpreter does not run the {whose}: {e}") from e
     finally:
-        calls.close()  # type: ignore[attr-defined]
+        calls.close()
 
 
 def _compare(was: Canonical, now: Canonical, shift: Shift) -> None:

@@ -8,7 +8,7 @@ from thermocomp.cli import reviserun, revisetables
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, Output, refuse_existing
 from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
-from thermocomp.compensation.nc.revise import Revision
+from thermocomp.compensation.nc.revising.revise import Revision
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
 from thermocomp.shopfloor import rs274

@@ -10,18 +10,18 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from thermocomp.cli.options import Flag, OptionalNames
-from thermocomp.compensation.nc import start
-from thermocomp.compensation.nc.block import Point, Setup
-from thermocomp.compensation.nc.coordinates import Coordinates
-from thermocomp.compensation.nc.demand import Demand
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.inputs import SPEED, Signal, constants
-from thermocomp.compensation.nc.method import Method
-from thermocomp.compensation.nc.offset import Offset
-from thermocomp.compensation.nc.start import Start
-from thermocomp.compensation.nc.stations import Station, stations
-from thermocomp.compensation.nc.text import DIGITS
-from thermocomp.compensation.nc.timeline import Kinematics
+from thermocomp.compensation.nc.drifting import start
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.drifting.inputs import SPEED, Signal, constants
+from thermocomp.compensation.nc.drifting.start import Start
+from thermocomp.compensation.nc.drifting.stations import Station, stations
+from thermocomp.compensation.nc.following.block import Point, Setup
+from thermocomp.compensation.nc.revising.coordinates import Coordinates
+from thermocomp.compensation.nc.revising.demand import Demand
+from thermocomp.compensation.nc.revising.method import Method
+from thermocomp.compensation.nc.revising.offset import Offset
+from thermocomp.compensation.nc.revising.text import DIGITS
+from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import measured as with_unit
 from thermocomp.files import forecast as forecasts

@@ -14,12 +14,12 @@ from typing import NamedTuple, TextIO
 from thermocomp import __version__
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
 from thermocomp.cli.progress import Share, by_share
-from thermocomp.compensation.nc import diff, header
-from thermocomp.compensation.nc.course import Course, Run
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.offset import ending
-from thermocomp.compensation.nc.revise import Revised, Revision
-from thermocomp.compensation.nc.tokens import program_lines
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.reading.tokens import program_lines
+from thermocomp.compensation.nc.revising import diff, header
+from thermocomp.compensation.nc.revising.course import Course, Run
+from thermocomp.compensation.nc.revising.offset import ending
+from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import draft

@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.cli.reviserun import Bound, Done, Job
-from thermocomp.compensation.nc.inputs import SPEED
+from thermocomp.compensation.nc.drifting.inputs import SPEED
 
 #: lines from which on the time that one takes can be told
 MANY = 1000

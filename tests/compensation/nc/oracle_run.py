@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from thermocomp.compensation.nc.block import Block
+from thermocomp.compensation.nc.following.block import Block
 
 CHILD = r"""
 import contextlib, ctypes, json, math, os, sys

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermocomp.compensation.nc.block import Block, Kind, Modal, Move
-from thermocomp.compensation.nc.course import Course
-from thermocomp.compensation.nc.line import Line
-from thermocomp.compensation.nc.revise import Revised
+from thermocomp.compensation.nc.following.block import Block, Kind, Modal, Move
+from thermocomp.compensation.nc.reading.line import Line
+from thermocomp.compensation.nc.revising.course import Course
+from thermocomp.compensation.nc.revising.revise import Revised
 
 Vector = tuple[float, float, float]
 

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from nc_law import Growing, Steady
-from thermocomp.compensation.nc.block import Point
-from thermocomp.compensation.nc.demand import Demand, opposed
-from thermocomp.compensation.nc.frame import Vector
+from thermocomp.compensation.nc.following.block import Point
+from thermocomp.compensation.nc.revising.demand import Demand, opposed
+from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.core.exceptions import InputError
 
 HERE = (0.0, 0.0, 0.0)

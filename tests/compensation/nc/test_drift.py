@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from driftmodels import ROOM, judged, lags, net, static, strict, ticking
-from thermocomp.compensation.nc import start
-from thermocomp.compensation.nc.drift import SOON, Drift
-from thermocomp.compensation.nc.inputs import Inputs, Signal, constants
-from thermocomp.compensation.nc.stations import Station
+from thermocomp.compensation.nc.drifting import start
+from thermocomp.compensation.nc.drifting.drift import SOON, Drift
+from thermocomp.compensation.nc.drifting.inputs import Inputs, Signal, constants
+from thermocomp.compensation.nc.drifting.stations import Station
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nc_interpreter import ends, needs_interpreter
-from thermocomp.compensation.nc.expressions import Parameters, evaluate
-from thermocomp.compensation.nc.line import Assignment
-from thermocomp.compensation.nc.systemparameters import what_is
+from thermocomp.compensation.nc.reading.expressions import Parameters, evaluate
+from thermocomp.compensation.nc.reading.line import Assignment
+from thermocomp.compensation.nc.reading.systemparameters import what_is
 from thermocomp.core.exceptions import InputError
 
 KNOWN: dict[int | str, float] = {1: 2.0, 2: 5.0, 3: -0.5, "depth": 7.25, "_way": 3.0}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from nc_law import STEADY, Growing, Steady, Still, revise
-from thermocomp.compensation.nc import header
+from thermocomp.compensation.nc.revising import header
 from thermocomp.core.exceptions import ProgramError
 
 pytestmark = pytest.mark.usefixtures("interpreter")

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from oracle_run import Oracle, compare
 from random_programs import programs
 
-from thermocomp.compensation.nc.block import Block, Setup
-from thermocomp.compensation.nc.follower import Follower, follow
-from thermocomp.compensation.nc.tokens import program_lines, read_lines, split_lines
+from thermocomp.compensation.nc.following.block import Block, Setup
+from thermocomp.compensation.nc.following.follower import Follower, follow
+from thermocomp.compensation.nc.reading.tokens import program_lines, read_lines, split_lines
 from thermocomp.core.exceptions import ProgramError
 
 NC_FILES = Path("/usr/share/linuxcnc/ncfiles")

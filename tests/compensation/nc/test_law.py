@@ -10,7 +10,7 @@ from random_programs import programs
 
 from nc_interpreter import PROGRAMS, needs_programs
 from nc_law import Growing, Steady, Still, Trial, revise
-from thermocomp.compensation.nc import header
+from thermocomp.compensation.nc.revising import header
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.shopfloor import rs274
 

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.compensation.nc.block import Block, Point, Setup
-from thermocomp.compensation.nc.follower import follow
-from thermocomp.compensation.nc.offsets import Offsets
-from thermocomp.compensation.nc.tokens import read_lines, split_lines
+from thermocomp.compensation.nc.following.block import Block, Point, Setup
+from thermocomp.compensation.nc.following.follower import follow
+from thermocomp.compensation.nc.following.offsets import Offsets
+from thermocomp.compensation.nc.reading.tokens import read_lines, split_lines
 
 ALL = (True, True, True)
 coordinates = st.tuples(*[st.floats(-1e3, 1e3)] * 3)

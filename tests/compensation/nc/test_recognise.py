@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nc_interpreter import PROGRAMS, needs_programs
-from thermocomp.compensation.nc.recognise import recognise
-from thermocomp.compensation.nc.tokens import split_lines
+from thermocomp.compensation.nc.reading.recognise import recognise
+from thermocomp.compensation.nc.reading.tokens import split_lines
 from thermocomp.core.exceptions import InputError
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from oracle_run import Oracle
 from test_follower import needs_linuxcnc, run
 
-from thermocomp.compensation.nc.block import Setup
+from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.core.exceptions import ProgramError
 
 START = "G21 G90 F100 S100\n"

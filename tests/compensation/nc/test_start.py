@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from driftmodels import judged, lags, net, static, strict, ticking
-from thermocomp.compensation.nc import start
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.inputs import Signal
-from thermocomp.compensation.nc.stations import Station
+from thermocomp.compensation.nc.drifting import start
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.drifting.inputs import Signal
+from thermocomp.compensation.nc.drifting.stations import Station
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.jobstate import JobState
 from thermocomp.core.model import ErrorModel

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from driftmodels import lags
-from thermocomp.compensation.nc.stations import Station, stations
+from thermocomp.compensation.nc.drifting.stations import Station, stations
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.compensation.nc import header
-from thermocomp.compensation.nc.block import Block, Modal
-from thermocomp.compensation.nc.diff import CONTEXT, unified
-from thermocomp.compensation.nc.frame import Frame
-from thermocomp.compensation.nc.line import Line, Word
-from thermocomp.compensation.nc.text import DIGITS, number, shifted
+from thermocomp.compensation.nc.following.block import Block, Modal
+from thermocomp.compensation.nc.reading.line import Line, Word
+from thermocomp.compensation.nc.revising import header
+from thermocomp.compensation.nc.revising.diff import CONTEXT, unified
+from thermocomp.compensation.nc.revising.frame import Frame
+from thermocomp.compensation.nc.revising.text import DIGITS, number, shifted
 from thermocomp.core.exceptions import ProgramError
 
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermocomp.compensation.nc.block import Arc, Block, Modal, Move, Point
-from thermocomp.compensation.nc.line import Line, Word
-from thermocomp.compensation.nc.timeline import ACCELERATION, AHEAD, CHUNK, RAPID, Kinematics, timed
+from thermocomp.compensation.nc.following.block import Arc, Block, Modal, Move, Point
+from thermocomp.compensation.nc.reading.line import Line, Word
+from thermocomp.compensation.nc.timing.timeline import ACCELERATION, AHEAD, CHUNK, RAPID, Kinematics, timed
 from thermocomp.core.exceptions import ProgramError, SettingError
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure

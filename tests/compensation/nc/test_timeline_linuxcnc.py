@@ -11,10 +11,10 @@ from itertools import pairwise
 import pytest
 
 import linuxcncrun
-from thermocomp.compensation.nc.block import Setup
-from thermocomp.compensation.nc.follower import follow
-from thermocomp.compensation.nc.timeline import Kinematics, Timed, timed
-from thermocomp.compensation.nc.tokens import read_lines
+from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.following.follower import follow
+from thermocomp.compensation.nc.reading.tokens import read_lines
+from thermocomp.compensation.nc.timing.timeline import Kinematics, Timed, timed
 
 KINEMATICS = Kinematics(
     rapid=(linuxcncrun.SPEEDS[0] * 60.0, linuxcncrun.SPEEDS[1] * 60.0, linuxcncrun.SPEEDS[2] * 60.0),

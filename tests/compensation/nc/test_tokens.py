@@ -7,10 +7,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from nc_interpreter import PROGRAMS, ends, needs_interpreter, needs_programs
-from thermocomp.compensation.nc import tokens
-from thermocomp.compensation.nc.expressions import Parameters, evaluate
-from thermocomp.compensation.nc.line import Line
-from thermocomp.compensation.nc.tokens import Controller, program_lines, read_line, read_lines, split_lines
+from thermocomp.compensation.nc.reading import tokens
+from thermocomp.compensation.nc.reading.expressions import Parameters, evaluate
+from thermocomp.compensation.nc.reading.line import Line
+from thermocomp.compensation.nc.reading.tokens import Controller, program_lines, read_line, read_lines, split_lines
 from thermocomp.core.exceptions import InputError
 
 CONTROLLERS: tuple[Controller, ...] = ("linuxcnc", "fanuc")

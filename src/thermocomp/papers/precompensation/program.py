@@ -10,19 +10,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.block import Block, Setup
-from thermocomp.compensation.nc.coordinates import Coordinates
-from thermocomp.compensation.nc.demand import Demand
-from thermocomp.compensation.nc.drift import Drift
-from thermocomp.compensation.nc.follower import follow
-from thermocomp.compensation.nc.method import Method
-from thermocomp.compensation.nc.offset import Offset
-from thermocomp.compensation.nc.revise import Revision
-from thermocomp.compensation.nc.start import Start, carried, cold
-from thermocomp.compensation.nc.stations import Station
-from thermocomp.compensation.nc.text import DIGITS
-from thermocomp.compensation.nc.timeline import Kinematics, Timed, timed
-from thermocomp.compensation.nc.tokens import read_lines
+from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.drifting.start import Start, carried, cold
+from thermocomp.compensation.nc.drifting.stations import Station
+from thermocomp.compensation.nc.following.block import Block, Setup
+from thermocomp.compensation.nc.following.follower import follow
+from thermocomp.compensation.nc.reading.tokens import read_lines
+from thermocomp.compensation.nc.revising.coordinates import Coordinates
+from thermocomp.compensation.nc.revising.demand import Demand
+from thermocomp.compensation.nc.revising.method import Method
+from thermocomp.compensation.nc.revising.offset import Offset
+from thermocomp.compensation.nc.revising.revise import Revision
+from thermocomp.compensation.nc.revising.text import DIGITS
+from thermocomp.compensation.nc.timing.timeline import Kinematics, Timed, timed
 from thermocomp.core.model import ErrorModel
 from thermocomp.papers.precompensation.setup import INTERVAL, MILLING, POSITIONS, SPEED
 from thermocomp.recording.recording import Recording

@@ -1,0 +1,274 @@
+"""Follows a program as the controller would: line after line, what state it runs in and what moves it makes.
+
+The order of execution within a line, the tolerances and the moves of cycles are LinuxCNC's; the tests compare every
+move with its interpreter. What cannot be followed for certain is refused with line and reason.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from thermocomp.compensation.nc.following import motion, placing, setting
+from thermocomp.compensation.nc.following.block import Block, Setup
+from thermocomp.compensation.nc.following.codes import CYCLES, TAKES_AXES
+from thermocomp.compensation.nc.following.orders import Orders, Reader
+from thermocomp.compensation.nc.following.state import State
+from thermocomp.compensation.nc.reading.expressions import Parameters
+from thermocomp.compensation.nc.reading.line import Line
+from thermocomp.core.exceptions import ProgramError
+
+_AXIS_LETTERS: Final = frozenset("XYZABC")
+_PLAIN_LETTERS: Final = frozenset("XYZF")
+_PROBES: Final = frozenset({"G31", "G38.2", "G38.3", "G38.4", "G38.5"})
+_THREADS: Final = frozenset({"G33", "G33.1"})
+_CURVES: Final = frozenset({"G5", "G5.1"})
+
+
+def follow(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
+    """Follow a program.
+
+    Parameters
+    ----------
+    lines : iterable of Line
+    setup : Setup
+        What stands at the controller and not in the program.
+
+    Yields
+    ------
+    Block
+        One for every line.
+
+    Raises
+    ------
+    ProgramError
+        A line cannot be followed for certain; its reason says what was found and what to do.
+    """
+    step = Follower(setup).step
+    for line in lines:
+        yield step(line)
+
+
+class Follower:
+    """A controller that goes through a program.
+
+    Parameters
+    ----------
+    setup : Setup
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.state = State(setup)
+        self._setup = setup
+        self._parameters = Parameters(setup.controller)
+        self._reader = Reader(setup, self._parameters)
+        self._began = False
+        self._demarcated = False
+        self._ended = False
+
+    def step(self, line: Line) -> Block:
+        """Run one line.
+
+        Raises
+        ------
+        ProgramError
+            See `follow`.
+        """
+        if self._ended:
+            return self._idle(line)
+        if line.demarcation:
+            return self._percent(line)
+        if not self._began and line.text.strip():
+            self._began = True
+        if line.optional and self._setup.skip_optional:
+            return self._idle(line)
+        if line.error:
+            raise ProgramError(line.number, line.error)
+        if line.flow:
+            raise ProgramError(
+                line.number,
+                f"{line.flow}: loops, branches and subprograms are not followed; --expand lets the interpreter unroll "
+                "them",
+            )
+        if not line.words and not line.assignments:
+            return self._idle(line)
+        orders = self._reader.read(line)
+        return self._optional(orders) if line.optional else self._run(orders)
+
+    def _idle(self, line: Line) -> Block:
+        state = self.state
+        return Block(
+            line,
+            state.modal,
+            start=state.place,
+            end=state.place,
+            known=state.known,
+            feed=state.feed,
+            speed=0.0 if self._ended else state.speed,
+        )
+
+    def _percent(self, line: Line) -> Block:
+        """Begin or end the program at ``%``."""
+        if self._began:
+            if not self._demarcated and not self.state.fanuc:
+                raise ProgramError(line.number, "'%' in a program that does not begin with it; remove it")
+            block = self._idle(line)
+            block.ends = self._ended = True
+            return block
+        self._began = self._demarcated = True
+        return self._idle(line)
+
+    def _optional(self, orders: Orders) -> Block:
+        """Run a line that the operator may skip: then nothing after it may depend on it."""
+        before = self._summary()
+        block = self._run(orders)
+        after = self._summary()
+        changed = [what for what, was in before.items() if after[what] != was]
+        if block.ends:
+            changed.append("the end of the program")
+        if block.kind in ("cycle", "set"):
+            changed.append(f"the state of {' '.join(block.codes) or 'the cycle'}")
+        if block.moves and not block.modal.absolute and block.kind != "home":
+            changed.append("the place of all G91 moves behind it")
+        if changed:
+            raise orders.error(
+                f"an optional line (/) that changes {changed[0]}: what comes after depends on whether the operator "
+                "skips it; decide with --block-delete"
+            )
+        if block.moves:
+            x, y, z = (
+                k and letter not in block.values and a == b
+                for k, letter, a, b in zip(block.known, "XYZ", block.start, block.end, strict=True)
+            )
+            block.known = self.state.known = (x, y, z)
+        return block
+
+    def _summary(self) -> dict[str, object]:
+        state = self.state
+        return {
+            "modal codes": state.modal,
+            "offsets": state.offsets.state(),
+            "tool lengths": (dict(state.lengths), dict(state.doubtful)),
+            "the feed": (state.feed, state.feed_word),
+            "the spindle's speed": (state.spindle, state.turning),
+            "the tool": (state.tool, state.selected),
+            "the cycle": (dict(state.sticky), state.level),
+        }
+
+    def _run(self, orders: Orders) -> Block:
+        state, values, groups = self.state, orders.values, orders.groups
+        before = state.modal
+        code = self._motion(orders)
+        if values.keys() - _PLAIN_LETTERS:
+            self._reader.check_letters(orders, code)
+        block = Block(orders.line, before, "none", orders.codes, orders.words, values, state.place)
+        if groups and not (len(groups) == 1 and "motion" in groups):
+            setting.settle(state, orders, block)
+        else:
+            setting.check_units(state, orders)
+            setting.speeds(state, orders, before.inch)
+        once = groups.get("once")
+        if once is not None:
+            self._once(orders, block, once)
+        if code:
+            self._move(orders, block, code)
+        if groups.get("motion") == "G80":
+            state.sticky = {}
+            state.level = None
+            state.moves_by("")
+            block.modal = state.modal
+        else:
+            block.modal = state.modal
+            if code in _CURVES:
+                state.moves_by("")
+        block.end = state.place
+        block.known = state.known
+        block.feed = state.feed
+        block.speed = block.speed or state.speed
+        stop = groups.get("stop")
+        if stop is not None:
+            block.stops = block.stops or stop in ("M0", "M1", "M60")
+            block.ends = self._ended = stop in ("M2", "M30")
+        return block
+
+    def _motion(self, orders: Orders) -> str:
+        """Return the motion code that this line runs; empty if it makes no move of its own."""
+        groups, values = orders.groups, orders.values
+        told = groups.get("motion")
+        once = groups.get("once")
+        if once is None and "tool length" not in groups:
+            if told == "G80":
+                if not _AXIS_LETTERS.isdisjoint(values):
+                    raise orders.error("axis words beside G80; write the motion code they are for")
+                return ""
+            if told is not None:
+                return told
+        takes = once in TAKES_AXES or groups.get("tool length") == "G43.1"
+        if once == "G4" and self.state.fanuc:
+            takes = True
+        if takes:
+            if told not in (None, "G80"):
+                raise orders.error(
+                    f"{told} beside {once or 'G43.1'}: both would use the axis words; put one on its own line"
+                )
+            return ""
+        if told is not None and told != "G80":
+            return told
+        if _AXIS_LETTERS.isdisjoint(values) and not self._turns(orders):
+            return ""
+        force = self.state.modal.motion
+        if not force or told == "G80":
+            raise orders.error("axis words, and no motion code is in force; write G0, G1 ... before them")
+        return force
+
+    def _turns(self, orders: Orders) -> bool:
+        """Whether the line is an arc without axis words: a full circle."""
+        force = self.state.modal.motion
+        return force in ("G2", "G3") and not orders.values.keys().isdisjoint("IJK") and "once" not in orders.groups
+
+    def _once(self, orders: Orders, block: Block, once: str) -> None:
+        """Do the code that holds for this line only; G53 belongs to the motion."""
+        state, values = self.state, orders.values
+        if once == "G4":
+            if "P" in values:
+                seconds = motion.dwell_seconds(state, values["P"])
+            elif state.fanuc and "X" in values:
+                seconds = values["X"]
+                if state.setup.integers == "least" and "." not in orders.words["X"].value:
+                    seconds /= 1000.0
+            else:
+                raise orders.error("G4 needs P, the time")
+            if seconds < 0.0:
+                raise orders.error("G4 with a negative time")
+            block.pause += seconds
+        elif once in ("G28", "G30"):
+            motion.home(state, orders, block)
+        elif once == "G10":
+            placing.g10(state, orders, block)
+        elif once != "G53":
+            placing.local(state, orders, block)
+
+    def _move(self, orders: Orders, block: Block, code: str) -> None:
+        state = self.state
+        again = state.modal.motion == code
+        if not again:
+            state.moves_by(code)
+        if code not in CYCLES:
+            if state.level is not None:
+                state.level, state.sticky = None, {}
+        elif _AXIS_LETTERS.isdisjoint(orders.values):
+            raise orders.error(f"{code} without axis words; say where")
+        if orders.groups.get("once") == "G53":
+            motion.in_machine(state, orders, block)
+        elif code in ("G0", "G1"):
+            motion.straight(state, orders, block)
+        elif code in ("G2", "G3"):
+            motion.arc(state, orders, block)
+        elif code in CYCLES:
+            motion.cycle(state, orders, block, again)
+        elif _AXIS_LETTERS.isdisjoint(orders.values):
+            raise orders.error(f"{code} without axis words; say where")
+        elif code in _PROBES:
+            motion.probe(state, orders, block)
+        elif code in _THREADS:
+            motion.in_step(state, orders, block)
+        else:
+            motion.curve(state, orders, block)

@@ -1,0 +1,101 @@
+"""A revised program is read again before anybody gets it: every move is the original's plus what was asked for."""
+
+from collections import deque
+from collections.abc import Iterator
+
+from thermocomp.compensation.nc.following.block import Block, Move, Point, Setup
+from thermocomp.compensation.nc.following.follower import follow
+from thermocomp.compensation.nc.reading.tokens import read_lines
+from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.compensation.nc.revising.method import PLANES, Change
+from thermocomp.core.exceptions import ProgramError
+
+#: largest difference that is rounding [um]
+ROUNDING = 0.1
+#: characters of a line that every control reads
+LONGEST = 240
+
+
+class Check:
+    """Follows the revised program beside the original.
+
+    Parameters
+    ----------
+    setup : Setup
+        That of the original.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._texts: deque[str] = deque()
+        self._blocks = follow(read_lines(self._given(), setup.controller), setup)
+
+    def _given(self) -> Iterator[str]:
+        while self._texts:
+            yield self._texts.popleft()
+
+    def check(self, block: Block, change: Change) -> None:
+        """Compare a block with what it has become.
+
+        Parameters
+        ----------
+        block : Block
+        change : Change
+
+        Raises
+        ------
+        ProgramError
+            A move is not where it should be. This is a fault of thermocomp, and better found here than at the machine.
+        """
+        longest = max(map(len, change.texts))
+        if longest > max(LONGEST, len(block.line.text)):
+            raise ProgramError(block.line.number, f"would become a line of {longest} characters; divide it")
+        self._texts.extend(change.texts)
+        try:
+            moves = [m for _ in change.texts for m in next(self._blocks).moves]
+        except ProgramError as e:
+            raise ProgramError(block.line.number, f"what it becomes cannot be read: {e.reason}") from e
+        if len(moves) != len(block.moves):
+            raise _fault(block, change, f"makes {len(moves)} moves instead of {len(block.moves)}")
+        for k, (was, now) in enumerate(zip(block.moves, moves, strict=True)):
+            allowed = self._allowed(block, change, last=k == len(moves) - 1)
+            found = _apart(was.end, now.end)
+            for axis in range(3):
+                if all(abs(found[axis] - a) > ROUNDING for a in allowed[axis]):
+                    raise _fault(
+                        block,
+                        change,
+                        f"moves {'XYZ'[axis]} by {found[axis]:.2f} um instead of {allowed[axis][0]:.2f} um",
+                    )
+            if not _same_arc(was, now, change.after):
+                raise _fault(block, change, "makes another arc")
+
+    def _allowed(self, block: Block, change: Change, *, last: bool) -> list[tuple[float, ...]]:
+        """Return what each axis may be shifted by in a move of a block [um]."""
+        if last or block.kind not in ("cycle", "home"):
+            return [(a,) for a in change.after]
+        return list(zip(change.after, change.before, change.inner, strict=True))
+
+
+def _apart(was: Point, now: Point) -> Vector:
+    x, y, z = ((b - a) * 1e3 for a, b in zip(was, now, strict=True))
+    return x, y, z
+
+
+def _same_arc(was: Move, now: Move, shift: Vector) -> bool:
+    a, b = was.arc, now.arc
+    if a is None or b is None:
+        return a is b
+    first, second, _ = PLANES[a.plane]
+    wanted = (shift[first], shift[second])
+    moved = ((q - p) * 1e3 for p, q in zip(a.centre, b.centre, strict=True))
+    return (a.plane, a.clockwise, a.turns) == (b.plane, b.clockwise, b.turns) and all(
+        abs(m - w) <= ROUNDING for m, w in zip(moved, wanted, strict=True)
+    )
+
+
+def _fault(block: Block, change: Change, what: str) -> ProgramError:
+    return ProgramError(
+        block.line.number,
+        f"{block.line.text.strip()!r} would become {change.texts[-1].strip()!r}, which {what}: "
+        "please report this; nothing was written",
+    )

@@ -1,0 +1,254 @@
+"""The paper's way: the correction is added to the words of X, Y and Z (P-06).
+
+What becomes of a block, by its kind:
+
+- a line: every word of an axis gets the correction of that axis; an axis that is not named, but whose correction has
+  changed, gets a word;
+- in G91 a word gets what the correction has changed since that axis moved last;
+- an arc: the axes of its plane keep what they carry, so that its radius stays; its third axis is that of a line;
+- a drilling cycle: depth and retract plane both get the correction of the drilling axis;
+- G92 and G10 L20: the value gets what the axis carries, so that the coordinates stay where they were;
+- G53, G28, G30: machine coordinates, they carry nothing;
+- with cutter radius compensation on: everything stays as it was when it was switched on.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.revising.frame import Frame, Vector
+from thermocomp.compensation.nc.revising.method import AXES, PLANES, SPREAD, Method, refuse_probing
+from thermocomp.compensation.nc.revising.text import shifted
+from thermocomp.core.exceptions import ProgramError
+
+#: a retract plane nearer than that to where the cycle starts is the same plane [mm]
+SAME_PLANE = 0.5
+#: motions that take a word they did not have
+PLAIN = ("G0", "G1")
+
+
+@dataclass
+class Coordinates(Method):
+    """Adds the correction to the words.
+
+    Parameters
+    ----------
+    helix : bool
+        An arc may get a word of its third axis.
+    """
+
+    helix: bool = True
+    _cutting: bool = False
+    _way: list[float] = field(default_factory=lambda: [math.inf] * 3)
+    _known: tuple[bool, bool, bool] = (False, False, False)
+    _cycle: float = 0.0  # what depth and retract plane of the cycle in force got
+    _series: tuple[float, float] | None = None  # level at which a series of cycles began [mm], and what it carries [um]
+
+    def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
+        refuse_probing(block)
+        kind = block.kind
+        if self.names_place(block):
+            text = self._named_anew(block)
+        elif kind in ("none", "set"):
+            text = block.line.text
+        elif kind == "machine":
+            self.leave(block)
+            text = block.line.text
+        else:
+            frame = self.frame(block)
+            old = frame.words(self.carried)
+            if kind in ("line", "arc", "curve"):
+                text = self._path(block, frame, old, demand)
+            elif kind == "cycle":
+                text = self._drill(block, frame, old, demand)
+            else:
+                text = self._homewards(block, frame, old)
+        if block.moves:
+            self._went(block)
+        self._known = block.known
+        return (text,)
+
+    # -- kinds of blocks ---------------------------------------------------------------------------------------------
+
+    def _path(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
+        modal = block.modal
+        named = self.named(block)
+        goal = frame.words(self._limited(block, demand))
+        holds = self._holds(block, frame)
+        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        if block.line.optional:
+            self._optional(named)
+        for i in named:
+            letter = AXES[i]
+            if modal.absolute:
+                if i not in holds and not (block.line.optional and not self.fixed[i]):
+                    new[i] = goal[i]
+                shifts[letter] = new[i]
+                self.fixed[i] = False
+                self.doubtful[i] = block.line.optional and new[i] != old[i]
+            elif i not in holds and not self.fixed[i] and not self.doubtful[i]:
+                new[i] = goal[i]
+                shifts[letter] = round(new[i] - old[i], frame.digits)
+        if self._takes_words(block):
+            self._add(block, frame, goal, holds, new, added)
+        if modal.arc_absolute and block.kind == "arc":
+            for i, letter in enumerate("IJK"):
+                if letter in block.words:
+                    shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
+        self._take(frame, old, new)
+        return shifted(block, shifts, added, frame.digits)
+
+    def _add(
+        self,
+        block: Block,
+        frame: Frame,
+        goal: Vector,
+        holds: tuple[int, ...],
+        new: list[float],
+        added: dict[str, float],
+    ) -> None:
+        for i, letter in enumerate(AXES):
+            if letter in block.words or i in holds or goal[i] == new[i] or self.fixed[i] or self.doubtful[i]:
+                continue
+            if not block.modal.absolute:
+                added[letter] = goal[i] - new[i]
+            elif self._known[i] and block.known[i]:
+                added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
+            else:
+                continue
+            new[i] = goal[i]
+
+    def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
+        if block.modal.motion == "G87":
+            raise ProgramError(
+                block.line.number, "G87 has levels that are not shifted; --method offset, or --expand writes it out"
+            )
+        axis = PLANES[block.modal.plane][2]
+        goal = frame.words(demand)
+        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        for i in self.named(block):
+            if i == axis:
+                continue
+            if block.modal.absolute:
+                new[i] = shifts[AXES[i]] = goal[i]
+                self.fixed[i] = self.doubtful[i] = False
+            elif block.values.get("L", 1.0) == 1 and not self.fixed[i] and not self.doubtful[i]:
+                new[i] = goal[i]
+                shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
+        if block.line.optional and tuple(new) != old:
+            raise ProgramError(block.line.number, "an optional line that drills: decide with --block-delete")
+        self._take(frame, old, new)
+        if block.modal.absolute:
+            self._levels(block, axis, frame, goal[axis], shifts, added)
+        return shifted(block, shifts, added, frame.digits)
+
+    def _levels(
+        self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
+    ) -> None:
+        """Shift depth and retract plane of a cycle, together or not at all."""
+        words = (AXES[axis], "R")
+        if self._series is None:
+            self._series = block.start[axis], self.carried[axis]
+        plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
+        level, carried = self._series
+        if not self.fixed[axis] and any(abs(z - plane) < SAME_PLANE for z in (block.start[axis], level)):
+            goal = frame.words(self.carried)[axis]  # which of them is the higher one must not change
+        if goal != self._cycle or all(word in block.words for word in words):
+            added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
+            self._cycle = goal
+        shifts |= {word: goal for word in words if word in block.words}
+        within = list(frame.words(self.carried))
+        within[axis] = goal
+        self.inner = frame.shift((within[0], within[1], within[2]))
+        back = list(self.carried)
+        if abs(block.end[axis] - plane) < SAME_PLANE:
+            back[axis] = self.inner[axis]
+            self.fixed[axis] = self.doubtful[axis] = False
+        else:
+            back[axis] = carried
+        self.carried = (back[0], back[1], back[2])
+
+    def _homewards(self, block: Block, frame: Frame, old: Vector) -> str:
+        shifts = {AXES[i]: old[i] for i in self.named(block)} if block.modal.absolute else {}
+        self.leave(block)
+        return shifted(block, shifts, {}, frame.digits)
+
+    def _named_anew(self, block: Block) -> str:
+        for i in self.named(block):
+            if self.doubtful[i]:
+                raise ProgramError(
+                    block.line.number,
+                    f"names the place of {AXES[i]}, where an optional line may have moved it or not: "
+                    "decide with --block-delete",
+                )
+        frame = self.frame(block)
+        old = frame.words(self.carried)
+        return shifted(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
+
+    # -- what may change ---------------------------------------------------------------------------------------------
+
+    def _optional(self, named: list[int]) -> None:
+        for i in named:
+            if self.doubtful[i]:
+                self.fixed[i] = True
+
+    def _holds(self, block: Block, frame: Frame) -> tuple[int, ...]:
+        """Return the axes that have to keep what they carry in this block."""
+        modal = block.modal
+        if block.kind == "curve" or modal.motion == "G33.1":
+            return (0, 1, 2)
+        if modal.cutter:
+            return tuple(i for i in range(3) if not (self.fixed[i] and i == PLANES[modal.plane][2]))
+        if block.kind == "arc":
+            first, second, third = PLANES[modal.plane]
+            return (0, 1, 2) if frame.turned and third != 2 else (first, second)
+        return ()
+
+    def _takes_words(self, block: Block) -> bool:
+        """Return whether a block may get words that it does not have."""
+        modal = block.modal
+        if block.line.optional or modal.cutter or not block.moves:
+            return False
+        if block.kind == "arc":
+            first, second, _ = PLANES[modal.plane]
+            return self.helix and (AXES[first] in block.words or AXES[second] in block.words)
+        return block.kind == "line" and modal.motion in PLAIN and bool(self.named(block))
+
+    def _limited(self, block: Block, demand: Vector) -> Vector:
+        """Return the demand, or what a cut may take of it: a step, if the last one is far enough behind."""
+        if not block.moves or block.moves[-1].rapid:
+            return demand
+        out = []
+        for i in range(3):
+            gap = demand[i] - self.carried[i]
+            comes_down = not self._cutting and abs(block.end[i] - block.start[i]) > SAME_PLANE
+            if self.fixed[i] or comes_down or not (self._known[i] or self._cutting):
+                out.append(demand[i])
+            elif self._way[i] >= SPREAD:
+                out.append(self.carried[i] + math.copysign(min(abs(gap), self.step), gap))
+            else:
+                out.append(self.carried[i])
+        return out[0], out[1], out[2]
+
+    def _take(self, frame: Frame, old: Vector, new: list[float]) -> None:
+        if tuple(new) == old:
+            return
+        moved = frame.shift((new[0], new[1], new[2]))
+        if frame.turned:
+            self.carried = moved
+        else:
+            x, y, z = (m if n != o else c for m, n, o, c in zip(moved, new, old, self.carried, strict=True))
+            self.carried = (x, y, z)
+        self._way = [0.0 if n != o else w for n, o, w in zip(new, old, self._way, strict=True)]
+
+    def _went(self, block: Block) -> None:
+        """Take in where a block went: a change in a cut has to wait for some way."""
+        if block.kind != "cycle":
+            self._series = None
+        last = block.moves[-1]
+        if last.rapid:
+            self._cutting, self._way = False, [math.inf] * 3
+        else:
+            self._cutting = True
+            way = math.dist(last.start, last.end)
+            self._way = [w + way for w in self._way]

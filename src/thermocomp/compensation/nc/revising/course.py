@@ -1,0 +1,107 @@
+"""How a revised program runs, in as many points as a picture needs, however long it is."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.compensation.nc.revising.revise import Revised
+
+FloatArray = NDArray[np.float64]
+
+_NOT_CUTTING = (math.nan,) * 3
+
+
+class Run(NamedTuple):
+    """A run in stretches of time: the lowest and the highest value in each."""
+
+    time: FloatArray  #: (n,), end of each stretch [s]; the first begins at 0
+    deviation: FloatArray  #: (n, 2, 3), drift of X, Y, Z [um]
+    carried: FloatArray  #: (n, 2, 3), correction in force [um]
+    left: FloatArray  #: (n, 2, 3), what it leaves of the drift in the cuts [um]; nan where nothing is cut
+    speed: FloatArray  #: (n, 2), of the spindle [1/min]
+
+
+@dataclass
+class Course:
+    """Collects a run.
+
+    Parameters
+    ----------
+    most : int
+        Stretches that are kept; neighbours are put together as soon as there are more.
+    """
+
+    most: int = 1500
+    _times: list[float] = field(default_factory=list, init=False)
+    _low: list[tuple[float, ...]] = field(default_factory=list, init=False)
+    _high: list[tuple[float, ...]] = field(default_factory=list, init=False)
+    _last: tuple[Vector, Vector, float, bool] | None = field(default=None, init=False)
+    _rows: int = field(default=0, init=False)  # in the last stretch
+    _stride: int = field(default=1, init=False)  # rows of a stretch
+
+    def take(self, revised: Revised) -> None:
+        """Take a line in, in its order."""
+        block = revised.block
+        if block is None:
+            return
+        cuts = any(not m.rapid for m in block.moves) and block.kind not in ("machine", "home")
+        speed = abs(block.speed)
+        row = revised.deviation, revised.carried, speed, cuts
+        if row == self._last:  # nothing moves but time
+            self._times[-1] = revised.end
+            return
+        before = self._last or row
+        self._last = row
+        low = high = (*row[0], *row[1], speed, *_NOT_CUTTING)
+        if cuts:  # at both ends, as in `thermocomp.compensation.nc.revising.demand.Left`
+            ends = [[d + c for d, c in zip(*pair[:2], strict=True)] for pair in (before, row)]
+            low, high = (*low[:7], *map(min, *ends)), (*high[:7], *map(max, *ends))
+        if self._rows and self._rows < self._stride:
+            self._times[-1] = revised.end
+            self._low[-1] = tuple(map(_least, self._low[-1], low))
+            self._high[-1] = tuple(map(_most, self._high[-1], high))
+            self._rows += 1
+            return
+        self._times.append(revised.end)
+        self._low.append(low)
+        self._high.append(high)
+        self._rows = 1
+        if len(self._times) > self.most:
+            self._join()
+
+    def run(self) -> Run:
+        """Return the run so far."""
+        table = np.array([self._low, self._high], dtype=np.float64).reshape(2, -1, 10).swapaxes(0, 1)
+        return Run(
+            np.array(self._times, dtype=np.float64),
+            table[:, :, 0:3],
+            table[:, :, 3:6],
+            table[:, :, 7:10],
+            table[:, :, 6],
+        )
+
+    def _join(self) -> None:
+        """Put neighbours together; an odd one stays open at the end."""
+        n = len(self._times) // 2 * 2
+        odd = len(self._times) > n
+        self._times = self._times[1:n:2] + self._times[n:]
+        self._low = [
+            tuple(map(_least, a, b)) for a, b in zip(self._low[0:n:2], self._low[1:n:2], strict=True)
+        ] + self._low[n:]
+        self._high = [
+            tuple(map(_most, a, b)) for a, b in zip(self._high[0:n:2], self._high[1:n:2], strict=True)
+        ] + self._high[n:]
+        self._rows = self._rows if odd else 2 * self._stride
+        self._stride *= 2
+
+
+def _least(a: float, b: float) -> float:
+    return b if a != a or b < a else a  # noqa: PLR0124 - nan gives way
+
+
+def _most(a: float, b: float) -> float:
+    return b if a != a or b > a else a  # noqa: PLR0124 - nan gives way

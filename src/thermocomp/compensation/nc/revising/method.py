@@ -1,0 +1,136 @@
+"""What the two ways of revising share: what each axis carries, and the change a block makes to it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from thermocomp.compensation.nc.following.block import Block, Modal
+from thermocomp.compensation.nc.revising.frame import Frame, Vector
+from thermocomp.compensation.nc.revising.text import Digits
+from thermocomp.core.exceptions import ProgramError
+
+AXES = "XYZ"
+#: plane -> its two axes and the one that stands on it
+PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+#: cutting way over which the correction changes by one step at most, in a cut [mm]
+SPREAD = 10.0
+
+
+class Change(NamedTuple):
+    """What became of a block."""
+
+    texts: tuple[str, ...]  #: lines to write instead of its line; the last one is the line itself
+    before: Vector  #: correction that the axes carried when it began [um, machine axes]
+    after: Vector  #: correction that they carry at its end
+    inner: Vector  #: and on the way, in a cycle that ends where it began
+
+
+@dataclass
+class Method(ABC):
+    """A way of getting a correction into a program.
+
+    Parameters
+    ----------
+    digits : Digits
+    step : float
+        In a cut the correction changes by that at most, per block and per 10 mm of way [um].
+    """
+
+    digits: Digits
+    step: float
+    #: correction that each axis carries now [um]
+    carried: Vector = (0.0, 0.0, 0.0)
+    #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
+    fixed: list[bool] = field(default_factory=lambda: [False, False, False])
+    #: axes of which nobody knows what they carry: an optional line may have moved them
+    doubtful: list[bool] = field(default_factory=lambda: [False, False, False])
+    #: what the axes carry within a cycle [um]
+    inner: Vector | None = None
+    _modal: Modal | None = None
+    _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()))
+
+    def revise(self, block: Block, demand: Vector) -> Change:
+        """Take the correction into a block, as far as it can.
+
+        Parameters
+        ----------
+        block : Block
+        demand : tuple of float
+            What the axes should carry at its end [um, machine axes].
+
+        Returns
+        -------
+        Change
+
+        Raises
+        ------
+        ProgramError
+            The block cannot be shifted safely.
+        """
+        before, self.inner = self.carried, None
+        texts = self._revise(block, demand)
+        return Change(texts, before, self.carried, self.inner or self.carried)
+
+    @property
+    def leaves_offset(self) -> bool:
+        """Whether an offset is in force that the program has to take back."""
+        return False
+
+    @abstractmethod
+    def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...
+
+    def frame(self, block: Block) -> Frame:
+        """Return how corrections stand in the words of a block."""
+        if block.modal is not self._modal:  # one snapshot serves many blocks
+            self._modal, self._frame = block.modal, Frame.of(block.modal, self.digits)
+        return self._frame
+
+    def named(self, block: Block) -> list[int]:
+        """Return the axes that a block names."""
+        return [i for i, letter in enumerate(AXES) if letter in block.words]
+
+    def names_place(self, block: Block) -> bool:
+        """Return whether a block gives the place where the tool stands another name.
+
+        Raises
+        ------
+        ProgramError
+            It does so in a way that is not followed.
+        """
+        if "G92" in block.codes:
+            return True
+        if "G10" not in block.codes or block.values.get("L") not in (10.0, 11.0, 20.0):
+            return False
+        if block.values["L"] != 20:
+            raise ProgramError(
+                block.line.number,
+                "G10 L10 and L11 take the tool's length from where it stands, which holds the drift already; "
+                "measure tools outside the program",
+            )
+        if int(block.values.get("P", 0)) not in (0, block.modal.system):
+            raise ProgramError(block.line.number, "G10 L20 for a system that is not in force is not supported")
+        return True
+
+    def leave(self, block: Block) -> None:
+        """Take in a move in machine coordinates: its axes carry nothing afterwards."""
+        axes = self.named(block) or ([0, 1, 2] if block.kind == "home" else [])
+        if axes and self.frame(block).turned and {0, 1} & set(axes):
+            axes = sorted({0, 1, *axes})
+            if any(self.carried[i] for i in axes if i not in self.named(block) and i != 2):
+                raise ProgramError(
+                    block.line.number, "a move in machine coordinates of X or Y alone while the coordinates are rotated"
+                )
+        after = list(self.carried)
+        for i in axes:
+            after[i], self.fixed[i], self.doubtful[i] = 0.0, True, False
+        self.carried = (after[0], after[1], after[2])
+
+
+def refuse_probing(block: Block) -> None:
+    """Raise `ProgramError` if a block probes: what it finds holds a correction nobody knows of."""
+    if block.kind == "probe":
+        raise ProgramError(
+            block.line.number,
+            f"{block.modal.motion} probes: the program goes on with what it finds, which holds the drift already; "
+            "revise the part of the program that cuts",
+        )

@@ -1,0 +1,152 @@
+"""The second way: the whole work coordinate system is shifted by ``G52``, where it cannot mark the part.
+
+``G52`` is absolute, says itself whether it is in force, and is the same for LinuxCNC and Fanuc. A new one is written at
+safe points only: the tool is up, no cutter compensation or cycle is on, and the next block is a rapid in G90. The words
+of the program stay untouched.
+"""
+
+from dataclasses import dataclass
+
+from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.revising.frame import Frame, Vector
+from thermocomp.compensation.nc.revising.method import AXES, PLANES, Method, refuse_probing
+from thermocomp.compensation.nc.revising.text import number
+from thermocomp.core.exceptions import ProgramError
+
+#: codes that use what G52 uses
+SAME_STORE = ("G52", "G92", "G92.1", "G92.2", "G92.3")
+
+
+@dataclass
+class Offset(Method):
+    """Shifts the work coordinate system at safe points.
+
+    Parameters
+    ----------
+    safe_z : float or None
+        The tool is up at and above this Z of the work coordinates [mm]; None: only at the start, after a tool change,
+        and after a move of Z in machine coordinates.
+    axes : tuple of bool
+        Axes that a ``G52`` names.
+    """
+
+    safe_z: float | None = None
+    axes: tuple[bool, bool, bool] = (True, True, True)
+    _up: bool = True
+    _written: Vector = (0.0, 0.0, 0.0)
+    _shift: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def leaves_offset(self) -> bool:
+        """Whether an offset is in force that the program has to take back."""
+        return any(self._written)
+
+    def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
+        refuse_probing(block)
+        self._refuse_rivals(block)
+        frame = self.frame(block)
+        before: tuple[str, ...] = ()
+        if self._safe(block):
+            before = self._update(block, frame, demand)
+        elif block.ends and any(self._written):
+            before = self._update(block, frame, (0.0, 0.0, 0.0))
+        self._carry(block, frame)
+        self._look_up(block)
+        return (*before, block.line.text)
+
+    # -- where -------------------------------------------------------------------------------------------------------
+
+    def _safe(self, block: Block) -> bool:
+        modal = block.modal
+        return (
+            self._up
+            and block.kind == "line"
+            and modal.motion == "G0"
+            and modal.absolute
+            and not modal.cutter
+            and not block.line.optional
+            and bool(self.named(block))
+        )
+
+    def _look_up(self, block: Block) -> None:
+        """Notice whether the tool is up after a block."""
+        if block.tool_change is not None or (block.kind in ("machine", "home") and (self.fixed[2])):
+            self._up = True
+        elif block.moves:
+            rapid = all(m.rapid for m in block.moves)
+            high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
+            level = block.end[2] == block.start[2]
+            self._up = rapid and not block.line.optional and (high or (self._up and level))
+
+    # -- what --------------------------------------------------------------------------------------------------------
+
+    def _update(self, block: Block, frame: Frame, demand: Vector) -> tuple[str, ...]:
+        if frame.turned and any(demand[:2]):
+            raise ProgramError(
+                block.line.number, "the coordinates are rotated: X and Y are shifted by --method coordinates only"
+            )
+        words = frame.words(demand)
+        if words == self._written and frame.shift(words) == self._shift:
+            return ()
+        self._written, self._shift = words, frame.shift(words)
+        text = "G52" + "".join(
+            f" {letter}{number(w, frame.digits)}" for letter, w, on in zip(AXES, words, self.axes, strict=True) if on
+        )
+        return (text + ending(block.line.text),)
+
+    def _carry(self, block: Block, frame: Frame) -> None:
+        """Follow what the controller makes of it: a named axis goes to the shifted place."""
+        kind = block.kind
+        if kind in ("machine", "home"):
+            self.leave(block)
+            return
+        if self.names_place(block):
+            self._refuse_mixed(block, self.named(block), "names a place")
+        if kind in ("none", "set") or not block.modal.absolute:
+            return
+        after = list(self.carried)
+        for i in self.named(block):
+            if block.line.optional and self.carried[i] != self._shift[i]:
+                raise ProgramError(
+                    block.line.number, "an optional line behind an update of the offset: decide with --block-delete"
+                )
+            after[i], self.fixed[i] = self._shift[i], False
+        if kind in ("arc", "curve", "cycle"):
+            plane = PLANES[block.modal.plane]
+            self._refuse_mixed(block, [i for i in plane[:2] if kind != "cycle"], "an arc")
+            if kind == "cycle":
+                drill = plane[2]
+                self.inner = self._shift
+                after[drill] = self._drilled(block, frame, drill)
+        self.carried = (after[0], after[1], after[2])
+
+    def _drilled(self, block: Block, frame: Frame, drill: int) -> float:
+        plane = block.sticky["R"] / (frame.scale[drill] * 1e3)
+        if abs(block.end[drill] - plane) < 1e-6:
+            self.fixed[drill] = False
+            return self._shift[drill]
+        return self.carried[drill]
+
+    # -- refusals ----------------------------------------------------------------------------------------------------
+
+    def _refuse_rivals(self, block: Block) -> None:
+        for code in block.codes:
+            if code in SAME_STORE:
+                raise ProgramError(
+                    block.line.number, f"{code} uses the offset that the correction is put in: --method coordinates"
+                )
+
+    def _refuse_mixed(self, block: Block, axes: list[int], what: str) -> None:
+        """Raise `ProgramError` if an axis has not moved since the offset was changed, and its place matters."""
+        for i in axes:
+            if self.carried[i] != self._shift[i]:
+                raise ProgramError(
+                    block.line.number,
+                    f"{what}, but {AXES[i]} has not been positioned since the offset was updated: "
+                    "--method coordinates, or position all axes after the tool change",
+                )
+
+
+def ending(text: str) -> str:
+    """Return how a line ends."""
+    return text[len(text.rstrip("\r\n")) :] or "\n"
