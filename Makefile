@@ -18,7 +18,7 @@ demo: $(VENV)/.study
 	$(BIN)/thermocomp demo --output demo --overwrite
 
 test: $(VENV)/.dev
-	scripts/system_packages.sh chromium
+	scripts/system_packages.sh chromium linuxcnc-uspace
 	$(BIN)/python -m pytest --cov --cov-report=term
 
 check: $(VENV)/.dev

@@ -202,10 +202,10 @@ def test_alpha_to_enter_above_alpha_to_remove_is_refused(alphas: tuple[float, fl
 def test_a_rule_that_goes_round_is_stopped() -> None:
     @dataclass(frozen=True)
     class Fickle:
-        def enter_f(self, df: int) -> float:  # noqa: ARG002
+        def enter_f(self, df: int) -> float:
             return 5.0
 
-        def delete_f(self, df: int) -> float:  # noqa: ARG002
+        def delete_f(self, df: int) -> float:
             return 1e9
 
     rng = np.random.default_rng(10)

@@ -175,7 +175,22 @@ def left(
     *,
     zero_known: bool,
 ) -> JobState:
-    """Return what the next job can start from; see `StationState`."""
+    """Return what the next job can start from.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+    states : sequence of State
+        Of their models.
+    zeros, doubts : sequence of float
+        Per station, see `StationState` [um].
+    zero_known : bool
+        The zeros are no predictions.
+
+    Returns
+    -------
+    JobState
+    """
     kept = []
     for station, state, zero, doubt in zip(stations, states, zeros, doubts, strict=True):
         memory = np.empty(0) if state.memory is None else state.memory

@@ -27,6 +27,13 @@ class ArcError(Exception):
 def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:
     """Refuse arcs whose radii at start and end [mm] differ as the interpreter does.
 
+    Parameters
+    ----------
+    start, end, centre : tuple of float
+        In the arc's plane [mm].
+    inch : bool
+        Its tolerance is another one in inches.
+
     Raises
     ------
     ArcError
@@ -42,7 +49,15 @@ def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:
 
 
 def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> Flat:
-    """Return the centre of an arc in the R form; a negative radius takes the longer way [mm].
+    """Return the centre of an arc in the R form.
+
+    Parameters
+    ----------
+    start, end : tuple of float
+        In the arc's plane [mm].
+    radius : float
+        A negative one takes the longer way [mm].
+    clockwise : bool
 
     Raises
     ------

@@ -192,7 +192,17 @@ def curve(state: State, orders: Orders, block: Block) -> None:
 
 
 def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
-    """G73 to G89; `again`: the same cycle was in force before this line."""
+    """G73 to G89.
+
+    Parameters
+    ----------
+    state : State
+    orders : Orders
+    block : Block
+        Gets the moves.
+    again : bool
+        The same cycle was in force before this line.
+    """
     modal, values = state.modal, orders.values
     code, scale = modal.motion, state.scale
     _may_drill(state, orders)

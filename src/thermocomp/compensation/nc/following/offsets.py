@@ -111,7 +111,18 @@ class Offsets:
     def set_origin(
         self, system: int, values: Mapping[int, float], rotation: float | None = None, add: bool = False
     ) -> None:
-        """G10 L2: set, or with `add` shift, the origin of a system, and its rotation [deg]."""
+        """G10 L2: set the origin of a system.
+
+        Parameters
+        ----------
+        system : int
+        values : mapping of int to float
+            By axis [mm].
+        rotation : float or None
+            [deg]; None: as it is.
+        add : bool
+            Shift it instead.
+        """
         old = self.origins.get(system, _ZERO)
         if add:
             values = {i: old[i] + v for i, v in values.items()}
@@ -124,7 +135,18 @@ class Offsets:
         self._update()
 
     def name_origin(self, system: int, point: Point, values: Mapping[int, float], known: Known) -> None:
-        """G10 L20: set the origin of a system so that the machine's `point` gets these program coordinates in it."""
+        """G10 L20: set the origin of a system so that a point of the machine gets these program coordinates in it.
+
+        Parameters
+        ----------
+        system : int
+        point : tuple of float
+            Machine coordinates [mm].
+        values : mapping of int to float
+            Program coordinates, by axis [mm].
+        known : tuple of bool
+            Per axis: `point` is certain.
+        """
         own = self.system
         certain = both(known, self.certain)
         self.system = system

@@ -128,7 +128,16 @@ class State:
         self.known = (a and still[0], b and still[1], c and still[2])
 
     def cut(self, orders: Orders, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
-        """Return a move in feed between machine coordinates.
+        """Return a move in feed.
+
+        Parameters
+        ----------
+        orders : Orders
+        start, end : tuple of float
+            Machine coordinates [mm].
+        arc : Arc or None
+        rotary : float
+            Way of the rotary axes [deg].
 
         Raises
         ------
@@ -151,7 +160,19 @@ class State:
     def per_turn(
         self, orders: Orders, start: Point, end: Point, pitch: float, arc: Arc | None = None, rotary: float = 0.0
     ) -> Move:
-        """Return a move that takes `pitch` [mm] (or degrees) per turn of the spindle."""
+        """Return a move that goes with the turns of the spindle.
+
+        Parameters
+        ----------
+        orders : Orders
+        start, end : tuple of float
+            Machine coordinates [mm].
+        pitch : float
+            Way per turn [mm], or degrees.
+        arc : Arc or None
+        rotary : float
+            Way of the rotary axes [deg].
+        """
         feed = pitch * abs(self.speed)
         if not feed:
             raise orders.error("a feed per turn while the spindle stands; start it with S and M3 before")

@@ -38,11 +38,13 @@ class Coordinates(Method):
     """
 
     helix: bool = True
-    _cutting: bool = False
-    _way: list[float] = field(default_factory=lambda: [math.inf] * 3)
-    _known: tuple[bool, bool, bool] = (False, False, False)
-    _cycle: float = 0.0  # what depth and retract plane of the cycle in force got
-    _series: tuple[float, float] | None = None  # level at which a series of cycles began [mm], and what it carries [um]
+    _cutting: bool = field(default=False, init=False)
+    _way: list[float] = field(default_factory=lambda: [math.inf] * 3, init=False)
+    _known: tuple[bool, bool, bool] = field(default=(False, False, False), init=False)
+    #: what depth and retract plane of the cycle in force got
+    _cycle: float = field(default=0.0, init=False)
+    #: level at which a series of cycles began [mm], and what it carries [um]
+    _series: tuple[float, float] | None = field(default=None, init=False)
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
         refuse_probing(block)

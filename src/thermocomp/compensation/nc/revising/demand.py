@@ -47,9 +47,9 @@ class Demand:
     tolerance: float
     every: float | None = None
     most: float = 400.0
-    _force: Vector = (0.0, 0.0, 0.0)
-    _field: Field | None = None
-    _next: float = 0.0
+    _force: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+    _field: Field | None = field(default=None, init=False)
+    _next: float = field(default=0.0, init=False)
 
     def at(self, time: float, drift: Drifting, point: Point) -> Vector:
         """Return the correction in force at a time [s] and place [mm, machine coordinates].

@@ -39,15 +39,15 @@ class Method(ABC):
     digits: Digits
     step: float
     #: correction that each axis carries now [um]
-    carried: Vector = (0.0, 0.0, 0.0)
+    carried: Vector = field(default=(0.0, 0.0, 0.0), init=False)
     #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
-    fixed: list[bool] = field(default_factory=lambda: [False, False, False])
+    fixed: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
     #: axes of which nobody knows what they carry: an optional line may have moved them
-    doubtful: list[bool] = field(default_factory=lambda: [False, False, False])
+    doubtful: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
     #: what the axes carry within a cycle [um]
-    inner: Vector | None = None
-    _modal: Modal | None = None
-    _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()))
+    inner: Vector | None = field(default=None, init=False)
+    _modal: Modal | None = field(default=None, init=False)
+    _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()), init=False)
 
     def revise(self, block: Block, demand: Vector) -> Change:
         """Take the correction into a block, as far as it can.

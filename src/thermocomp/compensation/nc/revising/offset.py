@@ -5,7 +5,7 @@ safe points only: the tool is up, no cutter compensation or cycle is on, and the
 of the program stay untouched.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from thermocomp.compensation.nc.following.block import Block
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
@@ -32,9 +32,9 @@ class Offset(Method):
 
     safe_z: float | None = None
     axes: tuple[bool, bool, bool] = (True, True, True)
-    _up: bool = True
-    _written: Vector = (0.0, 0.0, 0.0)
-    _shift: Vector = (0.0, 0.0, 0.0)
+    _up: bool = field(default=True, init=False)
+    _written: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+    _shift: Vector = field(default=(0.0, 0.0, 0.0), init=False)
 
     @property
     def leaves_offset(self) -> bool:

@@ -73,13 +73,13 @@ class Revision:
     drift: Drifting
     method: Method
     demand: Demand
-    left: Left = field(default_factory=Left)
-    lines: int = 0
-    changed: int = 0
-    seconds: float = 0.0
-    tool_changes: list[float] = field(default_factory=list)
-    slowest: float = float("inf")
-    fastest: float = 0.0
+    left: Left = field(default_factory=Left, init=False)
+    lines: int = field(default=0, init=False)
+    changed: int = field(default=0, init=False)
+    seconds: float = field(default=0.0, init=False)
+    tool_changes: list[float] = field(default_factory=list, init=False)
+    slowest: float = field(default=float("inf"), init=False)
+    fastest: float = field(default=0.0, init=False)
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.

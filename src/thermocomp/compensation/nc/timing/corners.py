@@ -155,9 +155,12 @@ def together(
     ----------
     overlap : tuple of float
         See `Segment`.
-    before, after : Segment
-    a, b : float
-        Their accelerations [mm/s2].
+    before : Segment
+    a : float
+        Its acceleration [mm/s2].
+    after : Segment
+    b : float
+        Its acceleration [mm/s2].
     share : float
         Of their lengths that is there for sure.
     """
