@@ -1,0 +1,362 @@
+"""Run an NC program through LinuxCNC's interpreter and write its canonical calls, a line each, to standard output.
+
+A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
+thermocomp but the file `_rs274_hooks.py` beside it. `thermocomp.shopfloor.rs274` starts it with one argument (JSON) and
+reads what it writes.
+
+The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
+the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
+in inches from the module whatever the program's unit is, and leave here in mm, with 15 digits.
+"""
+
+import ctypes
+import json
+import math
+import os
+import re
+import resource
+import sys
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from _rs274_hooks import Hooks  # type: ignore[import-not-found]
+
+sys.path.insert(0, "/usr/lib/python3/dist-packages")
+
+MM = 25.4
+
+INT, D, B, P = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p
+#: canonical functions that are told with their numbers: mangled name -> kind, types
+TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
+    "_Z11SELECT_TOOLi": ("select", (INT,)),
+    "_Z21STOP_SPEED_FEED_SYNCHv": ("unsync", ()),
+    "_Z23START_SPINDLE_CLOCKWISEii": ("m3", (INT, INT)),
+    "_Z30START_SPINDLE_COUNTERCLOCKWISEii": ("m4", (INT, INT)),
+    "_Z20STOP_SPINDLE_TURNINGi": ("m5", (INT,)),
+    "_Z17SET_SPINDLE_SPEEDid": ("speed", (INT, D)),
+    "_Z16SET_SPINDLE_MODEid": ("speedmode", (INT, D)),
+    "_Z14ORIENT_SPINDLEidi": ("orient", (INT, D, INT)),
+    "_Z28WAIT_SPINDLE_ORIENT_COMPLETEid": ("oriented", (INT, D)),
+    "_Z12PROGRAM_STOPv": ("m0", ()),
+    "_Z21OPTIONAL_PROGRAM_STOPv": ("m1", ()),
+    "_Z14PALLET_SHUTTLEv": ("pallet", ()),
+    "_Z11PROGRAM_ENDv": ("end", ()),
+    "_Z7MIST_ONv": ("mist", ()),
+    "_Z8FLOOD_ONv": ("flood", ()),
+    "_Z8MIST_OFFv": ("mistoff", ()),
+    "_Z9FLOOD_OFFv": ("floodoff", ()),
+    "_Z20ENABLE_FEED_OVERRIDEv": ("feedoverride", ()),
+    "_Z21DISABLE_FEED_OVERRIDEv": ("nofeedoverride", ()),
+    "_Z21ENABLE_SPEED_OVERRIDEi": ("speedoverride", (INT,)),
+    "_Z22DISABLE_SPEED_OVERRIDEi": ("nospeedoverride", (INT,)),
+    "_Z20ENABLE_ADAPTIVE_FEEDv": ("adaptive", ()),
+    "_Z21DISABLE_ADAPTIVE_FEEDv": ("noadaptive", ()),
+    "_Z16ENABLE_FEED_HOLDv": ("feedhold", ()),
+    "_Z17DISABLE_FEED_HOLDv": ("nofeedhold", ()),
+    "_Z21SET_MOTION_OUTPUT_BITi": ("m62", (INT,)),
+    "_Z23CLEAR_MOTION_OUTPUT_BITi": ("m63", (INT,)),
+    "_Z18SET_AUX_OUTPUT_BITi": ("m64", (INT,)),
+    "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
+    "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
+    "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
+    "_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi": ("tooltable", ()),  # its numbers are not looked at
+}
+
+
+class Canon:
+    """Receives the canonical calls of the interpreter."""
+
+    def __init__(self, job: dict[str, Any], write: Callable[[str], Any]) -> None:
+        self.parameter_file = job["parameters"]
+        self.delete = bool(job["block_delete"])
+        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
+        self.write = write
+        self.line = 0
+        self.begun = 0  # 1 after the mark in the job's start block, 2 after its last call, the tool length
+        self.metric = False
+        self.interpreter = 0
+        self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
+        self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
+        self.angle = 0.0
+        self.spindle = 0
+        self.plane = 1
+        self.feed = 0.0  # [mm/min]
+        self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
+        self.file = b""
+        self.hooks = Hooks()
+        self.library = ctypes.PyDLL("librs274.so.0")
+        self.sequence = self.library._ZN6Interp15sequence_numberEv
+        self.sequence.argtypes = (P,)
+        self.name = self.library._ZN6Interp9file_nameEPcm
+        self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
+        self.buffer = ctypes.create_string_buffer(512)
+        self.program = job["program"].encode()
+
+    def connect(self, module: str) -> None:
+        """Turn the functions the module leaves empty to this object."""
+
+        def told(kind: str) -> Callable[..., None]:
+            return lambda *numbers: self.tell(kind, *numbers)
+
+        functions: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
+            name: (told(kind), (None, *types)) for name, (kind, types) in TOLD.items()
+        }
+        functions["_Z22START_SPEED_FEED_SYNCHidb"] = (self.synchronised, (None, INT, D, B))
+        functions["_Z18CHANGE_TOOL_NUMBERi"] = (self.change_tool_number, (None, INT))
+        functions["_Z9RIGID_TAPidddd"] = (self.tapped, (None, INT, D, D, D, D))
+        functions["_Z4WAITiiid"] = (self.waited, (INT, INT, INT, INT, D))
+        functions["_Z16USE_LENGTH_UNITS11CANON_UNITS"] = (self.united, (None, INT))
+        functions["_Z23SET_MOTION_CONTROL_MODE17CANON_MOTION_MODEd"] = (self.pathed, (None, INT, D))
+        functions["_Z22SET_NAIVECAM_TOLERANCEd"] = (self.naive, (None, D))
+        # what the module answers is wrong once the unit, an offset or the mode has changed
+        functions["_Z22GET_EXTERNAL_FEED_RATEv"] = (lambda: self.feed / self.unit(), (D,))
+        functions["_Z32GET_EXTERNAL_MOTION_CONTROL_MODEv"] = (lambda: self.path[0], (INT,))
+        functions["_Z37GET_EXTERNAL_MOTION_CONTROL_TOLERANCEv"] = (lambda: self.path[1] / self.unit(), (D,))
+        functions["_Z46GET_EXTERNAL_MOTION_CONTROL_NAIVECAM_TOLERANCEv"] = (lambda: self.path[2] / self.unit(), (D,))
+        for i, axis in enumerate("XYZABCUVW"):
+            functions[f"_Z23GET_EXTERNAL_POSITION_{axis}v"] = (partial(self.position, i), (D,))
+            functions[f"_Z32GET_EXTERNAL_TOOL_LENGTH_{axis}OFFSETv"] = (partial(self.tool_length, i), (D,))
+        functions["_Z10NURBS_FEEDiSt6vectorI13CONTROL_POINTSaIS0_EEj"] = (
+            self.curved,
+            (None, INT, P, ctypes.c_uint),
+        )
+        self.unit_before = self.hooks.turn("librs274", functions)["_Z16USE_LENGTH_UNITS11CANON_UNITS"]
+        made = {"_ZN6InterpC1Ev": (self.constructed, (None, P))}
+        self.construct_before = self.hooks.turn(module, made)["_ZN6InterpC1Ev"]
+
+    def constructed(self, this: int) -> None:
+        self.construct_before(this)
+        self.interpreter = this
+
+    # --- writing ---
+    def where(self) -> None:
+        """Line and file of the block in execution."""
+        if self.interpreter:
+            self.move_to(self.sequence(self.interpreter))
+
+    def move_to(self, line: int) -> None:
+        self.line = line if self.begun == 2 else 0
+        self.name(self.interpreter, self.buffer, 512)
+        name = self.buffer.value
+        if name != self.file:
+            self.file = name
+            own = not name or os.path.samefile(name, self.program)  # noqa: PTH121
+            text = "" if own else name.decode("utf-8", "replace")
+            self.write(f"file {self.line} {text}\n")
+
+    def tell(self, kind: str, *numbers: float) -> None:
+        self.where()
+        self.write(f"{kind} {self.line} {' '.join(format(number, '.15g') for number in numbers)}\n")
+
+    def text(self, kind: str, text: str) -> None:
+        self.where()
+        self.write(f"{kind} {self.line} {re.sub('[^ -~]', '?', text)}\n")
+
+    def length(self, value: float) -> float:
+        return value if self.metric else value * MM
+
+    def unit(self) -> float:
+        return 1.0 if self.metric else MM
+
+    # --- where it stands: program = unrotated(machine - origin - tool) - G92 ---
+    def turned(self, values: tuple[float, ...], angle: float) -> list[float]:
+        c, s = math.cos(angle), math.sin(angle)
+        return [values[0] * c - values[1] * s, values[0] * s + values[1] * c, *values[2:]]
+
+    def shifted(self, name: str, values: tuple[float, ...]) -> None:
+        """Take an offset; the machine stays."""
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        machine = self.turned(tuple(p + g for p, g in zip(self.place, self.offset["g92"], strict=True)), self.angle)
+        machine = [m + f for m, f in zip(machine, sums, strict=True)]
+        if name == "rotation":
+            self.angle = math.radians(values[0])
+        else:
+            self.offset[name] = values
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        back = self.turned(tuple(m - f for m, f in zip(machine, sums, strict=True)), -self.angle)
+        self.place = tuple(p - g for p, g in zip(back, self.offset["g92"], strict=True))
+
+    def position(self, axis: int) -> float:
+        return self.place[axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)
+
+    def tool_length(self, axis: int) -> float:
+        return self.offset["length"][axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)
+
+    # --- what the module leaves out ---
+    def united(self, unit: int) -> None:
+        self.unit_before(unit)
+        self.metric = unit == 2
+        self.tell("unit", 1.0 if self.metric else MM)
+
+    def synchronised(self, spindle: int, pitch: float, velocity: bool) -> None:
+        self.tell("sync", spindle, self.length(pitch), velocity)
+
+    def change_tool_number(self, number: int) -> None:
+        self.spindle = number
+        self.tell("toolnumber", number)
+
+    def tapped(self, line: int, x: float, y: float, z: float, scale: float) -> None:
+        self.tell("tap", self.length(x), self.length(y), self.length(z), scale)
+
+    def waited(self, index: int, *more: float) -> int:
+        self.tell("wait", index)
+        return 0
+
+    def pathed(self, mode: int, tolerance: float) -> None:
+        self.path = (mode, self.length(tolerance), self.path[2])
+        self.tell("path", mode, self.length(tolerance))
+
+    def naive(self, tolerance: float) -> None:
+        self.path = (*self.path[:2], self.length(tolerance))
+        self.tell("naive", self.length(tolerance))
+
+    def curved(self, line: int, vector: int, order: int) -> None:
+        """Tell a spline; the argument is a std::vector of (x, y, weight)."""
+        first, last = (ctypes.c_size_t.from_address(vector + 8 * i).value for i in (0, 1))
+        numbers = (D * ((last - first) // 8)).from_address(first)
+        points = [n if i % 3 == 2 else self.length(n) for i, n in enumerate(numbers)]
+        self.place = (points[-3] / MM, points[-2] / MM, *self.place[2:])
+        self.tell("curve", order, *points)
+
+    # --- what the module tells ---
+    def next_line(self, state: Any) -> None:
+        if self.interpreter:
+            self.move_to(state.sequence_number)
+
+    def straight_traverse(self, x: float, y: float, z: float, *more: float) -> None:
+        self.straight("rapid", x, y, z, more)
+
+    def straight_feed(self, x: float, y: float, z: float, *more: float) -> None:
+        self.straight("feed", x, y, z, more)
+
+    def straight_probe(self, x: float, y: float, z: float, *more: float) -> None:
+        self.straight("probe", x, y, z, more)
+
+    def straight(self, kind: str, x: float, y: float, z: float, more: tuple[float, ...]) -> None:
+        self.place = (x, y, z, *more)
+        # percent formats take half the time of the others
+        text = "%s %d %.15g %.15g %.15g" % (kind, self.line, x * MM, y * MM, z * MM)
+        self.write(text + self.others(more) + "\n")
+
+    def others(self, more: tuple[float, ...]) -> str:
+        """Rotary and secondary axes; nothing if they stand at 0."""
+        if not any(more):
+            return ""
+        return " %.15g %.15g %.15g" % more[:3] + " %.15g %.15g %.15g" % tuple(v * MM for v in more[3:6])
+
+    def arc_feed(
+        self, end1: float, end2: float, centre1: float, centre2: float, turns: int, end3: float, *more: float
+    ) -> None:
+        at = {1: (end1, end2, end3), 2: (end3, end1, end2), 3: (end2, end3, end1)}[self.plane]
+        self.place = (*at, *more)
+        numbers = "%.15g %.15g %.15g %.15g %.15g" % tuple(v * MM for v in (end1, end2, centre1, centre2, end3))
+        self.write(f"arc {self.line} {turns} {numbers}{self.others(more)}\n")
+
+    def offsets(self, kind: str, first: str, values: tuple[float, ...]) -> None:
+        self.where()
+        self.shifted(kind, values)
+        numbers = " ".join(format(v if 3 <= i < 6 else v * MM, ".15g") for i, v in enumerate(values))
+        self.write(f"{kind} {self.line} {first}{numbers}\n")
+        if kind == "length" and self.begun == 1:
+            self.begun = 2
+
+    def set_g5x_offset(self, index: int, *values: float) -> None:
+        self.offsets("g5x", f"{index} ", values)
+
+    def set_g92_offset(self, *values: float) -> None:
+        self.offsets("g92", "", values)
+
+    def tool_offset(self, *values: float) -> None:
+        self.offsets("length", "", values)
+
+    def set_xy_rotation(self, angle: float) -> None:
+        self.shifted("rotation", (angle,))
+        self.tell("rotation", angle)
+
+    def set_plane(self, plane: int) -> None:
+        self.plane = plane
+        self.tell("plane", {1: 17, 2: 19, 3: 18}[plane])
+
+    def set_feed_rate(self, feed: float) -> None:
+        # the module divides by 25.4 in G21 and does not in G20; a feed of rotary axes alone is no length
+        self.feed = feed * MM
+        self.tell("feedrate", feed * MM, feed * (MM if self.metric else 1.0))
+
+    def dwell(self, seconds: float) -> None:
+        self.tell("dwell", seconds)
+
+    def change_tool(self, number: int) -> None:
+        self.spindle = number
+        self.tell("change", number)
+
+    def user_defined_function(self, number: int, p: float, q: float) -> None:
+        self.tell("user", 100 + number, p, q)
+
+    def comment(self, text: str) -> None:
+        if text == "begin" and not self.begun:
+            self.begun = 1
+        else:
+            self.text("comment", text)
+
+    def message(self, text: str) -> None:
+        self.text("message", text)
+
+    def set_traverse_rate(self, rate: float) -> None:
+        """Not used by the programs' words."""
+
+    # --- what the module asks ---
+    def check_abort(self) -> bool:
+        return self.hooks.failure is not None
+
+    def get_tool(self, index: int) -> tuple[float, ...]:
+        """Of the tool at this place of the table: number, offsets (X to W), diameter, angles, orientation [mm]."""
+        index = index or self.spindle  # place 0 is the spindle
+        number, length, diameter = self.tools[index - 1] if 0 < index <= len(self.tools) else (0, 0.0, 0.0)
+        return (number, 0.0, 0.0, length, *(0.0,) * 6, diameter, 0.0, 0.0, 0)
+
+    def get_external_angular_units(self) -> float:
+        return 1.0
+
+    def get_external_length_units(self) -> float:
+        return 1.0  # of the machine per mm
+
+    def get_axis_mask(self) -> int:
+        return 0x1FF
+
+    def get_block_delete(self) -> bool:
+        return self.delete
+
+
+def main() -> None:
+    """Run the job of the first argument."""
+    job = json.loads(sys.argv[1])
+    resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
+    with os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1 << 16) as out:
+        os.dup2(2, 1)  # (PRINT, ...) of a program goes to standard output
+        os.environ["HOME"] = job["home"]
+        if job["ini"]:
+            os.environ["INI_FILE_NAME"] = job["ini"]
+        import gcode  # type: ignore[import-not-found,unused-ignore]
+
+        # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
+        tools = ctypes.CDLL("libtooldata.so.0")
+        tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
+        tools._Z13tooldata_initb(B(False))
+        tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
+        canon = Canon(job, out.write)
+        canon.connect("gcode.cpython")
+        ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
+        result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
+        if canon.hooks.failure is not None:
+            raise canon.hooks.failure
+        if result > gcode.MIN_ERROR:
+            canon.text("error", gcode.strerror(result))
+        else:
+            canon.library._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+            out.write("done 0\n")
+
+
+if __name__ == "__main__":
+    main()
