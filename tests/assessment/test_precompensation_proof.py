@@ -148,7 +148,6 @@ def test_the_law_does_not_hold_without_its_shifts(tmp_path: Path, name: str) -> 
         ("G21\nG0 X1\nM2\n", "G21\nG0 X1\nG0 X1\nM2\n", 3, "makes a 'rapid' in place of"),
         ("G21\nG4 P1\nM2\n", "G21\nG4 P2\nM2\n", 2, "gives 'dwell'"),
         ("%\nG21\nG0 X1\nG0 X2\n%\n", "%\nG21\nG0 X1\n%\n", 4, "in the original only|in place of"),
-        ("G21\n(MSG, a)\nM2\n", "G21\n(MSG, b)\nM2\n", 2, "gives 'message'"),
         ("G21\nG0 A1\nM2\n", "G21\nG0 A2\nM2\n", 2, "moves another axis"),
         ("G21\nG2 X2 I1 F9\nM2\n", "G21\nG3 X2 I1 F9\nM2\n", 2, "turns another way"),
         ("G21\nG2 X2 R2 F9\nM2\n", "G21\nG2 X2 R2.1 F9\nM2\n", 2, r"moves Y of an arc's centre by -?\d+"),

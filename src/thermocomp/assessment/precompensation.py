@@ -85,6 +85,7 @@ def stored(setup: Setup) -> rs274.Stored:
         origins={system: origin for system, origin in setup.offsets.items() if system <= 9},
         lengths=setup.tools,
         home28=setup.home,
+        startup="G64 G99",  # as the follower takes it, where a program does not say
     )
 
 

@@ -183,16 +183,19 @@ class Comparison(NamedTuple):
     where: str  #: the line of the largest difference, or of the first other difference; empty if there is none
 
 
-def compare(blocks: Iterable[Block], ran: Ran) -> Comparison:  # noqa: PLR0912
+def compare(blocks: Iterable[Block], ran: Ran) -> Comparison:  # noqa: PLR0911, PLR0912
     """Compare every move, arc, dwell and tool change with the interpreter's, line by line."""
     told: dict[int, list[tuple[str, tuple[float, ...]]]] = {}
     for line, kind, values in ran.out:
         told.setdefault(line, []).append((kind, values))
     count, apart, where = 0, 0.0, ""
     at: tuple[float, ...] = (0.0, 0.0, 0.0)
-    beside = arced = False
+    beside = arced = lengthened = False
     unsure: set[str] = set()  # axes that the module has lost
     for block in blocks:
+        lengthened = (lengthened or any(c.startswith("G43") for c in block.codes)) and "G49" not in block.codes
+        if lengthened and {"G20", "G21"} & set(block.codes):
+            return Comparison(count, apart, where)  # from here on the module has the length in the old unit
         events = told.pop(block.line.number, [])
         dwell = sum(v[0] for k, v in events if k == "dwell")
         tools = [v[0] for k, v in events if k == "tool"]

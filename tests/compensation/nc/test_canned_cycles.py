@@ -6,6 +6,7 @@ from thermocomp.compensation.nc.following.block import Block, Setup
 from thermocomp.compensation.nc.following.cycles import Cycle, CycleError
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.tokens import read_lines, split_lines
+from thermocomp.core.exceptions import ProgramError
 
 
 def run(text: str, setup: Setup | None = None) -> list[Block]:
@@ -24,11 +25,15 @@ def ways(block: Block) -> list[tuple[str, float, float, float]]:
 
 
 def test_drilling_goes_back_to_where_it_came_from_or_to_r() -> None:
-    blocks = run("F100 G0 Z5 G98\nG81 X1 Z-1 R2\nG99 X2\nG98 X3\n")
+    blocks = run("F100 G0 Z5 G98\nG81 X1 Z-1 R2\nG99 X2\n")
     assert ways(blocks[1]) == [("rapid", 1, 0, 5), ("rapid", 1, 0, 2), ("feed", 1, 0, -1), ("rapid", 1, 0, 5)]
     assert ways(blocks[2]) == [("rapid", 2, 0, 5), ("rapid", 2, 0, 2), ("feed", 2, 0, -1), ("rapid", 2, 0, 2)]
-    # seen in LinuxCNC 2.9: from R it goes to the next hole and to the first level at once
-    assert ways(blocks[3]) == [("rapid", 3, 0, 5), ("rapid", 3, 0, 2), ("feed", 3, 0, -1), ("rapid", 3, 0, 5)]
+
+
+def test_back_to_the_first_level_after_r_is_refused() -> None:
+    """LinuxCNC 2.9 goes from R to the next hole and to the first level at once, or not, as numbers are rounded."""
+    with pytest.raises(ProgramError, match="G98 after a hole that ended at R"):
+        run("F100 G0 Z5 G98\nG81 X1 Z-1 R2\nG99 X2\nG98 X3\n")
 
 
 def test_the_tool_goes_up_to_r_first() -> None:

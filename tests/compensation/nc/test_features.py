@@ -116,3 +116,16 @@ def test_every_axis_in_work_coordinates_has_the_whole_correction(feature: Featur
                 carries = 0.0 if re.search("G53|G28|G30", text) else -STEADY[i]
             if moves:
                 assert moves[-1] == pytest.approx(carries, abs=0.1), (text, letter)
+
+
+def test_where_a_cycle_ends_unsaid_no_word_is_added_behind_it(tmp_path: Path) -> None:
+    """Without G98 or G99 the controller decides: a Z that is added could take the tool down to R."""
+    text = "G81 X10 Y10 Z-5 R2\nX20\nG80\nG1 X50\nX60\nG0 Z10\n"
+    path = program(tmp_path, Feature("", text))
+    trial = revise(path, tmp_path, Growing(rate=(0.0, 0.0, 2.0)), "coordinates")
+    trial.proved()
+    assert not any("Z" in row.texts[0] for row in trial.rows if row.text.startswith(("G1 X50", "X60")))
+    path = program(tmp_path, Feature("", f"G99 {text}"))
+    trial = revise(path, tmp_path, Growing(rate=(0.0, 0.0, 2.0)), "coordinates")
+    trial.proved()
+    assert all("Z" in row.texts[0] for row in trial.rows if row.text.startswith(("G1 X50", "X60")))

@@ -40,6 +40,8 @@ class Modal:
     rotation : float
         Rotation of the work coordinate system about Z [deg].
     retract : {98, 99}
+    retract_stated : bool
+        The program has said which; else it is what the controller happens to stand at.
     blend : float or None
         G64 P: how far the path may leave the corners [mm]; 0 without P, None in G61 and G61.1 (exact).
     """
@@ -55,6 +57,7 @@ class Modal:
     system: int = 1
     rotation: float = 0.0
     retract: int = 98
+    retract_stated: bool = False
     blend: float | None = 0.0
 
 

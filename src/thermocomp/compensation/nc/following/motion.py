@@ -10,6 +10,9 @@ from thermocomp.compensation.nc.following.state import State
 #: LinuxCNC refuses these under cutter compensation, which this follower does not compute
 _NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come before"
 
+#: levels nearer than that are the same [mm]
+_SAME_LEVEL = 1e-4
+
 
 def straight(state: State, orders: Orders, block: Block) -> None:
     """G0 and G1."""
@@ -227,6 +230,8 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         state.level, state.level_known, state.level_frame = start[across], state.known[across], frame
     elif state.level_frame != frame:
         raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
+    elif modal.absolute and modal.retract == 98 and not state.fanuc:
+        _refuse_from_r(start[across], state.level, state.sticky["R"] * scale, orders)
     repeats = orders.whole("K" if state.fanuc and "K" in values else "L", least=1) or 1
     x, y, z = (v / scale for v in start)
     run = Cycle(
@@ -243,10 +248,7 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     )
     block.kind = "cycle"
     block.sticky = state.sticky
-    if state.fanuc and code in ("G74", "G84") and not state.turning:
-        if state.spindle is None:
-            raise orders.error(f"{code}, and no spindle speed was stated; write S before")
-        block.speed = state.spindle if code == "G84" else -state.spindle
+    _turn_for_a_tap(state, orders, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
     at = state.machine
     try:
@@ -263,7 +265,25 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     # back at R, or at the level where the cycle began
     at_r = modal.absolute and (modal.retract == 99 or state.sticky["R"] > state.level / scale)
     state.place, state.machine = start, at
-    state.known = mark(known, {across: 0.0}, to=at_r or state.level_known)
+    certain = modal.retract_stated or not modal.absolute or state.sticky["R"] >= state.level / scale
+    state.known = mark(known, {across: 0.0}, to=certain and (at_r or state.level_known))
+
+
+def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:
+    """On a Fanuc the tapping cycles start the spindle themselves."""
+    code = state.modal.motion
+    if state.fanuc and code in ("G74", "G84") and not state.turning:
+        if state.spindle is None:
+            raise orders.error(f"{code}, and no spindle speed was stated; write S before")
+        block.speed = state.spindle if code == "G84" else -state.spindle
+
+
+def _refuse_from_r(start: float, level: float, plane: float, orders: Orders) -> None:
+    if abs(start - plane) < _SAME_LEVEL < abs(level - plane):
+        raise orders.error(
+            "G98 after a hole that ended at R (G99): whether LinuxCNC goes up before the next hole depends on "
+            "rounding; write G80 between them"
+        )
 
 
 def _may_drill(state: State, orders: Orders) -> None:

@@ -172,5 +172,5 @@ def _modal_codes(state: State, orders: Orders) -> None:
     if "arc distance" in groups:
         fields["arc_absolute"] = groups["arc distance"] == "G90.1"
     if "retract" in groups:
-        fields["retract"] = int(groups["retract"][1:])
+        fields |= {"retract": int(groups["retract"][1:]), "retract_stated": True}
     state.changed(**fields)

@@ -153,8 +153,11 @@ class Coordinates(Method):
             self._series = block.start[axis], self.carried[axis]
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
-        if not self.fixed[axis] and any(abs(z - plane) < SAME_PLANE for z in (block.start[axis], level)):
-            goal = frame.words(self.carried)[axis]  # which of them is the higher one must not change
+        near = any(abs(z - plane) < SAME_PLANE for z in (block.start[axis], level))
+        unsaid = not block.modal.retract_stated
+        if not self.fixed[axis] and (near or unsaid):
+            # which level is the higher one must not change, nor what the axis carries at either
+            goal = frame.words(self.carried)[axis]
         if goal != self._cycle or all(word in block.words for word in words):
             added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal
@@ -165,7 +168,7 @@ class Coordinates(Method):
         back = list(self.carried)
         if abs(block.end[axis] - plane) < SAME_PLANE:
             back[axis] = self.inner[axis]
-            self.fixed[axis] = self.doubtful[axis] = False
+            self.fixed[axis], self.doubtful[axis] = False, unsaid and carried != self.inner[axis]
         else:
             back[axis] = carried
         self.carried = (back[0], back[1], back[2])

@@ -117,6 +117,10 @@ class Offset(Method):
             if kind == "cycle":
                 drill = plane[2]
                 self.inner = self._shift
+                if not block.modal.retract_stated and self.carried[drill] != self._shift[drill]:
+                    raise ProgramError(
+                        block.line.number, "where the cycle ends is not said: write G98 or G99 at its beginning"
+                    )
                 after[drill] = self._drilled(block, frame, drill)
         self.carried = (after[0], after[1], after[2])
 
