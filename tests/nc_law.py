@@ -67,10 +67,10 @@ class Still(Steady):
         return 0.0, 0.0, 0.0
 
 
-def method(name: str) -> Method:
+def method(name: str, step: float = 1.0) -> Method:
     """Return a way of revising by its name."""
     digits = DIGITS["linuxcnc"]
-    return Coordinates(digits, 1.0) if name == "coordinates" else Offset(digits, 1.0, safe_z=5.0)
+    return Coordinates(digits, step) if name == "coordinates" else Offset(digits, step, safe_z=5.0)
 
 
 @dataclass
@@ -110,10 +110,17 @@ class Trial:
 
 
 def revise(
-    original: Path, folder: Path, drift: Steady, way: str, *, every: float | None = None, setup: Setup = STATED
+    original: Path,
+    folder: Path,
+    drift: Steady,
+    way: str,
+    *,
+    every: float | None = None,
+    setup: Setup = STATED,
+    step: float = 1.0,
 ) -> Trial:
     """Revise a program; `ProgramError` if it is refused."""
-    run = Revision(setup, Kinematics(), drift, method(way), Demand(1.0, every))
+    run = Revision(setup, Kinematics(), drift, method(way, step), Demand(1.0, every))
     ledger, rows = Ledger(), []
     with original.open(encoding="latin-1", newline="") as file:
         for row in run.revise(file):

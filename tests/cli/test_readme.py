@@ -1,6 +1,7 @@
 """The README shows what the commands really print."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,21 @@ def test_the_real_machine_prints_what_the_readme_shows(
     recording = str(shared_data / "fl_thermal" / "recording.csv")
     assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic"]) == 1
     assert_printed(blocks()[2], capsys.readouterr().out)
+
+
+@pytest.mark.usefixtures("interpreter")
+def test_the_revision_prints_what_the_readme_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = README.read_text("utf-8")
+    commands = re.findall(r"^    thermocomp ((?:simulate precomp|fit test-1|revise).*?)(?: +#.*)?$", shown, re.MULTILINE)
+    assert len(commands) == 3
+    Path("plate.ngc").write_bytes((README.parent / "docs" / "files" / "plate.ngc").read_bytes())
+    for command in commands:
+        assert run(shlex.split(command)) == 0
+    assert_printed(blocks()[5], capsys.readouterr().out)
 
 
 def test_the_study_prints_what_the_readme_shows(

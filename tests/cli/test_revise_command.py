@@ -37,7 +37,7 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     assert all(line.startswith(f"({MARK} ") and line.endswith(")") and len(line) <= 80 for line in header)
     assert "DO NOT REVISE AGAIN" in header[0]
     assert "2026-01-31, for linuxcnc" in header[1]
-    assert any("model Z z_um model.json" in line for line in header)
+    assert any("model model.json " in line and line.endswith(" for Z)") for line in header)
     assert any("start cold, drift counts from the start of the program" in line for line in header)
     assert any("bound Z" in line and " um" in line for line in header)
 

@@ -1,5 +1,6 @@
 """``thermocomp revise``: an NC program is corrected by the drift it will cause, before it is run."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -8,6 +9,7 @@ from thermocomp.cli import reviserun, revisetables
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, Output, refuse_existing
 from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
+from thermocomp.compensation.nc.drifting.stations import Station
 from thermocomp.compensation.nc.revising.revise import Revision
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
@@ -78,13 +80,12 @@ def revise(
     paths = reviserun.Paths.of(output, expanded=way.expand)
     given = (timing.machine, starting.carried, drifting.forecast)
     refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
-    hashes = drifting.hashes()
     job = reviserun.Job(
         program,
         paths,
         revision,
         drift,
-        [f"{s} {s.model.target} {hashes[s.model.target]}" for s in found],
+        _files(found, drifting.hashes()),
         f"{starting.words()}, drift counts {starting.counted()}",
         f"method {way.words()}",
         reviserun.moment(date),
@@ -100,6 +101,17 @@ def revise(
     else:
         revisetables.show(job, done, notes, _console)
     return 0
+
+
+def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
+    """Return which files the models come from, each with what it is for."""
+    found = []
+    for name in dict.fromkeys(hashes[s.model.target] for s in stations):
+        mine = [s for s in stations if hashes[s.model.target] == name]
+        places = {a: [s.along for s in mine if s.axis == a] for a in dict.fromkeys(s.axis for s in mine)}
+        said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
+        found.append(f"{name} for {', '.join(said)}")
+    return found
 
 
 def _check_interpreter(way: Way, controller: Controller) -> None:

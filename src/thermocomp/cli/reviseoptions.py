@@ -180,7 +180,7 @@ class Way:
         Renew it as soon as the drift has moved by that much; with --every only along the way, where the drift depends
         on the place.
     step : str
-        In a cut it changes by that much at most, per block and per 10 mm.
+        In a cut it changes by that much at most per 10 mm of way, spread over the block.
     largest : str
         A correction beyond that is refused: it is no thermal drift any more.
     safe_z : str

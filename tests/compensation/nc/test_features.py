@@ -4,7 +4,9 @@ Adding the drift to every Z of the text is wrong for most of these; each is eith
 moves are the original's plus the correction, or refused with its line.
 """
 
+import math
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -129,3 +131,33 @@ def test_where_a_cycle_ends_unsaid_no_word_is_added_behind_it(tmp_path: Path) ->
     trial = revise(path, tmp_path, Growing(rate=(0.0, 0.0, 2.0)), "coordinates")
     trial.proved()
     assert all("Z" in row.texts[0] for row in trial.rows if row.text.startswith(("G1 X50", "X60")))
+
+
+def cut(folder: Path, moves: str, step: float = 1.0) -> list[tuple[float, float]]:
+    """Return way [mm] and change of the correction of Z [um] of each block of a cut, the drift growing fast."""
+    path = program(folder, Feature("", f"G1 Z-1\n{moves}G0 Z10\n"))
+    trial = revise(path, folder, Growing(rate=(0.0, 0.0, 1.0), slope=0.0), "coordinates", step=step)
+    trial.proved()
+    cuts = [row for row in trial.rows if row.block and row.block.moves and not row.block.moves[-1].rapid]
+    return [
+        (math.dist(b.block.moves[-1].start, b.block.moves[-1].end), b.carried[2] - a.carried[2])
+        for a, b in pairwise(cuts)
+        if b.block
+    ]
+
+
+def test_a_finished_surface_gets_no_mark(tmp_path: Path) -> None:
+    """In a cut the correction changes by a step per 10 mm of way at most, spread over its block."""
+    short = "".join(f"X{k / 2}\n" for k in range(1, 200))
+    for moves in (short, "X100\nX0\nX100\n", "X9.5\nX19\nX0\nY4\nX80\n"):
+        for step in (0.5, 1.0, 3.0):
+            gone = 0.0
+            last = math.inf
+            for way, change in cut(tmp_path, moves, step):
+                assert abs(change) <= step * max(1.0, way / 10) + 1e-6
+                if change:
+                    assert last >= 10 - 1e-6 or abs(change) <= step * way / 10 + 1e-6
+                    last = 0.0
+                last += way
+                gone += change
+            assert gone < -3 * step  # it does follow

@@ -220,19 +220,24 @@ class Coordinates(Method):
         return block.kind == "line" and modal.motion in PLAIN and bool(self.named(block))
 
     def _limited(self, block: Block, demand: Vector) -> Vector:
-        """Return the demand, or what a cut may take of it: a step, if the last one is far enough behind."""
+        """Return the demand, or what a cut may take of it.
+
+        A change is spread over its block: a step per 10 mm of it is no mark. A short block takes a step if the last
+        one is far enough behind.
+        """
         if not block.moves or block.moves[-1].rapid:
             return demand
+        last = block.moves[-1]
+        spread = math.dist(last.start, last.end) / SPREAD
         out = []
         for i in range(3):
             gap = demand[i] - self.carried[i]
             comes_down = not self._cutting and abs(block.end[i] - block.start[i]) > SAME_PLANE
             if self.fixed[i] or comes_down or not (self._known[i] or self._cutting):
                 out.append(demand[i])
-            elif self._way[i] >= SPREAD:
-                out.append(self.carried[i] + math.copysign(min(abs(gap), self.step), gap))
             else:
-                out.append(self.carried[i])
+                most = self.step * (max(spread, 1.0) if self._way[i] >= SPREAD else math.floor(spread))
+                out.append(self.carried[i] + math.copysign(min(abs(gap), most), gap))
         return out[0], out[1], out[2]
 
     def _take(self, frame: Frame, old: Vector, new: list[float]) -> None:

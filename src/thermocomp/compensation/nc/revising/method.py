@@ -33,7 +33,7 @@ class Method(ABC):
     ----------
     digits : Digits
     step : float
-        In a cut the correction changes by that at most, per block and per 10 mm of way [um].
+        In a cut the correction changes by that at most, per 10 mm of way [um].
     """
 
     digits: Digits
