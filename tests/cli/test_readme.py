@@ -52,7 +52,8 @@ def test_the_revision_prints_what_the_readme_shows(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     shown = README.read_text("utf-8")
-    commands = re.findall(r"^    thermocomp ((?:simulate precomp|fit test-1|revise).*?)(?: +#.*)?$", shown, re.MULTILINE)
+    wanted = r"^    thermocomp ((?:simulate precomp|fit test-1|revise).*?)(?: +#.*)?$"
+    commands = re.findall(wanted, shown, re.MULTILINE)
     assert len(commands) == 3
     Path("plate.ngc").write_bytes((README.parent / "docs" / "files" / "plate.ngc").read_bytes())
     for command in commands:
