@@ -25,6 +25,8 @@ STEADY: Vector = (12.3, -7.7, 25.0)
 class Steady:
     """The drift is there at once and stays."""
 
+    by_position = False  # the programs say no origins
+
     def advance(self, dt: float, speed: float) -> None:
         """Let time pass."""
 

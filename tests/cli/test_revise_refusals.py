@@ -97,7 +97,6 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is no thermal drift"),
         (judged(lags("z_um")), ["--every", "10"], "write a value with its unit, such as"),
         (judged(lags("z_um")), ["--speed", "6 mm"], "--speed '6 mm': unit 'mm' measures"),
-        (judged(lags("z_um")), ["--safe-z", "5 mm"], "--safe-z is for --method offset"),
         (judged(lags("z_um")), ["--date", "today"], "write year-month-day"),
         (
             judged(lags("z_um")),

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.shopfloor.expand import expand
 from thermocomp.shopfloor.proof import compare, kept
-from thermocomp.shopfloor.rs274 import read
+from thermocomp.shopfloor.rs274 import HIGHEST_TOOL, Stored, read
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 
 NCFILES = Path("/usr/share/linuxcnc/ncfiles")
+ZERO = dict.fromkeys(range(1, HIGHEST_TOOL), 0.0)
 Plain = Callable[..., list[str]]
 
 
@@ -142,6 +143,10 @@ def test_plain_lines(plain: Plain, text: str, lines: list[str]) -> None:
         ("G21\nG38.2 Z-500 F10\nM2\n", 2, "it probes|refuses it"),
         ("G21\nM66 P0 L0\nM2\n", 2, "waits for an input"),
         ("G21\nM19 R5 Q1\nM2\n", 2, "orients the spindle"),
+        ("G21\nG0 X1\nm 19 (orient)\nM2\n", 3, "orients the spindle"),
+        ("G21\no<turn> sub\nM19\no<turn> endsub\no<turn> call\nM2\n", 3, "orients the spindle"),
+        ("G21\nG0 X[#5400/10]\nM2\n", 2, "where X.* goes depends"),
+        ("G21\nT1\nG43\n#1=#5400\nM6\nG43 H#1\nG0 Z5\nM2\n", 7, "plain lines would do"),
         ("G21\nM101\nM2\n", 2, "M101 is a code of the user's own"),
         ("G21\nG10 L1 P1 Z5\nM2\n", 2, "writes the tool table"),
         ("G21\n#1=5\nG10 L2 P3 X#1\nM2\n", 3, "more than plain numbers"),
@@ -173,6 +178,8 @@ def test_what_the_program_does_not_say_can_be_told(plain: Plain) -> None:
     ]  # fmt: skip
     corner = "G21\nG0 X0 Y0\nT1 M6\nG41\nG1 X10 F100\nX20\nY20\nG40 X30\nM2\n"
     assert "G1 X18 Y2" in plain(corner, diameters={1: 4.0})
+    with pytest.raises(ProgramError, match="line 5: it cannot be expanded"):
+        plain(corner, diameters={2: 4.0})
     assert plain("G21\n/G0 X1\nG0 X2\nM2\n", block_delete=True) == [START, "G21", "G0 X2", "M2"]
 
 
@@ -188,6 +195,39 @@ def test_subprograms_in_folders_and_the_lines_they_come_from(tmp_path: Path) -> 
         "G0 X2 Y1 Z1": 4, "M2": 5,
     }  # fmt: skip
     assert expansion.acts == 5
+
+
+def test_the_tool_that_is_in_the_spindle_already(plain: Plain) -> None:
+    """Its length is that of no tool the program names, and not none (G49): Z would go down by the whole tool."""
+    moves = "G43\nG0 X0 Y0 Z5\nG1 Z-1 F100\n"
+    found = plain(f"G21\n{moves}T2 M6\nG43\nG0 Z5\nG49\nT0 M6\nG43\nG0 Z6\nM2\n")
+    assert found[2:4] == ["G43", "G0 X0 Y0 Z5"]
+    assert [line for line in found if line.startswith("G4")] == ["G43", "G43 H2", "G49", "G49"]
+    text = "G21 G90 G17 G54 G43\nS6000 M3\no1 repeat [2]\nG0 X0 Y0 Z5\nG1 Z-1 F100\nG0 Z5\no1 endrepeat\nM2\n"
+    assert "G49" not in plain(text)
+    with pytest.raises(ProgramError, match="stored"):
+        plain("G21\nG0 X0 Y0\nG41\nG1 X10 F100\nX20\nM2\n")  # its diameter
+
+
+def test_the_proof_sees_a_tool_length_that_was_dropped(tmp_path: Path) -> None:
+    one, two = tmp_path / "one.ngc", tmp_path / "two.ngc"
+    one.write_text("G21 G43\nG0 X0 Y0 Z5\nM2\n", encoding="ascii")
+    two.write_text("G21 G49\nG0 X0 Y0 Z5\nM2\n", encoding="ascii")
+    stored = Stored(lengths={7: 80.0}, spindle=7)
+    with pytest.raises(ProgramError, match="the plain lines would do"):
+        compare(read(one, stored), read(two, stored))
+
+
+def test_orienting_in_a_subprogram_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "turn.ngc").write_text("o<turn> sub\n\nM19\no<turn> endsub\nM2\n", encoding="ascii")
+    (tmp_path / "p.ngc").write_text("G21\no<turn> call\nM2\n", encoding="ascii")
+    with pytest.raises(ProgramError, match=r"M19.*line 3 of turn\.ngc"):
+        expand(tmp_path / "p.ngc", tmp_path / "out.ngc")
+
+
+def test_m19_in_remarks_and_in_lines_left_out_is_none(plain: Plain) -> None:
+    text = "G21\n(M19)\n#<m19>=5 ; M19\n/M19\nG0 X1\nM2\n"
+    assert plain(text, block_delete=True)[-2:] == ["G0 X1", "M2"]
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
@@ -254,7 +294,7 @@ def test_the_proof_looks_at_what_is_left_in_the_controller() -> None:
 def test_programs_of_linuxcnc(tmp_path: Path, name: str, acts: int) -> None:
     if not (NCFILES / name).is_file():
         pytest.skip(f"{NCFILES / name} is not here: it comes with the Debian package linuxcnc-uspace")
-    expansion = expand(NCFILES / name, tmp_path / name, inch=False, startup="G64 G98", diameters={})
+    expansion = expand(NCFILES / name, tmp_path / name, inch=False, startup="G64 G98", diameters=ZERO)
     assert expansion.acts >= acts
     code = re.sub(r"\([^)]*\)", "", expansion.path.read_text(encoding="ascii"))
     assert not re.search(r"#|\[|\bO|N\d|G91(?!\.1)|G8[1-9]|G7[36]|G4[12]|G93", code)

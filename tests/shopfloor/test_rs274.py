@@ -243,3 +243,19 @@ def test_frame_there_and_back(origin: Any, shift: Any, length: Any, point: Any, 
         frame.take(kind, values)
     assert frame.system == 2
     assert frame.program(frame.machine(point)) == pytest.approx(point, abs=1e-9)
+
+
+def test_a_tool_the_program_stores_is_what_m6_and_g43_take(tmp_path: Path) -> None:
+    path = tmp_path / "p.ngc"
+    path.write_text("G21 G49\nT1 M6\nG10 L1 P5 Z10\nG10 L1 P1 Z20\nG43\nT5 M6\nG43\nM2\n", encoding="ascii")
+    calls = read(path, Stored(lengths=dict.fromkeys(range(1, 9), 100.0)))
+    assert [c.values[2] for c in calls if c.kind == "length" and c.line > 1] == [20.0, 10.0]
+
+
+@pytest.mark.parametrize("head", ["", "G21\n", "G21\n\nG1 X1 F5\n", "%\n"])
+def test_what_cannot_be_read_is_told_with_its_line(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "p.ngc"
+    path.write_text(f"{head}G0 X\nG0 X5\nM2\n", encoding="ascii")
+    with pytest.raises(ProgramError, match="No characters found") as caught:
+        list(read(path))
+    assert caught.value.line == head.count("\n") + 1

@@ -9,6 +9,7 @@ from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
+from thermocomp.compensation.nc.following import startup
 from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.revise import Revised
@@ -85,7 +86,7 @@ def stored(setup: Setup) -> rs274.Stored:
         origins={system: origin for system, origin in setup.offsets.items() if system <= 9},
         lengths=setup.tools,
         home28=setup.home,
-        startup="G64 G99",  # as the follower takes it, where a program does not say
+        startup=startup.whole(setup),
     )
 
 

@@ -74,7 +74,7 @@ def revise(
     drift = starting.drift(found, others)
     setup = controller.setup()
     kinematics, guesses = timing.kinematics()
-    method = way.made(setup.controller, drift.axes)
+    method = way.made(setup.controller, drift.driven)
     revision = Revision(setup, kinematics, drift, method, way.demand())
     _check_interpreter(way, controller)
     paths = reviserun.Paths.of(output, expanded=way.expand)
@@ -90,6 +90,8 @@ def revise(
         f"method {way.words()}",
         reviserun.moment(date),
         way.interpreter,
+        controller.diameters(expand=way.expand),
+        way.folders(),
     )
     try:
         done = reviserun.revise(job, hidden=json)

@@ -1,6 +1,5 @@
 """What ``thermocomp revise`` can be told, and the objects that come of it."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -10,28 +9,28 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from thermocomp.cli.options import Flag, OptionalNames
+from thermocomp.cli.revisevalues import origin_of, point_of, positive, startup_of, tool_of, value
 from thermocomp.compensation.nc.drifting import start
 from thermocomp.compensation.nc.drifting.drift import Drift
 from thermocomp.compensation.nc.drifting.inputs import SPEED, Signal, constants
 from thermocomp.compensation.nc.drifting.start import Start
 from thermocomp.compensation.nc.drifting.stations import Station, stations
-from thermocomp.compensation.nc.following.block import Point, Setup
+from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.revising.coordinates import Coordinates
 from thermocomp.compensation.nc.revising.demand import Demand
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import Offset
 from thermocomp.compensation.nc.revising.text import DIGITS
 from thermocomp.compensation.nc.timing.timeline import Kinematics
-from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.core.units import measured as with_unit
+from thermocomp.core.exceptions import InputError
 from thermocomp.files import forecast as forecasts
 from thermocomp.files import jobstate, modelfile
 from thermocomp.files.machines import read_machine
 
 Zero = Literal["start", "cold", "last"]
 Models = Annotated[list[Path], Parameter(consume_multiple=True, negative=())]
+OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
 
-_SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 _COUNTED: dict[Zero, str] = {
     "start": "from the start of the program",
     "cold": "from the cold machine",
@@ -184,10 +183,12 @@ class Way:
     largest : str
         A correction beyond that is refused: it is no thermal drift any more.
     safe_z : str
-        For --method offset: the tool is up at and above this Z of the work coordinates. If not given, at tool changes,
-        and where Z was moved in machine coordinates.
+        At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
+        after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
     expand : bool
         Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
+    subroutines : list of Path
+        With --expand: folders of subprograms; the program's own comes first anyway.
     interpreter : str
         Prove the result by LinuxCNC's interpreter: auto, where it is installed; off; required.
     """
@@ -199,6 +200,7 @@ class Way:
     largest: str = "400 um"
     safe_z: str | None = None
     expand: Flag = False
+    subroutines: OptionalPaths = None
     interpreter: Literal["auto", "off", "required"] = "auto"
 
     def demand(self) -> Demand:
@@ -210,13 +212,22 @@ class Way:
     def made(self, controller: Literal["linuxcnc", "fanuc"], axes: Sequence[str]) -> Method:
         """Return the method."""
         digits, step = DIGITS[controller], positive(self.step, "displacement", "--step", "1 um")
-        if self.method == "coordinates":
-            if self.safe_z is not None:
-                raise InputError("--safe-z is for --method offset: the coordinates are changed anywhere")
-            return Coordinates(digits, step)
         safe = None if self.safe_z is None else value(self.safe_z, "position", "--safe-z", "5 mm")
+        if self.method == "coordinates":
+            # a helix is an option of older Fanucs
+            return Coordinates(digits, step, safe_z=safe, helix=controller == "linuxcnc")
         x, y, z = (name in axes for name in "XYZ")
         return Offset(digits, step, safe_z=safe, axes=(x, y, z))
+
+    def folders(self) -> list[Path]:
+        """Return the folders of subprograms."""
+        folders = self.subroutines or []
+        if folders and not self.expand:
+            raise InputError("--subroutines is for --expand: without it subprograms are refused")
+        for folder in folders:
+            if not folder.is_dir():
+                raise InputError(f"--subroutines {folder}: no such folder")
+        return folders
 
     def words(self) -> str:
         """Return the method in words."""
@@ -235,12 +246,17 @@ class Controller:
         Whose habits the program has; the ISO programs of most machining centres are like Fanuc's.
     units : str
         Unit when the program starts; without it the program has to say G20 or G21.
+    startup : str
+        Codes in force when the program starts, such as "G64 P0.01 G98" (mm). Without it G64 (no tolerance) is taken,
+        and G99 for linuxcnc, G98 for fanuc; what --expand needs to know of them the program has to say itself.
     speed : str
         Spindle speed when the program starts, such as "6000 1/min"; without it the program has to say S and M3.
     origin : list of str
         Where work coordinates begin, such as "G54=100 mm, 50 mm, 0 mm": it counts where the drift depends on the place.
     tool : list of str
         Lengths of tools, such as "1=120 mm".
+    diameter : list of str
+        With --expand: diameters of tools, such as "1=10 mm", for which G41 and G42 are worked out.
     home : str
         Where G28 goes, such as "0 mm, 0 mm, 400 mm".
     integers : str
@@ -254,9 +270,11 @@ class Controller:
 
     controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
     units: Literal["mm", "inch"] | None = None
+    startup: str | None = None
     speed: str | None = None
     origin: OptionalNames = None
     tool: OptionalNames = None
+    diameter: OptionalNames = None
     home: str | None = None
     integers: Literal["whole", "least", "refuse"] | None = None
     least: str = "1 um"
@@ -267,14 +285,23 @@ class Controller:
         return Setup(
             controller=self.controller,
             inch=None if self.units is None else self.units == "inch",
+            startup="" if self.startup is None else startup_of(self.startup, self.controller),
             speed=0.0 if self.speed is None else positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
-            offsets=dict(_origin(text) for text in self.origin or ()),
-            tools=dict(_tool(text) for text in self.tool or ()),
-            home=(0.0, 0.0, 0.0) if self.home is None else _point(self.home, f"--home {self.home!r}"),
+            offsets=dict(origin_of(text) for text in self.origin or ()),
+            tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
+            home=(0.0, 0.0, 0.0) if self.home is None else point_of(self.home, f"--home {self.home!r}"),
             integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
             least=positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",
         )
+
+    def diameters(self, *, expand: bool) -> dict[int, float] | None:
+        """Return the diameters of the tools [mm]."""
+        if self.diameter is None:
+            return None
+        if not expand:
+            raise InputError("--diameter is for --expand: without it G41 and G42 stay in the program")
+        return dict(tool_of(text, "--diameter", "10 mm") for text in self.diameter)
 
 
 @Parameter(name="*", group=_group("The time it takes", 5))
@@ -307,58 +334,3 @@ class Timing:
         silent = [a.name for a in machine.axes if a.name in "XYZ" and None in (a.rapid, a.acceleration)]
         notes = [f"{self.machine}: no rapid or acceleration of {', '.join(silent)}: taken as 30 m/min and 3 m/s2"]
         return Kinematics.of(machine, tool_change=change, stop=stop), notes if silent else []
-
-
-def value(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option in house units.
-
-    Raises
-    ------
-    InputError
-        It is no value with a unit of that quantity.
-    """
-    try:
-        number = with_unit(text, quantity)
-    except UnitError as e:
-        raise InputError(f"{option} {text!r}: {e}") from e
-    if number is None:
-        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
-    return number
-
-
-def positive(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option that must be positive; see `value`."""
-    number = value(text, quantity, option, example)
-    if not number > 0:
-        raise InputError(f"{option} {text!r}: must be positive")
-    return number
-
-
-def _origin(text: str) -> tuple[int, Point]:
-    name, _, place = text.partition("=")
-    found = _SYSTEM.fullmatch(name.strip())
-    if found is None or (found[2] and found[3] and found[2] != "1"):
-        raise InputError(f'--origin {text!r}: want a work coordinate system, such as "G54=100 mm, 50 mm, 0 mm"')
-    base, decimal, extra = int(found[1]), found[2], found[3]
-    point = _point(place, f"--origin {text!r}")
-    if extra:  # G54.1 P3
-        return 100 + int(extra), point
-    if decimal and base != 9:
-        raise InputError(f"--origin {text!r}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
-    return (6 + int(decimal) if decimal else base - 3), point
-
-
-def _point(text: str, said: str) -> Point:
-    parts = [part.strip() for part in text.split(",")]
-    if len(parts) != 3:
-        raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
-    x, y, z = (value(part, "position", said, "100 mm") for part in parts)
-    return x, y, z
-
-
-def _tool(text: str) -> tuple[int, float]:
-    name, _, length = (part.strip() for part in text.partition("="))
-    number = name.upper().removeprefix("T")
-    if not number.isdecimal():
-        raise InputError(f'--tool {text!r}: want the number of a tool and its length, such as "1=120 mm"')
-    return int(number), value(length, "position", f"--tool {text!r}", "120 mm")

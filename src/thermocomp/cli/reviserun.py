@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import date, datetime
@@ -70,6 +70,10 @@ class Job:
         For the header: which models, from what state, in what way.
     when : date
     interpreter : {'auto', 'off', 'required'}
+    diameters : dict of int to float, optional
+        Of the tools, for the expansion [mm].
+    subroutines : sequence of Path
+        Folders of subprograms, for the expansion.
     """
 
     program: Path
@@ -81,6 +85,8 @@ class Job:
     method: str
     when: datetime
     interpreter: str
+    diameters: Mapping[int, float] | None = None
+    subroutines: Sequence[Path] = ()
 
 
 class Bound(NamedTuple):
@@ -128,7 +134,15 @@ def revise(job: Job, *, hidden: bool) -> Done:
         if paths.expanded is not None:
             source = drafts[paths.expanded]
             setup = job.revision.setup
-            lines = expand(job.program, source, inch=setup.inch, block_delete=setup.skip_optional).sources
+            lines = expand(
+                job.program,
+                source,
+                inch=setup.inch,
+                startup=setup.startup or None,
+                diameters=job.diameters,
+                block_delete=setup.skip_optional,
+                subroutines=job.subroutines,
+            ).sources
         ledger, course = Ledger(), Course()
         begin = time.perf_counter()
         try:
@@ -237,7 +251,7 @@ def _facts(job: Job, bounds: Sequence[Bound]) -> list[str]:
 
 def _together(facts: list[str], most: int) -> list[str]:
     """Return so many facts at most, the last ones on one line."""
-    return facts if len(facts) <= most else [*facts[: most - 1], "; ".join(facts[most - 1 :])]
+    return facts if len(facts) <= most else [*facts[: most - 1], ", ".join(facts[most - 1 :])]
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share) -> tuple[Proof | None, str]:

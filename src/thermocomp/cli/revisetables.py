@@ -58,6 +58,17 @@ def warnings(job: Job, done: Done) -> list[str]:
         f"{axis} was asked for {far:.1f} mm beyond its outermost station: the value there was held"
         for axis, far in drift.beyond.items()
     ]
+    found += [
+        f"in the cuts the correction could not follow the drift at once because of {why}: {gap:.1f} um at line {line}"
+        for why, (gap, line) in job.revision.held.items()
+    ]
+    if job.revision.idle:
+        found.append(f"{job.revision.idle} lines behind the end of the program are as they were: nobody runs them")
+    if job.revision.method.leaves_mark:
+        found.append(
+            "G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then; and a G92 that is in force when the "
+            "program starts is lost"
+        )
     for b in done.bounds:
         if math.isnan(b.model):
             found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")

@@ -1,5 +1,6 @@
 """The picture of a revised program: how far the tool would drift, and what is left of it."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -83,10 +84,8 @@ def _drift(ax: Axes, axis: str, time: FloatArray, run: Run) -> None:
     ax.axhline(0, color="#aaa", lw=0.8)
     ax.plot(*_within(time, drift), color=MEASURED, lw=1.6, label="drift")
     taken = -carried[:, ::-1]
-    starts = np.concatenate([[0.0], time[:-1]])
-    stretches = np.stack([starts, time], axis=1).ravel()
-    ax.plot(stretches, taken.ravel(), color=TAKEN_OFF, lw=1.0, label="taken off by the program (minus the correction)")
-    ax.plot(stretches, left.ravel(), color=RESIDUAL, lw=1.4, solid_capstyle="butt", label="left in the cuts")
+    ax.plot(*_within(time, taken), color=TAKEN_OFF, lw=1.0, label="taken off by the program (minus the correction)")
+    ax.plot(*_cuts(time, left), color=RESIDUAL, lw=1.4, label="left in the cuts")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -_SMALL), max(high, _SMALL))
     ax.set_ylabel(f"{axis} [um]")
@@ -99,6 +98,23 @@ def _drift(ax: Axes, axis: str, time: FloatArray, run: Run) -> None:
 def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a curve that has the lowest and the highest value of each stretch at its end."""
     return np.concatenate([[0.0], np.repeat(time, 2)]), np.concatenate([values[0, :1], values.ravel()])
+
+
+def _cuts(time: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a curve from one end of each cut to the other, with gaps where nothing is cut.
+
+    Which end is the higher one is told by the cut before: curves go on.
+    """
+    starts = np.concatenate([[0.0], time[:-1]])
+    x = np.stack([starts, time, time], axis=1)
+    y = np.full((len(time), 3), np.nan)
+    last = 0.0
+    for k, (low, high) in enumerate(left.tolist()):
+        if not math.isnan(low):
+            first, second = (low, high) if abs(low - last) <= abs(high - last) else (high, low)
+            y[k, :2] = first, second
+            last = second
+    return x.ravel(), y.ravel()
 
 
 def _changes(n: int) -> str:

@@ -26,7 +26,15 @@ sys.path.insert(0, "/usr/lib/python3/dist-packages")
 
 MM = 25.4
 
-INT, D, B, P = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p
+INT, D, B, P, TEXT = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p, ctypes.c_char_p
+
+
+class Pose(ctypes.Structure):
+    """Offsets X Y Z A B C U V W."""
+
+    _fields_ = (("values", D * 9),)
+
+
 #: canonical functions that are told with their numbers: mangled name -> kind, types
 TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
     "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
@@ -61,7 +69,6 @@ TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
     "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
     "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
     "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
-    "_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi": ("tooltable", ()),  # its numbers are not looked at
 }
 
 
@@ -80,7 +87,7 @@ class Canon:
         self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
         self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
         self.angle = 0.0
-        self.spindle = 0
+        self.spindle: int = job["spindle"]
         self.plane = 1
         self.feed = 0.0  # [mm/min]
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
@@ -104,6 +111,8 @@ class Canon:
             name: (told(kind), (None, *types)) for name, (kind, types) in TOLD.items()
         }
         functions["_Z22START_SPEED_FEED_SYNCHidb"] = (self.synchronised, (None, INT, D, B))
+        functions["_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi"] = (self.tool_stored, (None, INT, INT, Pose, D, D, D, INT))
+        functions["fopen64"] = (self.opened, (P, TEXT, TEXT))
         functions["_Z18CHANGE_TOOL_NUMBERi"] = (self.change_tool_number, (None, INT))
         functions["_Z9RIGID_TAPidddd"] = (self.tapped, (None, INT, D, D, D, D))
         functions["_Z4WAITiiid"] = (self.waited, (INT, INT, INT, INT, D))
@@ -122,7 +131,8 @@ class Canon:
             self.curved,
             (None, INT, P, ctypes.c_uint),
         )
-        self.unit_before = self.hooks.turn("librs274", functions)["_Z16USE_LENGTH_UNITS11CANON_UNITS"]
+        before = self.hooks.turn("librs274", functions)
+        self.unit_before, self.open_before = before["_Z16USE_LENGTH_UNITS11CANON_UNITS"], before["fopen64"]
         made = {"_ZN6InterpC1Ev": (self.constructed, (None, P))}
         self.construct_before = self.hooks.turn(module, made)["_ZN6InterpC1Ev"]
 
@@ -196,6 +206,19 @@ class Canon:
     def change_tool_number(self, number: int) -> None:
         self.spindle = number
         self.tell("toolnumber", number)
+
+    def tool_stored(self, place: int, number: int, pose: Pose, front: float, back: float, size: float, to: int) -> None:
+        """G10 L1, L10, L11: M6 and G43 take the tool from here [mm]."""
+        if 0 < number <= len(self.tools):
+            self.tools[number - 1] = (number, pose.values[2], size)
+        self.tell("tooltable")
+
+    def opened(self, name: bytes, mode: bytes) -> int:
+        """Tell of a file that is there, the program's own included."""
+        result: int = self.open_before(name, mode)
+        if result and mode.startswith(b"r"):
+            self.write(f"opened {self.line} {os.path.realpath(name).decode('utf-8', 'surrogateescape')}\n")
+        return result
 
     def tapped(self, line: int, x: float, y: float, z: float, scale: float) -> None:
         self.tell("tap", self.length(x), self.length(y), self.length(z), scale)

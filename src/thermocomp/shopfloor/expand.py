@@ -1,6 +1,7 @@
 """Expands an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; the result is proven."""
 
 import random
+import re
 from array import array
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -14,6 +15,9 @@ from thermocomp.shopfloor.plain import Writer
 from thermocomp.shopfloor.proof import compare, kept
 from thermocomp.shopfloor.rs274 import HIGHEST_TOOL, Canonical, Stored, read
 from thermocomp.shopfloor.words import Side
+
+_NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
+_ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
 
 
 @dataclass(frozen=True)
@@ -40,14 +44,20 @@ class _Around:
 
     inch: bool | None
     startup: str | None
-    diameters: Mapping[int, float] | None
+    diameters: Mapping[int, float]
     block_delete: bool
     subroutines: Sequence[Path]
     user_codes: bool
     seconds: int
 
     def run(
-        self, path: Path, stored: Stored, *, task: bool = False, left: dict[int, float] | None = None
+        self,
+        path: Path,
+        stored: Stored,
+        *,
+        task: bool = False,
+        left: dict[int, float] | None = None,
+        opened: set[Path] | None = None,
     ) -> Generator[Canonical]:
         """Run a program in it."""
         return read(
@@ -59,6 +69,7 @@ class _Around:
             task=task,
             seconds=self.seconds,
             left=left,
+            opened=opened,
         )
 
     def controller(self, seed: int) -> Stored:
@@ -76,10 +87,9 @@ class _Around:
             rotations={system: some(1, 20.0)[0] for system in range(1, 10)},
             shift=some(9, 10.0),
             lengths={tool: round(chance.uniform(20.0, 200.0), 6) for tool in tools},
-            diameters=self.diameters
-            if self.diameters is not None
-            else {tool: round(chance.uniform(0.001, 0.1), 6) for tool in tools},
+            diameters={tool: round(chance.uniform(0.001, 0.1), 6) for tool in tools} | dict(self.diameters),
             active_length=round(chance.uniform(20.0, 200.0), 6),
+            spindle=HIGHEST_TOOL - seed,
             home28=some(9),
             home30=some(9),
             startup=" ".join(startup),
@@ -117,8 +127,8 @@ def expand(
         Codes in force at the start that the end of a program does not put back, such as ``G64 P0.01 G98`` [mm]. Canned
         cycles need them; what is not given the program has to say (G61, G61.1 or G64; G98 or G99).
     diameters : dict of int to float, optional
-        Of the tools [mm]: G41 and G42 are worked out for them. If not given, a program that uses the diameters stored
-        in the controller is refused.
+        Of the tools [mm]: G41 and G42 are worked out for them. A program that uses another one, which is stored in the
+        controller, is refused.
     block_delete : bool
         Leave out the lines that begin with ``/``.
     subroutines : sequence of Path
@@ -139,7 +149,7 @@ def expand(
     InputError
         `out` exists already, or the program is not there.
     """
-    around = _Around(inch, startup, diameters, block_delete, subroutines, user_codes, seconds)
+    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds)
     if out.exists():
         raise InputError(f"{out} exists already; nothing is overwritten")
     part = out.with_name(out.name + ".part")
@@ -177,7 +187,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
         yield "%", 0
     name = "".join(c if " " <= c <= "~" and c not in "()" else "?" for c in path.name)
     yield f"(expanded from {name} by thermocomp)", 0
-    if around.diameters is not None:
+    if around.diameters:
         yield "(cutter radius compensation is worked out for given tool diameters)", 0
     yield "G17 G40 G80 G90 G94", 0
     if around.startup is not None:
@@ -186,15 +196,32 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
         yield "G20" if around.inch else "G21", 0
     one, two = around.controller(1), around.controller(2)
     writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
-    with closing(around.run(path, one)) as run1, closing(around.run(path, two, task=True)) as run2:
+    opened: set[Path] = set()
+    with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
             if first is None or second is None:
                 raise writer.refuse(f"where it ends {DEPENDS}")
             yield from writer.write(first, second)
+    for file in sorted(opened):
+        _refuse_orienting(file, path, around.block_delete)
     if not writer.ended:
         yield from writer.flush()
         if percent:
             yield "%", 0
+
+
+def _refuse_orienting(file: Path, program: Path, block_delete: bool) -> None:
+    """Refuse M19 in a file that was run: without R the interpreter passes it over without a trace."""
+    with file.open(encoding="latin-1") as lines:
+        for number, text in enumerate(lines, 1):
+            code = _NO_CODE.sub("", text).upper()
+            if _ORIENTS.search(code) and not (block_delete and code.startswith("/")):
+                own = file == program.resolve()
+                where = "" if own else f" (line {number} of {file.name})"
+                raise ProgramError(
+                    number if own else 1,
+                    f"it cannot be expanded: it orients the spindle (M19), which plain lines would lose{where}",
+                )
 
 
 def _first(path: Path) -> str:

@@ -126,10 +126,12 @@ def tool_length(sides: Sides, words: Words, refuse: Refuse) -> str:
     if not (any(first) or any(second)):
         return "G49"
     if not any(first[:2] + first[3:] + second[:2] + second[3:]):
-        one, two = (side.stored.lengths for side in sides)
-        for tool, length in one.items():
-            if same(length, first[2]) and same(two[tool], second[2]):
+        one, two = (side.stored for side in sides)
+        for tool, length in one.lengths.items():
+            if same(length, first[2]) and same(two.lengths[tool], second[2]):
                 return f"G43 H{tool}"
+        if same(one.lengths[one.spindle], first[2]) and same(two.lengths[two.spindle], second[2]):
+            return "G43"  # of the tool that was in the spindle at the start, whatever its number
     if all(same(x, y) for x, y in zip(first, second, strict=True)) and not any(first[3:]):
         return f"G43.1 {' '.join(words.axis(i, first[i]) for i in range(3))}"
     raise refuse(f"the tool length in force {DEPENDS}")

@@ -78,6 +78,8 @@ class Stored:
         Of the tools [mm]; all tools up to 1000 are there, those that are not named with 0.
     active_length : float
         Tool length offset in force at the start [mm].
+    spindle : int
+        Number of the tool in the spindle at the start; 0: none.
     home28, home30 : sequence of float
         Where G28 and G30 go, X to W [mm, deg].
     startup : str
@@ -94,6 +96,7 @@ class Stored:
     lengths: Mapping[int, float] = field(default_factory=dict)
     diameters: Mapping[int, float] = field(default_factory=dict)
     active_length: float = 0.0
+    spindle: int = 0
     home28: Sequence[float] = ()
     home30: Sequence[float] = ()
     startup: str = "G64 G98"
@@ -207,6 +210,7 @@ def read(
     task: bool = False,
     seconds: int = 600,
     left: dict[int, float] | None = None,
+    opened: set[Path] | None = None,
 ) -> Generator[Canonical]:
     """Run a program through LinuxCNC's interpreter and yield its canonical calls as they come.
 
@@ -227,6 +231,8 @@ def read(
         Processor time the interpreter may take [s]: a program can have an endless loop.
     left : dict, optional
         Filled at the end with the parameters the controller would have stored afterwards.
+    opened : set, optional
+        Filled with the files the interpreter opens: the program, and those of subprograms.
 
     Yields
     ------
@@ -260,7 +266,7 @@ def read(
                 encoding="utf-8",
             )
         try:
-            yield from _calls(process, folder, seconds)
+            yield from _calls(process, folder, seconds, set() if opened is None else opened)
         finally:
             process.kill()  # does nothing if it has ended
             process.communicate()
@@ -290,13 +296,14 @@ def _job(folder: Path, path: Path, stored: Stored, inch: bool, subroutines: Sequ
         "parameters": str(folder / "parameters"),
         "table": str(folder / "table"),
         "tools": tools,
+        "spindle": stored.spindle,
         "units": f"G21 G90 G17 G40 G49 G80 G94 {stored.startup}{start}",
         # the child waits for this comment and the tool length after it: then the program begins
         "start": f"(begin) G2{0 if inch else 1} G43.1 Z{stored.active_length / (25.4 if inch else 1.0):.9f}",
     }
 
 
-def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int) -> Iterator[Canonical]:
+def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int, opened: set[Path]) -> Iterator[Canonical]:
     """Read what the child writes."""
     assert process.stdout is not None
     frame, plane, line, file, done = Frame(), 17, 0, "", False
@@ -323,6 +330,9 @@ def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int) -> Iter
             yield Canonical(kind, line, file, *nowhere, None, (), rest)
         elif kind == "file":
             file = Path(rest).name if rest else ""
+        elif kind == "opened":
+            if not Path(rest).is_relative_to(folder.resolve()):
+                opened.add(Path(rest))
         elif kind == "error":
             where = f" (in {file})" if file else ""
             raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {rest}")

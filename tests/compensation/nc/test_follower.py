@@ -116,22 +116,38 @@ def test_axes_are_known_once_an_absolute_word_has_come() -> None:
     ]
 
 
-def test_a_system_the_setup_knows_keeps_axes_known() -> None:
+def test_a_system_the_setup_knows_tells_the_place_and_nothing_certain() -> None:
     setup = Setup(inch=False, offsets={1: (1.0, 2.0, 3.0), 2: (10.0, 20.0, 30.0)})
     blocks = run("G52 X0 Y0 Z0\nG49 G0 X1 Y1 Z1\nG55\nG0 X1\n", setup)
     assert blocks[1].moves[0].end == (2.0, 3.0, 4.0)
-    assert blocks[2].known == (True, True, True)
+    assert blocks[2].known == (False, False, False)
     assert blocks[2].end == (-8.0, -17.0, -26.0)
     assert blocks[3].moves[0].end == (11.0, 3.0, 4.0)
 
 
 def test_tool_lengths_that_are_not_known_make_z_uncertain() -> None:
-    blocks = run("G21 G49 G0 X0 Y0 Z0\nG43 H1\nZ5\nG43 H2\nZ5\n", Setup(tools={1: 100.0}))
-    assert blocks[1].known == (True, True, True)
+    """What the setup says of a tool tells where the machine is; only the program itself makes it certain."""
+    blocks = run("G21 G49 G0 X0 Y0 Z0\nG43 H1\nZ5\nG43 H2\nZ5\nG49\n", Setup(tools={1: 100.0}))
+    assert [b.known[2] for b in blocks] == [True, False, True, False, True, False]
     assert blocks[1].end[2] == -100.0
     assert blocks[2].moves[0].end[2] == 105.0
-    assert blocks[3].known == (True, True, False)
-    assert blocks[4].known == (True, True, True)
+    assert all(b.known[:2] == (True, True) for b in blocks)
+    blocks = run("G21 G49 G10 L1 P1 Z100\nG0 Z0\nG43 H1\nG49\n", Setup())
+    assert [b.known[2] for b in blocks] == [False, True, True, True]
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc"])
+def test_nothing_is_known_after_a_tool_change(controller: str) -> None:
+    """Settings and macros of the machine move axes to the changer."""
+    blocks = run("G90 G0 X1. Y1. Z1.\nT2\nM6\nX2.\nT3 M6 G0 Y1.\n", Setup(controller, inch=False))  # type: ignore[arg-type]
+    assert [b.known for b in blocks[1:]] == [
+        (True, True, True),
+        (False, False, False),
+        (True, False, False),
+        (False, True, False),
+    ]
+    cycle = run("G90 G0 X1. Z5.\nG98 G81 X1. Z-1. R1. F100\nT1 M6\nX2.\n", Setup(controller, inch=False))  # type: ignore[arg-type]
+    assert [b.known[2] for b in cycle] == [True, True, False, False]
 
 
 def test_snapshots_are_shared() -> None:
@@ -240,6 +256,34 @@ def test_fanuc() -> None:
     assert by_line[11].end == (10.0, 5.0, 50.0)
     assert by_line[11].modal.system == 102
     assert by_line[13].ends
+
+
+def test_fanuc_text_before_the_first_percent_is_a_leader() -> None:
+    setup = Setup("fanuc", inch=False)
+    blocks = run("(MADE BY CAM)\n\n%\nO1234\nG0 X1.\n%\nX2.\n", setup)
+    assert [b.ends for b in blocks] == [False] * 5 + [True, False]
+    assert blocks[-1].end[0] == 1.0
+    blocks = run("O1234\nG0 X1.\n%\nX2.\n", setup)
+    assert [b.ends for b in blocks] == [False, False, True, False]
+
+
+def test_fanuc_goes_on_with_the_motion_of_before_a_cycle() -> None:
+    setup = Setup("fanuc", inch=False)
+    blocks = run("G0 X0 Z50.\nG98 G81 X1. Z-1. R1. F100\nG83 X2. Z-3. R1. Q1.\nG80\nZ60.\nG80\nX9.\n", setup)
+    assert blocks[3].modal.motion == "G0"
+    assert [(b.kind, b.moves[0].rapid, b.end) for b in (blocks[4], blocks[6])] == [
+        ("line", True, (2.0, 0.0, 60.0)),
+        ("line", True, (9.0, 0.0, 60.0)),
+    ]
+    blocks = run("G1 X0 F100\nG81 X1. Z-1. R1.\nG0 X5.\nG81 X1. Z-1. R1.\nG80\nX3.\nG31 X4.\nX5.\n", setup)
+    assert blocks[5].moves[0].rapid
+    assert [b.kind for b in blocks[6:]] == ["probe", "line"]
+
+
+def test_tools_with_large_numbers_are_no_lathe_once_they_are_changed() -> None:
+    text = "T1212\nG91 G28 Z0\nM6\nT1313\nG90 G1 X1. F100\nM6\nT0101 M6\n"
+    assert [b.tool_change for b in run(text, Setup("fanuc", inch=False)) if b.tool_change] == [1212, 1313, 101]
+    assert run("T0101 M6\n", Setup("fanuc"))[0].tool_change == 101
 
 
 @pytest.mark.parametrize(("integers", "x"), [("whole", 1500.0), ("least", 1.5)])

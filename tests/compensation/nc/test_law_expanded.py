@@ -15,6 +15,8 @@ pytestmark = pytest.mark.usefixtures("interpreter")
 
 #: at least this share of the programs that the interpreter runs is revised
 SHARE = 0.7
+#: diameters of all tools
+ZERO = dict.fromkeys(range(1, rs274.HIGHEST_TOOL), 0.0)
 #: where subprograms of the package stand
 FOLDERS = [PROGRAMS, *(PROGRAMS / name for name in ("ngcgui_lib", "ngcgui_lib/utilitysubs", "remap_lib"))]
 
@@ -31,7 +33,7 @@ def unrolled(path: Path, folder: Path) -> Trial | InputError:
     """Revise what the interpreter makes of a program."""
     plain = folder / f"plain-{path.name}"
     try:
-        expand(path, plain, inch=False, startup="G64 G99", diameters={}, subroutines=FOLDERS, user_codes=True)
+        expand(path, plain, inch=False, startup="G64 G99", diameters=ZERO, subroutines=FOLDERS, user_codes=True)
         return revise(plain, folder, Growing(rate=(0.01, -0.01, 0.02)), "coordinates", setup=STATED)
     except InputError as error:
         return error

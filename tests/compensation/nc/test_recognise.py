@@ -63,6 +63,15 @@ def test_refused_by_name(text: str, name: str) -> None:
         recognise(list(split_lines(text)))
 
 
+@pytest.mark.parametrize("coding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_without_a_mark(coding: str) -> None:
+    lines = list(split_lines("%\nG21 G0 X1\n(Taschenfräser → 5)\n".encode(coding).decode("latin-1")))
+    with pytest.raises(InputError, match="UTF-16"):
+        recognise(lines)
+    with pytest.raises(InputError, match="Mazatrol"):
+        recognise(["\0\1\2\0\0\0G0\0\n"])
+
+
 def test_a_refusal_says_what_to_do() -> None:
     with pytest.raises(InputError, match="have the CAM system write the part for an ISO control"):
         recognise(["0 BEGIN PGM 1 MM\n"])

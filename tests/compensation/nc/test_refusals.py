@@ -90,7 +90,7 @@ NOT_FOLLOWED = [
     ("G0 X#7", "unknown"),
     ("M98 P100", "subprogram"),
     ("M99", "subprogram"),
-    ("M101", "a code of the user"),
+    ("M101", "a code of the user): nobody knows what it does; if it moves nothing, name it with --harmless M101"),
     ("M70", "M70"),
     ("G28.1", "G28"),
     ("G5.2 X1 Y1 L3 P1", "NURBS"),
@@ -186,14 +186,29 @@ def test_a_speed_that_was_never_told() -> None:
         ("G28", "without axis words"),
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
-        ("IF [#1 EQ 1] GOTO 10", "--expand"),
-        ("M10", "unknown"),
+        ("IF [#1 EQ 1] GOTO 10", "CAM system"),
+        ("WHILE [#1 LT 2] DO1", "CAM system"),
+        ("M98 P1000", "CAM system"),
+        ("M10", "if it moves nothing, name it with --harmless M10"),
+        ("G999", "unknown (fanuc): nobody knows what it does; remove it"),
+        ("T0101", "a lathe program: X is a diameter"),
+        ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: a lathe program"),
+        ("G50 S2500", "a lathe program"),
+        ("G0 X1. Z1.\nG50 X200. Z100.", "a lathe program"),
+        ("G54 P1", "write G54.1 P1"),
+        ("G0 X1.\nG5.1 Q1 X5.", "on a line of its own"),
+        ("G0 G8 P1 X5.", "on a line of its own"),
+        ("G99 G81 X1. Z-1. R1. F100 K0", "K0 stores the words of G81 and drills no hole"),
+        ("G99 G81 X1. Z-1. R1. F100 L0", "L0 stores the words of G81 and drills no hole"),
+        ("G81 X1. Z-1. R1. F100\nG80\nX2.", "no motion code is in force"),
     ],
 )
 def test_fanuc_refusals(text: str, reason: str) -> None:
     with pytest.raises(ProgramError) as caught:
         run("G21 G90\n" + text + "\n", Setup("fanuc", inch=False))
     assert reason in caught.value.reason
+    assert "--expand" not in caught.value.reason  # which is LinuxCNC's
+    assert caught.value.line == 2 + text.count("\n")
 
 
 def test_integers_can_be_refused() -> None:
@@ -201,6 +216,29 @@ def test_integers_can_be_refused() -> None:
     with pytest.raises(ProgramError, match="no decimal point"):
         run("G0 X10", setup)
     assert run("G0 X10. Y0", setup)[0].end[0] == 10.0
+
+
+def test_numbers_that_are_no_lengths_need_no_decimal_point() -> None:
+    setup = Setup("fanuc", inch=False, integers="refuse")
+    text = "G05.1 Q1\nG0 X1.\nG05.1 Q1 X0 Y0 Z0\nG05 P10000\nG08 P1\nG187 P2 E0.01\nG61.1\nG64\nG43 H1 Z5.\n"
+    blocks = run(text + "G99 G81 X1. Z-1. R1. F100 K3\nX2. L2\nG80\n", setup)
+    assert [len(b.moves) for b in blocks] == [0, 1, 0, 0, 0, 0, 0, 0, 1, 13, 9, 0]
+    assert blocks[2].end[0] == 1.0
+    for wrong in ("G83 X1. Z-1. R1. Q1 F100", "G81 X1. Z-1. R1 F100", "G18 G2 X1. Z0 I0.5 K1 F100"):
+        with pytest.raises(ProgramError, match="no decimal point"):
+            run(wrong, setup)
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc"])
+def test_codes_of_the_maker_that_move_nothing(controller: str) -> None:
+    setup = Setup(controller, inch=False, integers="refuse", harmless=frozenset({88, 101, 6}))  # type: ignore[arg-type]
+    blocks = run("G0 X1.\nM88 M101\nM101 P1 Q2\nX2. M88\nT1 M6\n", setup)
+    assert [(b.kind, b.end[0]) for b in blocks[:4]] == [("line", 1.0), ("none", 1.0), ("none", 1.0), ("line", 2.0)]
+    assert blocks[1].codes == ("M88", "M101")
+    assert blocks[4].tool_change == 1  # what is known stays what it is
+    for text in ("M89", "M88 R1", "M188"):
+        with pytest.raises(ProgramError, match="harmless M|no code that uses it"):
+            run(text, setup)
 
 
 @settings(max_examples=400, deadline=None)

@@ -233,6 +233,13 @@ class Drift:
         return tuple(a for a in AXES if any(s.axis == a for s in self.stations))
 
     @property
+    def driven(self) -> tuple[str, ...]:
+        """The axes whose models say anything: an input has an influence on them, or they are not 0 at rest."""
+        return tuple(
+            a for a in AXES if any(s.axis == a and (s.model.sensors or s.model.intercept) for s in self.stations)
+        )
+
+    @property
     def by_position(self) -> bool:
         """True if the deviation varies with the place."""
         return bool(self._ladders)

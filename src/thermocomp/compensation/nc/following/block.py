@@ -44,6 +44,10 @@ class Modal:
         The program has said which; else it is what the controller happens to stand at.
     blend : float or None
         G64 P: how far the path may leave the corners [mm]; 0 without P, None in G61 and G61.1 (exact).
+    naive : float
+        G64 Q, or P without it: how far points may be off a line that replaces their lines [mm]; 0: none is replaced.
+    exact_stop : bool
+        G61.1: the axes stop at the end of every move.
     """
 
     motion: str = ""
@@ -59,6 +63,8 @@ class Modal:
     retract: int = 98
     retract_stated: bool = False
     blend: float | None = 0.0
+    naive: float = 0.0
+    exact_stop: bool = False
 
 
 class Arc(NamedTuple):
@@ -117,8 +123,8 @@ class Block:
         Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
-        `end` would not move it. False at the start of the program, after G53, G28, G30, after a change of the
-        coordinate system or of the tool length that the file does not tell, and after an optional line that moved it.
+        `end` would not move it. False at the start of the program, after G53, G28, G30, M6, after a change
+        of the coordinate system or of the tool length that the file does not tell, and after an optional line that moved it.
     moves : list of Move
     feed : float
         F in force, in mm per minute, mm per turn or 1/min, according to ``modal.feed_mode``.
@@ -165,12 +171,15 @@ class Setup:
         Whose habits the program has.
     inch : bool or None
         Unit in force when the program starts; None: unknown, and the program has to say it before the first length.
+    startup : str
+        Codes in force when the program starts, from `thermocomp.compensation.nc.following.startup.tidy`.
     speed : float
         Spindle speed S in force when the program starts [1/min]; 0: none.
     offsets : dict of int to tuple of float
-        Origins of work coordinate systems, X Y Z [mm]; those that are not there are unknown and taken as 0.
+        Origins of work coordinate systems, X Y Z [mm]; those that are not there are taken as 0. They tell about where
+        the machine is, but are never certain: only what the program itself sets keeps an axis known.
     tools : dict of int to float
-        Lengths of the tools [mm]; those that are not there are unknown and taken as 0.
+        Lengths of the tools [mm]; the same holds for them.
     home : tuple of float
         Where G28 goes, in machine coordinates [mm].
     integers : {'whole', 'least', 'refuse'}
@@ -180,10 +189,13 @@ class Setup:
         Least input increment [mm], for `integers` 'least'.
     skip_optional : bool
         Block delete is on: lines that begin with ``/`` are not run.
+    harmless : frozenset of int
+        M codes of the machine's maker or user that move no axis; known codes keep their meaning.
     """
 
     controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
     inch: bool | None = None
+    startup: str = ""
     speed: float = 0.0
     offsets: dict[int, Point] = field(default_factory=dict)
     tools: dict[int, float] = field(default_factory=dict)
@@ -191,3 +203,4 @@ class Setup:
     integers: Literal["whole", "least", "refuse"] = "whole"
     least: float = 0.001
     skip_optional: bool = False
+    harmless: frozenset[int] = frozenset()

@@ -115,6 +115,7 @@ _NO_SCALING = "scaling is not supported; write the coordinates out"
 _NO_MIRROR = "mirroring is not supported; write the coordinates out"
 _NO_ROTATION = "rotated coordinates are not supported; write the coordinates out"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
+_MACRO = "macro calls are not followed; write the moves out in the CAM system"
 _NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
 
 _FANUC_G: Final = (
@@ -138,8 +139,9 @@ _FANUC_G: Final = (
     Code("G51", "scaling", "scaling", _NO_SCALING),
     Code("G51.1", "mirror", "mirror image", _NO_MIRROR),
     Code("G54.1", "system", "one of the additional work coordinate systems"),
-    Code("G65", "once", "macro call", "macro calls are not followed; write the moves out"),
-    Code("G66", "call", "modal macro call", "macro calls are not followed; write the moves out"),
+    Code("G61.1", "path", "high accuracy"),
+    Code("G65", "once", "macro call", _MACRO),
+    Code("G66", "call", "modal macro call", _MACRO),
     Code("G67", "call", "modal macro call off"),
     Code("G68", "rotation", "rotation", _NO_ROTATION),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
@@ -147,6 +149,7 @@ _FANUC_G: Final = (
     Code("G76", "motion", "fine boring", "it shifts the tool at the bottom by a parameter of the control; use G86"),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
+    Code("G187", "high speed", "smoothness"),
 )
 
 _CALL = "subprograms are not followed; write the moves into the program"
@@ -166,11 +169,11 @@ _COMMON_M: Final = (
     Code("M30", "stop", "end"),
     Code("M48", "override", "overrides on"),
     Code("M49", "override", "overrides off"),
-    Code("M98", "stop", "subprogram call", f"{_CALL}; in LinuxCNC {_EXPAND}"),
     Code("M99", "stop", "end of a subprogram", f"this is a subprogram, or a program without end; {_CALL}"),
 )
 
 _LINUXCNC_M: Final = (
+    Code("M98", "stop", "subprogram call", f"{_CALL}; {_EXPAND}"),
     *(Code(f"M{n}", "override", "override switch") for n in range(50, 54)),
     Code("M60", "stop", "stop, change pallets"),
     Code("M61", "tool", "tells the number of the tool"),
@@ -182,8 +185,9 @@ _LINUXCNC_M: Final = (
 )
 
 _FANUC_M: Final = (
+    Code("M98", "stop", "subprogram call", f"{_CALL} in the CAM system"),
     Code("M29", "tapping", "rigid tapping"),
-    Code("M198", "stop", "subprogram call", _CALL),
+    Code("M198", "stop", "subprogram call", f"{_CALL} in the CAM system"),
 )
 
 
@@ -221,12 +225,13 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
     },
     "fanuc": {
         "D": frozenset({"G41", "G42"}),
+        "E": frozenset({"G187"}),
         "H": frozenset({"G43", "G49"}),
         "I": _ARCS,
         "J": _ARCS,
         "K": _ARCS | CYCLES,
         "L": CYCLES | {"G10"},
-        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1"},
+        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G187"},
         "Q": frozenset({"G5.1", "G73", "G83", "G74", "G84"}),
         "R": CYCLES | _ARCS | {"G5.1", "G10"},
     },

@@ -76,17 +76,17 @@ class Follower:
             return self._idle(line)
         if line.demarcation:
             return self._percent(line)
-        if not self._began and line.text.strip():
-            self._began = True
+        if not self._began:  # what stands before the first % of a Fanuc program is a leader
+            acts = line.words or line.assignments or line.flow if self.state.fanuc else line.text.strip()
+            self._began = bool(acts)
         if line.optional and self._setup.skip_optional:
             return self._idle(line)
         if line.error:
             raise ProgramError(line.number, line.error)
         if line.flow:
+            remedy = "write them out in the CAM system" if self.state.fanuc else "--expand lets the interpreter unroll them"
             raise ProgramError(
-                line.number,
-                f"{line.flow}: loops, branches and subprograms are not followed; --expand lets the interpreter unroll "
-                "them",
+                line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}"
             )
         if not line.words and not line.assignments:
             return self._idle(line)
@@ -173,12 +173,19 @@ class Follower:
         if groups.get("motion") == "G80":
             state.sticky = {}
             state.level = None
-            state.moves_by("")
+            if not state.fanuc:
+                state.moves_by("")
+            elif state.modal.motion in CYCLES:  # these are a group of their own there
+                state.moves_by(state.under)
             block.modal = state.modal
         else:
             block.modal = state.modal
             if code in _CURVES:
                 state.moves_by("")
+            elif code == "G31":  # holds for its line only
+                state.moves_by(before.motion)
+        if state.lathe and not all(move.rapid for move in block.moves):
+            raise setting.lathe(orders, f"{state.lathe} before, and no M6")
         block.end = state.place
         block.known = state.known
         block.feed = state.feed
@@ -201,6 +208,10 @@ class Follower:
                 return ""
             if told is not None:
                 return told
+        if self.state.fanuc and "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values):
+            if told or any(values.get(letter) for letter in _AXIS_LETTERS):
+                raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
+            return ""  # X0 Y0 Z0: these axes are smoothed
         takes = once in TAKES_AXES or groups.get("tool length") == "G43.1"
         if once == "G4" and self.state.fanuc:
             takes = True
@@ -250,6 +261,8 @@ class Follower:
         state = self.state
         again = state.modal.motion == code
         if not again:
+            if state.modal.motion not in CYCLES:
+                state.under = state.modal.motion
             state.moves_by(code)
         if code not in CYCLES:
             if state.level is not None:

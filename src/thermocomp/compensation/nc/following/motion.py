@@ -232,6 +232,12 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
         _refuse_from_r(start[across], state.level, state.sticky["R"] * scale, orders)
+    for letter in "KL" if state.fanuc else "":
+        if values.get(letter) == 0.0:
+            raise orders.error(
+                f"{letter}0 stores the words of {code} and drills no hole here, which is not followed; remove the line "
+                f"and write {code} with all its words on the line of its first hole"
+            )
     repeats = orders.whole("K" if state.fanuc and "K" in values else "L", least=1) or 1
     x, y, z = (v / scale for v in start)
     run = Cycle(

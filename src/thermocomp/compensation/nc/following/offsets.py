@@ -37,7 +37,7 @@ def mark(known: Known, axes: Mapping[int, object], to: bool) -> Known:
 class Offsets:
     """The offsets in force, and per axis whether they are certain.
 
-    An offset that stood at the controller before the program started is not; what the program or the setup states is.
+    An offset that stood at the controller before the program started is not; nor is what the setup says of it; what the program states is.
     After a change, a program coordinate is only known if the offset was certain before it and after it.
 
     Parameters
@@ -49,7 +49,7 @@ class Offsets:
         self.system = 1
         self.origins: dict[int, Point] = dict(setup.offsets)
         self.rotations: dict[int, float] = {}
-        self._certain_origins: dict[int, Known] = dict.fromkeys(setup.offsets, _ALL)
+        self._certain_origins: dict[int, Known] = {}
         self.shift: Point = _ZERO
         self._kept: Point = _ZERO
         self._certain_shift: Known = _NEVER

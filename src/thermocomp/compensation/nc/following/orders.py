@@ -63,6 +63,7 @@ class Reader:
         self.parameters = parameters
         self._controller = setup.controller
         self._used_by = USED_BY[setup.controller]
+        self._harmless = {f"M{number}" for number in setup.harmless}
         self._codes: dict[tuple[str, float], Code] = {}
 
     def read(self, line: Line) -> Orders:
@@ -107,6 +108,10 @@ class Reader:
             if letter in REFUSED_LETTERS:
                 raise orders.error(f"{letter}: {REFUSED_LETTERS[letter]}")
             users = self._used_by.get(letter, frozenset())
+            if letter in "PQ" and not self._harmless.isdisjoint(orders.codes):
+                continue
+            if letter == "P" and "G54" in orders.codes and self._controller == "fanuc":
+                raise orders.error("G54 with P: write G54.1 P1 for an additional coordinate system")
             if motion not in users and users.isdisjoint(orders.codes):
                 raise orders.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
 
@@ -118,12 +123,16 @@ class Reader:
 
     def _find(self, line: Line, letter: str, number: float) -> Code:
         code = find(letter, number, self._controller)
+        name = f"{letter}{number:g}"
+        if code is None and name in self._harmless:
+            code = Code(name, name, "moves nothing")
         if code is None:
-            user = letter == "M" and 100 <= number < 200
+            user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
+            remedy = f"if it moves nothing, name it with --harmless {name}; else" if letter == "M" else ""
             raise ProgramError(
                 line.number,
-                f"{letter}{number:g} is unknown ({'a code of the user' if user else self._controller}): nobody knows "
-                "what it does; remove it",
+                f"{name} is unknown ({'a code of the user' if user else self._controller}): nobody knows what it does; "
+                f"{remedy} remove it".replace(";  ", "; "),
             )
         if code.refused:
             raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")

@@ -4,11 +4,12 @@ from typing import Final
 
 from thermocomp.compensation.nc.following import placing
 from thermocomp.compensation.nc.following.arcs import PLANES
-from thermocomp.compensation.nc.following.block import Block, Setup
-from thermocomp.compensation.nc.following.codes import LENGTHS
+from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.following.codes import CYCLES, LENGTHS
 from thermocomp.compensation.nc.following.offsets import mark
 from thermocomp.compensation.nc.following.orders import Orders
 from thermocomp.compensation.nc.following.state import MM, State
+from thermocomp.core.exceptions import ProgramError
 
 _MODAL_GROUPS: Final = frozenset(
     {"plane", "units", "cutter", "distance", "arc distance", "diameter", "retract", "path", "feed mode"}
@@ -17,12 +18,15 @@ _MODAL_GROUPS: Final = frozenset(
 _NOT_UNDER_CUTTER: Final = frozenset({"tool length", "system", "path", "retract", "tool", "io", "override"})
 
 
-def lengths(setup: Setup, orders: Orders, inch: bool) -> None:
+def lengths(state: State, orders: Orders) -> None:
     """Give lengths without a decimal point the value they have at this control."""
     if orders.groups.get("once") == "G4":
         return
+    setup, inch, none = state.setup, state.modal.inch, ""
+    if state.fanuc:  # K repeats a cycle; Q is a length in cycles, and a number elsewhere
+        none = "K" if orders.groups.get("motion", state.modal.motion) in CYCLES else "Q"
     for letter, word in orders.words.items():
-        if letter not in LENGTHS or word.number is None or "." in word.value or not word.number:
+        if letter not in LENGTHS or letter in none or word.number is None or "." in word.value or not word.number:
             continue
         if setup.integers == "refuse":
             raise orders.error(
@@ -37,7 +41,7 @@ def check_units(state: State, orders: Orders) -> None:
     if not state.unit_told:
         _unit_needed(state, orders)
     if state.setup.integers != "whole":
-        lengths(state.setup, orders, state.modal.inch)
+        lengths(state, orders)
 
 
 def _unit_needed(state: State, orders: Orders) -> None:
@@ -67,6 +71,15 @@ def speeds(state: State, orders: Orders, inch: bool) -> None:
         state.spindle = values["S"]
     if "T" in values:
         state.selected = orders.whole("T") or 0
+        if state.fanuc and state.lathe is not None and state.selected > 99 and "tool" not in orders.groups:
+            state.lathe = f"T{orders.words['T'].value.strip()}"
+            if state.lathe[1] == "0":
+                raise lathe(orders, f"{state.lathe} without M6")
+
+
+def lathe(orders: Orders, sign: str) -> ProgramError:
+    """Return the error of a lathe program, and what shows that it is one."""
+    return orders.error(f"{sign}: a lathe program: X is a diameter, G99 is feed per turn there; not supported")
 
 
 def settle(state: State, orders: Orders, block: Block) -> None:
@@ -80,6 +93,10 @@ def settle(state: State, orders: Orders, block: Block) -> None:
         if mode != state.modal.feed_mode or not state.fanuc:
             state.feed = state.feed_word = 0.0
         state.changed(feed_mode=mode)
+    if groups.get("scaling") == "G50" and (
+        "S" in orders.values or (not {"X", "Z"}.isdisjoint(orders.values) and "motion" not in groups)
+    ):
+        raise lathe(orders, "G50 with S, X or Z")
     if state.fanuc and "units" in groups:
         inch = groups["units"] == "G20"
     if "units" in groups:
@@ -91,7 +108,7 @@ def settle(state: State, orders: Orders, block: Block) -> None:
     if not _MODAL_GROUPS.isdisjoint(groups):
         _modal_codes(state, orders)
     if "units" in groups and state.setup.integers != "whole":
-        lengths(state.setup, orders, state.modal.inch)
+        lengths(state, orders)
     if "tool length" in groups:
         placing.tool_length(state, orders)
     if "system" in groups:
@@ -129,8 +146,9 @@ def _machine_codes(state: State, orders: Orders, block: Block) -> None:
     if tool == "M6":
         block.tool_change = state.tool = state.selected
         state.turning = 0
-        if state.fanuc:  # its macro moves axes to the changer
-            state.known = (state.known[0], state.known[1], False)
+        # macros, remapped codes and settings of the machine move axes to the changer
+        state.known, state.level_known = (False, False, False), False
+        state.lathe = None
     elif tool == "M61":
         number = orders.whole("Q")
         if number is None:
@@ -165,8 +183,11 @@ def _modal_codes(state: State, orders: Orders) -> None:
         if state.modal.cutter and not on:  # the tool stays beside the programmed path
             state.known = mark(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
     if "path" in groups:
-        exact = groups["path"] != "G64"
-        fields["blend"] = None if exact else orders.values.get("P", 0.0) * (MM if state.modal.inch else 1.0)
+        # Fanuc's likes smooth the path in G61.1 and stop in G61
+        exact = groups["path"] == "G61" or (groups["path"] == "G61.1" and not state.fanuc)
+        blend = 0.0 if exact else orders.values.get("P", 0.0) * state.scale
+        naive = orders.values.get("Q", 0.0) * state.scale if blend and "Q" in orders.values else blend
+        fields |= {"blend": None if exact else blend, "naive": naive, "exact_stop": exact and (groups["path"] == "G61.1" or state.fanuc)}
     if "distance" in groups:
         fields["absolute"] = groups["distance"] == "G90"
     if "arc distance" in groups:

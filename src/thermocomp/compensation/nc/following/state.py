@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from typing import Final
 
+from thermocomp.compensation.nc.following import startup
 from thermocomp.compensation.nc.following.arcs import length
 from thermocomp.compensation.nc.following.block import Arc, Known, Modal, Move, Point, Setup
 from thermocomp.compensation.nc.following.codes import ROTARY
@@ -25,8 +26,7 @@ class State:
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
         self.fanuc = setup.controller == "fanuc"
-        # LinuxCNC's interpreter begins with G99, Fanuc with G98
-        self.modal = Modal(inch=bool(setup.inch), retract=98 if self.fanuc else 99)
+        self.modal = startup.modal(setup)
         self._variants: dict[str, Modal] = {}
         self.unit_told = setup.inch is not None
         self.scale = MM if setup.inch else 1.0
@@ -41,8 +41,10 @@ class State:
         self.turning = 0
         self.selected = -1
         self.tool = -1
-        self.lengths: dict[int, float] = dict(setup.tools)
-        self.doubtful: dict[int, float] = {}
+        self.lathe: str | None = ""  # Fanuc: a T word that may be a lathe's; None: M6 has come
+        self.under = ""  # Fanuc: the motion that G80 brings back
+        self.lengths: dict[int, float] = {}  # that the program has set
+        self.doubtful: dict[int, float] = dict(setup.tools)
         self.shifted_by = ""
         self.length_number: int | None = None
         self.length_inch: bool | None = None

@@ -64,6 +64,10 @@ _KINDS = (
 )
 _PATTERNS = [(kind, re.compile(kind.code, re.I), re.compile(kind.raw, re.I)) for kind in _KINDS]
 
+_UTF_16 = "UTF-16 text, which controls do not read; save it as plain text (ASCII)"
+#: share of NUL bytes at every second place, from which a text without a byte order mark is UTF-16
+_MOSTLY = 0.9
+
 # the first bytes of files that are no text
 _MAGIC = (
     ("%PDF-", "a PDF document"),
@@ -75,8 +79,8 @@ _MAGIC = (
     ("GIF8", "a GIF picture"),
     ("\x7fELF", "an executable program"),
     ("MZ\x90", "an executable program"),
-    ("\xff\xfe", "UTF-16 text, which controls do not read; save it as plain text (ASCII)"),
-    ("\xfe\xff", "UTF-16 text, which controls do not read; save it as plain text (ASCII)"),
+    ("\xff\xfe", _UTF_16),
+    ("\xfe\xff", _UTF_16),
 )
 _COMMENT = re.compile(r"\([^()]*\)?")
 _NAME = re.compile(r"<[^<>]*>")  # o<trans> call, #<rot>
@@ -110,6 +114,10 @@ def recognise(first_lines: Sequence[str]) -> str:
 
 
 def _refuse_binary(lines: Sequence[str]) -> None:
+    text = "".join(lines)
+    for half, other in ((text[::2], text[1::2]), (text[1::2], text[::2])):
+        if "\0" not in half and other.count("\0") > _MOSTLY * len(other):
+            raise InputError(f"the file is no NC program but {_UTF_16}")
     for magic, name in _MAGIC:
         if lines[0].startswith(magic):
             raise InputError(f"the file is no NC program but {name}")

@@ -16,13 +16,12 @@ import math
 from dataclasses import dataclass, field
 
 from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.revising.contact import CLEAR, Contact
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, PLANES, SPREAD, Method, refuse_probing
+from thermocomp.compensation.nc.revising.method import AXES, PLANES, Method, refuse_probing
 from thermocomp.compensation.nc.revising.text import shifted
 from thermocomp.core.exceptions import ProgramError
 
-#: a retract plane nearer than that to where the cycle starts is the same plane [mm]
-SAME_PLANE = 0.5
 #: motions that take a word they did not have
 PLAIN = ("G0", "G1")
 
@@ -38,16 +37,22 @@ class Coordinates(Method):
     """
 
     helix: bool = True
-    _cutting: bool = field(default=False, init=False)
-    _way: list[float] = field(default_factory=lambda: [math.inf] * 3, init=False)
+    contact: Contact = field(init=False)
     _known: tuple[bool, bool, bool] = field(default=(False, False, False), init=False)
     #: what depth and retract plane of the cycle in force got
     _cycle: float = field(default=0.0, init=False)
     #: level at which a series of cycles began [mm], and what it carries [um]
     _series: tuple[float, float] | None = field(default=None, init=False)
 
+    def __post_init__(self) -> None:
+        self.contact = Contact(self.step, self.safe_z)
+
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
         refuse_probing(block)
+        self.contact.begin(block)
+        if block.tool_change is not None:  # the change may have moved any axis
+            self.doubtful = [not fixed for fixed in self.fixed]
+        before = self.carried
         kind = block.kind
         if self.names_place(block):
             text = self._named_anew(block)
@@ -65,17 +70,28 @@ class Coordinates(Method):
                 text = self._drill(block, frame, old, demand)
             else:
                 text = self._homewards(block, frame, old)
-        if block.moves:
-            self._went(block)
+        if block.moves and kind != "cycle":
+            self._series = None
+        self.contact.end(block, [a != b for a, b in zip(self.carried, before, strict=True)])
         self._known = block.known
         return (text,)
+
+    def held_by(self, block: Block) -> str:
+        """Return what keeps the correction from following the drift in a block."""
+        if block.modal.cutter:
+            return "cutter radius compensation"
+        if block.kind in ("arc", "curve", "cycle"):
+            return {"arc": "arcs", "curve": "splines", "cycle": "the levels of a cycle"}[block.kind]
+        return "the step in cuts" if block.modal.absolute else "G91"
 
     # -- kinds of blocks ---------------------------------------------------------------------------------------------
 
     def _path(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
         modal = block.modal
         named = self.named(block)
-        goal = frame.words(self._limited(block, demand))
+        goal = frame.words(demand)
+        if goal != old or frame.turned:
+            goal = frame.words(self._limited(block, demand))
         holds = self._holds(block, frame)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
         if block.line.optional:
@@ -91,7 +107,7 @@ class Coordinates(Method):
             elif i not in holds and not self.fixed[i] and not self.doubtful[i]:
                 new[i] = goal[i]
                 shifts[letter] = round(new[i] - old[i], frame.digits)
-        if self._takes_words(block):
+        if self._takes_words(block, named):
             self._add(block, frame, goal, holds, new, added)
         if modal.arc_absolute and block.kind == "arc":
             for i, letter in enumerate("IJK"):
@@ -128,13 +144,14 @@ class Coordinates(Method):
         axis = PLANES[block.modal.plane][2]
         goal = frame.words(demand)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        repeats = block.values.get("L", block.values.get("K", 1.0))
         for i in self.named(block):
             if i == axis:
                 continue
             if block.modal.absolute:
                 new[i] = shifts[AXES[i]] = goal[i]
                 self.fixed[i] = self.doubtful[i] = False
-            elif block.values.get("L", 1.0) == 1 and not self.fixed[i] and not self.doubtful[i]:
+            elif repeats == 1 and not self.fixed[i] and not self.doubtful[i]:
                 new[i] = goal[i]
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
@@ -153,9 +170,9 @@ class Coordinates(Method):
             self._series = block.start[axis], self.carried[axis]
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
-        near = any(abs(z - plane) < SAME_PLANE for z in (block.start[axis], level))
+        near = any(abs(z - plane) < CLEAR for z in (block.start[axis], level))
         unsaid = not block.modal.retract_stated
-        if not self.fixed[axis] and (near or unsaid):
+        if not (self.fixed[axis] or self.doubtful[axis]) and (near or unsaid):
             # which level is the higher one must not change, nor what the axis carries at either
             goal = frame.words(self.carried)[axis]
         if goal != self._cycle or all(word in block.words for word in words):
@@ -166,7 +183,7 @@ class Coordinates(Method):
         within[axis] = goal
         self.inner = frame.shift((within[0], within[1], within[2]))
         back = list(self.carried)
-        if abs(block.end[axis] - plane) < SAME_PLANE:
+        if abs(block.end[axis] - plane) < CLEAR:
             back[axis] = self.inner[axis]
             self.fixed[axis], self.doubtful[axis] = False, unsaid and carried != self.inner[axis]
         else:
@@ -183,8 +200,8 @@ class Coordinates(Method):
             if self.doubtful[i]:
                 raise ProgramError(
                     block.line.number,
-                    f"names the place of {AXES[i]}, where an optional line may have moved it or not: "
-                    "decide with --block-delete",
+                    f"names the place of {AXES[i]}, and nobody knows where it is: a tool change or an optional line "
+                    "may have moved it; position it before, or decide with --block-delete",
                 )
         frame = self.frame(block)
         old = frame.words(self.carried)
@@ -209,7 +226,7 @@ class Coordinates(Method):
             return (0, 1, 2) if frame.turned and third != 2 else (first, second)
         return ()
 
-    def _takes_words(self, block: Block) -> bool:
+    def _takes_words(self, block: Block, named: list[int]) -> bool:
         """Return whether a block may get words that it does not have."""
         modal = block.modal
         if block.line.optional or modal.cutter or not block.moves:
@@ -217,27 +234,17 @@ class Coordinates(Method):
         if block.kind == "arc":
             first, second, _ = PLANES[modal.plane]
             return self.helix and (AXES[first] in block.words or AXES[second] in block.words)
-        return block.kind == "line" and modal.motion in PLAIN and bool(self.named(block))
+        return block.kind == "line" and modal.motion in PLAIN and bool(named)
 
     def _limited(self, block: Block, demand: Vector) -> Vector:
-        """Return the demand, or what a cut may take of it.
-
-        A change is spread over its block: a step per 10 mm of it is no mark. A short block takes a step if the last
-        one is far enough behind.
-        """
-        if not block.moves or block.moves[-1].rapid:
-            return demand
-        last = block.moves[-1]
-        spread = math.dist(last.start, last.end) / SPREAD
+        """Return the demand, or what a cut may take of it, spread over the block."""
         out = []
         for i in range(3):
-            gap = demand[i] - self.carried[i]
-            comes_down = not self._cutting and abs(block.end[i] - block.start[i]) > SAME_PLANE
-            if self.fixed[i] or comes_down or not (self._known[i] or self._cutting):
+            gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
+            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self._known[i] or self.contact.touching):
                 out.append(demand[i])
             else:
-                most = self.step * (max(spread, 1.0) if self._way[i] >= SPREAD else math.floor(spread))
-                out.append(self.carried[i] + math.copysign(min(abs(gap), most), gap))
+                out.append(self.carried[i] + math.copysign(most, gap))
         return out[0], out[1], out[2]
 
     def _take(self, frame: Frame, old: Vector, new: list[float]) -> None:
@@ -249,16 +256,3 @@ class Coordinates(Method):
         else:
             x, y, z = (m if n != o else c for m, n, o, c in zip(moved, new, old, self.carried, strict=True))
             self.carried = (x, y, z)
-        self._way = [0.0 if n != o else w for n, o, w in zip(new, old, self._way, strict=True)]
-
-    def _went(self, block: Block) -> None:
-        """Take in where a block went: a change in a cut has to wait for some way."""
-        if block.kind != "cycle":
-            self._series = None
-        last = block.moves[-1]
-        if last.rapid:
-            self._cutting, self._way = False, [math.inf] * 3
-        else:
-            self._cutting = True
-            way = math.dist(last.start, last.end)
-            self._way = [w + way for w in self._way]

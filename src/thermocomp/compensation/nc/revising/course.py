@@ -58,7 +58,10 @@ class Course:
         self._last = row
         low = high = (*row[0], *row[1], speed, *_NOT_CUTTING)
         if cuts:  # at both ends, as in `thermocomp.compensation.nc.revising.demand.Left`
-            ends = [[d + c for d, c in zip(*pair[:2], strict=True)] for pair in (before, row)]
+            pairs = [(before[0], before[1]), (row[0], row[1])]
+            if block.kind == "cycle":  # the hole counts, not the level where it ends
+                pairs = [(deviation, revised.inner) for deviation, _ in pairs]
+            ends = [[d + c for d, c in zip(*pair, strict=True)] for pair in pairs]
             low, high = (*low[:7], *map(min, *ends)), (*high[:7], *map(max, *ends))
         if self._rows and self._rows < self._stride:
             self._times[-1] = revised.end

@@ -1,11 +1,11 @@
 """When the correction in a program is renewed, and what it leaves of the drift."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from thermocomp.compensation.nc.following.block import Block, Point
+from thermocomp.compensation.nc.following.block import Point
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
@@ -16,6 +16,10 @@ Field = Callable[[Point], Vector]
 
 class Drifting(Protocol):
     """What a machine's drift is asked for."""
+
+    @property
+    def by_position(self) -> bool:
+        """Whether the deviation varies with the place."""
 
     def advance(self, dt: float, speed: float) -> None:
         """Let `dt` seconds pass with the spindle at `speed` [1/min]."""
@@ -103,7 +107,7 @@ def opposed(deviation: Vector) -> Vector:
 
 @dataclass
 class Left:
-    """What a correction leaves of the drift that it was computed from, at both ends of every cut.
+    """What a correction leaves of the drift that it was computed from, in the cuts.
 
     Parameters
     ----------
@@ -119,20 +123,19 @@ class Left:
     line: list[int] = field(default_factory=lambda: [0] * 3)
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
-    def take(self, block: Block, ends: tuple[tuple[Vector, Vector], tuple[Vector, Vector]]) -> None:
-        """Take a block in.
+    def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> None:
+        """Take a cut in.
 
         Parameters
         ----------
-        block : Block
-        ends : tuple of (tuple of float, tuple of float)
-            Deviation and correction carried [um] at its start, and at its end.
+        line : int
+        samples : iterable of (tuple of float, tuple of float)
+            Deviation and correction carried [um], here and there on the way.
         """
-        if all(m.rapid for m in block.moves) or block.kind in ("machine", "home"):
-            return
-        for deviation, carried in ends:
-            for i in range(3):
-                left = abs(deviation[i] + carried[i])
-                if left > self.most[i]:
-                    self.most[i], self.line[i] = left, block.line.number
-                self.without[i] = max(self.without[i], abs(deviation[i]))
+        most, without = self.most, self.without
+        for deviation, carried in samples:
+            for i, (drift, correction) in enumerate(zip(deviation, carried, strict=True)):
+                left = abs(drift + correction)
+                if left > most[i]:
+                    most[i], self.line[i] = left, line
+                without[i] = max(without[i], abs(drift))

@@ -42,7 +42,7 @@ def filled(facts: list[str], ending: str) -> tuple[str, ...]:
 
 def refuse_revised(line: Line) -> None:
     """Raise `ProgramError` if a comment says that the program has been revised."""
-    if MARK in line.comment:
+    if f"{MARK} REVISED" in line.comment:
         raise ProgramError(
             line.number,
             "has been revised by thermocomp already: its drift would be taken off twice; revise the original",

@@ -12,8 +12,6 @@ from thermocomp.core.exceptions import ProgramError
 AXES = "XYZ"
 #: plane -> its two axes and the one that stands on it
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-#: cutting way over which the correction changes by one step at most, in a cut [mm]
-SPREAD = 10.0
 
 
 class Change(NamedTuple):
@@ -34,15 +32,18 @@ class Method(ABC):
     digits : Digits
     step : float
         In a cut the correction changes by that at most, per 10 mm of way [um].
+    safe_z : float or None
+        At and above this Z of the work coordinates the tool is up [mm].
     """
 
     digits: Digits
     step: float
+    safe_z: float | None = None
     #: correction that each axis carries now [um]
     carried: Vector = field(default=(0.0, 0.0, 0.0), init=False)
     #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
     fixed: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
-    #: axes of which nobody knows what they carry: an optional line may have moved them
+    #: axes of which nobody knows what they carry: an optional line or a tool change may have moved them
     doubtful: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
     #: what the axes carry within a cycle [um]
     inner: Vector | None = field(default=None, init=False)
@@ -72,9 +73,18 @@ class Method(ABC):
         return Change(texts, before, self.carried, self.inner or self.carried)
 
     @property
+    def leaves_mark(self) -> bool:
+        """Whether something may stay in the controller if the program is aborted."""
+        return False
+
+    @property
     def leaves_offset(self) -> bool:
         """Whether an offset is in force that the program has to take back."""
         return False
+
+    @abstractmethod
+    def held_by(self, block: Block) -> str:
+        """Return what keeps the correction from following the drift in a block."""
 
     @abstractmethod
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...

@@ -23,23 +23,29 @@ class Offset(Method):
 
     Parameters
     ----------
-    safe_z : float or None
-        The tool is up at and above this Z of the work coordinates [mm]; None: only at the start, after a tool change,
-        and after a move of Z in machine coordinates.
     axes : tuple of bool
         Axes that a ``G52`` names.
     """
 
-    safe_z: float | None = None
     axes: tuple[bool, bool, bool] = (True, True, True)
     _up: bool = field(default=True, init=False)
-    _written: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+    _begun: bool = field(default=False, init=False)
+    _cycling: bool = field(default=False, init=False)
     _shift: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+
+    def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
+        """Return what keeps the correction from following the drift in a block."""
+        return "a long way between safe points"
+
+    @property
+    def leaves_mark(self) -> bool:
+        """Whether something may stay in the controller if the program is aborted."""
+        return self._begun
 
     @property
     def leaves_offset(self) -> bool:
         """Whether an offset is in force that the program has to take back."""
-        return any(self._written)
+        return self._begun and any(self._shift)
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
         refuse_probing(block)
@@ -48,7 +54,11 @@ class Offset(Method):
         before: tuple[str, ...] = ()
         if self._safe(block):
             before = self._update(block, frame, demand)
-        elif block.ends and any(self._written):
+        elif block.ends and self._begun:
+            if block.modal.cutter:
+                raise ProgramError(
+                    block.line.number, "the program ends under cutter radius compensation; write G40 before"
+                )
             before = self._update(block, frame, (0.0, 0.0, 0.0))
         self._carry(block, frame)
         self._look_up(block)
@@ -60,8 +70,10 @@ class Offset(Method):
         modal = block.modal
         return (
             self._up
-            and block.kind == "line"
-            and modal.motion == "G0"
+            and (
+                (block.kind == "line" and modal.motion == "G0")
+                or (block.kind == "cycle" and modal.retract_stated and not self._cycling)
+            )
             and modal.absolute
             and not modal.cutter
             and not block.line.optional
@@ -76,7 +88,9 @@ class Offset(Method):
             rapid = all(m.rapid for m in block.moves)
             high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
             level = block.end[2] == block.start[2]
-            self._up = rapid and not block.line.optional and (high or (self._up and level))
+            self._up = rapid and ((high and not block.line.optional) or (self._up and level))
+        if block.moves:
+            self._cycling = block.kind == "cycle"
 
     # -- what --------------------------------------------------------------------------------------------------------
 
@@ -86,10 +100,11 @@ class Offset(Method):
                 block.line.number, "the coordinates are rotated: X and Y are shifted by --method coordinates only"
             )
         words = frame.words(demand)
-        if words == self._written and frame.shift(words) == self._shift:
+        if not any(self.axes) or (self._begun and frame.shift(words) == self._shift):
             return ()
-        self._written, self._shift = words, frame.shift(words)
-        text = "G52" + "".join(
+        # the first one is written even if it is zero: an aborted run may have left another one in force
+        self._begun, self._shift = True, frame.shift(words)
+        text = "G90 G52" + "".join(
             f" {letter}{number(w, frame.digits)}" for letter, w, on in zip(AXES, words, self.axes, strict=True) if on
         )
         return (text + ending(block.line.text),)

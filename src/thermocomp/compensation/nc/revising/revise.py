@@ -5,6 +5,7 @@ whole (`Revision`) grows with it.
 """
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -20,11 +21,16 @@ from thermocomp.compensation.nc.revising.demand import Demand, Drifting, Left
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
+from thermocomp.compensation.nc.revising.way import at, length
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
 from thermocomp.core.exceptions import ProgramError
 
 #: lines by which the control is recognised that a program is for
 FIRST = 200
+#: how often a cut is looked at: in time [s], and along the way where the drift depends on the place [mm]
+OFTEN = 20.0
+DENSE = 20.0
+MOST_PIECES = 1000
 
 
 class Revised(NamedTuple):
@@ -66,6 +72,10 @@ class Revision:
         When [s].
     slowest, fastest : float
         Spindle speeds met [1/min].
+    held : dict of str to (float, int)
+        What kept a correction from following the drift in a cut, by how much at most [um], and in which line.
+    idle : int
+        Lines behind the end of the program that have words: nothing is corrected there.
     """
 
     setup: Setup
@@ -80,6 +90,9 @@ class Revision:
     tool_changes: list[float] = field(default_factory=list, init=False)
     slowest: float = field(default=float("inf"), init=False)
     fastest: float = field(default=0.0, init=False)
+    held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
+    idle: int = field(default=0, init=False)
+    _touching: bool = field(default=False, init=False)
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
@@ -106,7 +119,7 @@ class Revision:
         recognise(first)
         lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
         check = Check(self.setup)
-        steered = _Spindle(self.setup)
+        steered, known = _Spindle(self.setup), _Places(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -116,19 +129,27 @@ class Revision:
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
                 headed = True
-            self._advance(end - self.seconds, steered.speed(block))
+            if self.drift.by_position:
+                known.check(block)
+            cutting = self._cuts(block)
+            samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
             self.seconds = end
             if block.tool_change is not None:
                 self.tool_changes.append(start)
-            before = deviation, carried
+            before = carried
             if block.moves:
                 point = block.moves[-1].end
             deviation = self.drift.deviation(point)
-            change = self.method.revise(block, self.demand.at(end, self.drift, point))
+            demand = self.demand.at(end, self.drift, point)
+            change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
-            if block.moves:
-                self.left.take(block, (before, (deviation, carried)))
+            if cutting:
+                samples.append((1.0, deviation))
+                ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
+                self.left.take(line.number, _beside(samples, *ends))
+                self._note_held(block, demand, ends[1])
+            self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
                 Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner)
@@ -137,12 +158,6 @@ class Revision:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
         if not ended and any(carried):
             self._refuse_open()
-        for line in lines:
-            yield self._told(
-                Revised(
-                    line.number, line.text, (line.text,), None, self.seconds, self.seconds, deviation, carried, carried
-                )
-            )
 
     def _guarded(self, lines: Iterable[Line]) -> Iterator[Line]:
         for line in lines:
@@ -158,12 +173,47 @@ class Revision:
         self.changed += revised.texts != (revised.text,)
         return revised
 
-    def _advance(self, dt: float, speed: float) -> None:
-        if dt > 0:
-            self.drift.advance(dt, speed)
-            if speed:
-                self.slowest = min(self.slowest, abs(speed))
-                self.fastest = max(self.fastest, abs(speed))
+    def _cuts(self, block: Block) -> bool:
+        """Return whether the tool may cut in a block: it moves in feed, or stands where it has cut."""
+        if block.tool_change is not None or block.kind in ("machine", "home"):
+            self._touching = False
+        elif block.moves:
+            self._touching = not block.moves[-1].rapid
+            return any(not m.rapid for m in block.moves)
+        return self._touching
+
+    def _advance(
+        self, block: Block, dt: float, speed: float, point: Point, cutting: bool
+    ) -> list[tuple[float, Vector]]:
+        """Let the time of a block pass; return share of the way and deviation where a cut is looked at."""
+        if dt > 0 and speed:
+            self.slowest = min(self.slowest, abs(speed))
+            self.fastest = max(self.fastest, abs(speed))
+        if not cutting:
+            if dt > 0:
+                self.drift.advance(dt, speed)
+            return []
+        move = block.moves[0] if len(block.moves) == 1 else None
+        pieces = math.ceil(dt / OFTEN)
+        if move is not None and self.drift.by_position:
+            pieces = max(pieces, math.ceil(length(move) / DENSE))
+        pieces = min(max(pieces, 1), MOST_PIECES)
+        samples = [(0.0, self.drift.deviation(point))]
+        for k in range(1, pieces + 1):
+            if dt > 0:
+                self.drift.advance(dt / pieces, speed)
+            if k < pieces:
+                place = point if move is None else at(move, k / pieces)
+                samples.append((k / pieces, self.drift.deviation(place)))
+        return samples
+
+    def _note_held(self, block: Block, demand: Vector, carried: Vector) -> None:
+        gap = max(abs(d - c) for d, c in zip(demand, carried, strict=True))
+        if gap <= self.demand.tolerance:
+            return
+        why = self.method.held_by(block)
+        if gap > self.held.get(why, (0.0, 0))[0]:
+            self.held[why] = gap, block.line.number
 
     def _refuse_open(self) -> None:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
@@ -199,3 +249,46 @@ class _Spindle:
                     "state the speed it finds with --speed",
                 )
         return block.speed
+
+
+@dataclass
+class _Places:
+    """Whether it is known where the tool is, for a drift that depends on it."""
+
+    setup: Setup
+    _said: set[int] = field(default_factory=set)
+    _tool: int = 0
+
+    def check(self, block: Block) -> None:
+        """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
+        if block.tool_change is not None:
+            self._tool = block.tool_change
+        if "G10" in block.codes and block.values.get("L") == 2:
+            self._said.add(int(block.values.get("P", 0)) or block.modal.system)
+        if "G43" in block.codes:
+            tool = int(block.values.get("H", self._tool))
+            if tool and tool not in self.setup.tools:
+                raise ProgramError(
+                    block.line.number,
+                    f"the drift depends on the place, and the length of tool {tool} is unknown: --tool '{tool}=120 mm'",
+                )
+        system = block.modal.system
+        if any(not m.rapid for m in block.moves) and system not in self.setup.offsets and system not in self._said:
+            raise ProgramError(
+                block.line.number,
+                f"the drift depends on the place, and where {_name(system)} begins is unknown: "
+                f"--origin '{_name(system)}=0 mm, 0 mm, 0 mm'",
+            )
+
+
+def _name(system: int) -> str:
+    if system > 100:
+        return f"G54.1 P{system - 100}"
+    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
+
+
+def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
+    """Yield deviation and the correction that is in force there: it changes evenly along a block."""
+    for share, deviation in samples:
+        x, y, z = (b + share * (a - b) for b, a in zip(before, after, strict=True))
+        yield deviation, (x, y, z)

@@ -59,12 +59,13 @@ def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: in
     """
     line = block.line
     text = line.text
-    insert = "".join(f" {letter}{number(value, digits)}" for letter, value in added.items())
-    if insert:
+    if added:
+        insert = "".join(f" {letter}{number(value, digits)}" for letter, value in added.items())
         behind = _end(line)
         text = text[:behind] + insert + text[behind:]
     changed = [(block.words[letter], shift) for letter, shift in shifts.items() if shift]
-    for word, shift in sorted(changed, key=_start, reverse=True):
+    changed.sort(key=_start, reverse=True)
+    for word, shift in changed:
         text = text[: word.start + 1] + _value(word, block.values[word.letter], shift, digits) + text[word.end :]
     return text
 
@@ -82,5 +83,5 @@ def _value(word: Word, value: float, shift: float, digits: int) -> str:
     if word.number is None:
         return f"[{word.value.strip()}{'+' if shift > 0 else ''}{number(shift, digits)}]"
     point = word.value.find(".")
-    written = 0 if point < 0 else sum(c.isdigit() for c in word.value[point:])
+    written = 0 if point < 0 else sum(map(str.isdigit, word.value[point:]))
     return number(value + shift, max(digits, written))

@@ -175,9 +175,9 @@ class _Plan:
         kinematics, codes = self.kinematics, block.codes
         before = 0.0
         halts = "S" in block.words
-        if codes:
+        if codes or not serial:
             halts = halts or not HALTS.isdisjoint(codes)
-            if "G61.1" in codes or "G61" in codes or "G64" in codes:
+            if not serial or "G61.1" in codes or "G61" in codes or "G64" in codes:
                 self._path_mode(block)
         if block.tool_change is not None:
             before += kinematics.tool_change
@@ -214,10 +214,7 @@ class _Plan:
     def _path_mode(self, block: Block) -> None:
         """Set how exact the path is from here on."""
         self._unchain()
-        self.exact = "G61.1" in block.codes
-        self.straight = block.modal.blend or 0.0
-        if self.straight and "Q" in block.values:
-            self.straight = block.values["Q"] * (25.4 if block.modal.inch else 1.0)
+        self.exact, self.straight = block.modal.exact_stop, block.modal.naive
 
     def _chain(self, serial: int, move: Move, block: Block) -> None:
         """Replace lines in feed by one, as long as it passes near enough by their ends."""

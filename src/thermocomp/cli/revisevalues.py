@@ -1,0 +1,77 @@
+"""What the texts of the options of ``thermocomp revise`` mean."""
+
+import re
+
+from thermocomp.compensation.nc.following import startup
+from thermocomp.compensation.nc.following.block import Point
+from thermocomp.compensation.nc.reading.tokens import Controller
+from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.units import measured as with_unit
+
+_SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
+
+
+def value(text: str, quantity: str, option: str, example: str) -> float:
+    """Return the value of an option in house units.
+
+    Raises
+    ------
+    InputError
+        It is no value with a unit of that quantity.
+    """
+    try:
+        number = with_unit(text, quantity)
+    except UnitError as e:
+        raise InputError(f"{option} {text!r}: {e}") from e
+    if number is None:
+        raise InputError(f'{option} {text!r}: write a value with its unit, such as "{example}"')
+    return number
+
+
+def positive(text: str, quantity: str, option: str, example: str) -> float:
+    """Return the value of an option that must be positive; see `value`."""
+    number = value(text, quantity, option, example)
+    if not number > 0:
+        raise InputError(f"{option} {text!r}: must be positive")
+    return number
+
+
+def origin_of(text: str) -> tuple[int, Point]:
+    """Return number and origin [mm] of a work coordinate system."""
+    name, _, place = text.partition("=")
+    found = _SYSTEM.fullmatch(name.strip())
+    if found is None or (found[2] and found[3] and found[2] != "1"):
+        raise InputError(f'--origin {text!r}: want a work coordinate system, such as "G54=100 mm, 50 mm, 0 mm"')
+    base, decimal, extra = int(found[1]), found[2], found[3]
+    point = point_of(place, f"--origin {text!r}")
+    if extra:  # G54.1 P3
+        return 100 + int(extra), point
+    if decimal and base != 9:
+        raise InputError(f"--origin {text!r}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
+    return (6 + int(decimal) if decimal else base - 3), point
+
+
+def point_of(text: str, said: str) -> Point:
+    """Return a point [mm]."""
+    parts = [part.strip() for part in text.split(",")]
+    if len(parts) != 3:
+        raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
+    x, y, z = (value(part, "position", said, "100 mm") for part in parts)
+    return x, y, z
+
+
+def startup_of(text: str, controller: Controller) -> str:
+    """Return codes that are in force at the start."""
+    try:
+        return startup.tidy(text, controller)
+    except InputError as e:
+        raise InputError(f"--startup {e}") from e
+
+
+def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
+    """Return number and length, or diameter, of a tool [mm]."""
+    name, _, length = (part.strip() for part in text.partition("="))
+    number = name.upper().removeprefix("T")
+    if not number.isdecimal():
+        raise InputError(f'{option} {text!r}: want the number of a tool and a length, such as "1={example}"')
+    return int(number), value(length, "position", f"{option} {text!r}", example)
