@@ -10,6 +10,7 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, Output, refuse_existing
 from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
 from thermocomp.compensation.nc.drifting.stations import Station
+from thermocomp.compensation.nc.reading.tokens import read_lines
 from thermocomp.compensation.nc.revising.revise import Revision
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
@@ -77,6 +78,8 @@ def revise(
     method = way.made(setup.controller, drift.driven)
     revision = Revision(setup, kinematics, drift, method, way.demand())
     _check_interpreter(way, controller)
+    if way.expand and controller.block_delete is None:
+        _refuse_optional(program)
     paths = reviserun.Paths.of(output, expanded=way.expand)
     given = (timing.machine, starting.carried, drifting.forecast)
     refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
@@ -114,6 +117,17 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
         said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
         found.append(f"{name} for {', '.join(said)}")
     return found
+
+
+def _refuse_optional(program: Path) -> None:
+    """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
+    with ncprogram.opened(program) as lines:
+        for line in read_lines(lines):
+            if line.optional:
+                raise InputError(
+                    f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
+                    "leaves it out; say --block-delete off or on"
+                )
 
 
 def _check_interpreter(way: Way, controller: Controller) -> None:

@@ -1,6 +1,6 @@
 """What ``thermocomp revise`` can be told, and the objects that come of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from thermocomp.cli.options import Flag, OptionalNames
-from thermocomp.cli.revisevalues import origin_of, point_of, positive, startup_of, tool_of, value
+from thermocomp.cli.revisevalues import m_code_of, origin_of, point_of, positive, startup_of, tool_of, value
 from thermocomp.compensation.nc.drifting import start
 from thermocomp.compensation.nc.drifting.drift import Drift
 from thermocomp.compensation.nc.drifting.inputs import SPEED, Signal, constants
@@ -75,8 +75,14 @@ class Drifting:
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
             raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
         signals = constants(self.constant or (), models)
+        driven = any(i.quantity == SPEED and i.name in m.sensors for m in models for i in m.inputs)
+        if not driven and self.forecast is None and any(m.sensors for m in models):
+            raise InputError(
+                "no model is driven by the spindle speed, and no --forecast tells what changes: they cannot tell what "
+                "this program does to the machine; fit one with --inputs spindle_rpm"
+            )
         if self.forecast is None:
-            return signals, []
+            return signals, _taken(signals, "held at a constant")
         read = forecasts.read(self.forecast)
         twice = sorted(set(signals) & set(read.columns))
         if twice:
@@ -84,6 +90,7 @@ class Drifting:
         wanted = {i.name for m in models for i in m.inputs}
         notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
         notes += [f"{self.forecast}: {text}" for text in read.left_out]
+        notes += _taken(signals, "held at a constant") + _taken(wanted & set(read.columns), "forecast")
         return signals | {n: Signal(*column) for n, column in read.columns.items() if n in wanted}, notes
 
     def hashes(self) -> dict[str, str]:
@@ -93,6 +100,10 @@ class Drifting:
             for path in self.model
             for m in modelfile.read(path)
         }
+
+
+def _taken(names: Iterable[str], how: str) -> list[str]:
+    return [f"{name} is {how}: that it may be otherwise is in no bound" for name in sorted(names)]
 
 
 @Parameter(name="*", group=_group("The state at the start: exactly one of cold, carried, measured", 2))
@@ -265,7 +276,10 @@ class Controller:
     least : str
         The least increment.
     block_delete : str
-        on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused.
+        on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused. With
+        --expand it has to be said: off writes them out as plain lines.
+    harmless : list of str
+        M codes of the machine's maker that move no axis, such as M88.
     """
 
     controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
@@ -278,7 +292,8 @@ class Controller:
     home: str | None = None
     integers: Literal["whole", "least", "refuse"] | None = None
     least: str = "1 um"
-    block_delete: Literal["on", "off"] = "off"
+    block_delete: Literal["on", "off"] | None = None
+    harmless: OptionalNames = None
 
     def setup(self) -> Setup:
         """Return it as the follower wants it."""
@@ -293,6 +308,7 @@ class Controller:
             integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
             least=positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",
+            harmless=frozenset(m_code_of(text) for text in self.harmless or ()),
         )
 
     def diameters(self, *, expand: bool) -> dict[int, float] | None:

@@ -211,7 +211,9 @@ def _write(
 
 
 def _row(revised: Revised, number: int, axes: Sequence[int]) -> str:
-    cells = "".join(f",{revised.deviation[k] + 0.0:.3f},{revised.carried[k] + 0.0:.4f}" for k in axes)
+    in_hole = revised.block is not None and revised.block.kind == "cycle"  # it counts, not the level where a cycle ends
+    carried = revised.inner if in_hole else revised.carried
+    cells = "".join(f",{revised.deviation[k] + 0.0:.3f},{carried[k] + 0.0:.4f}" for k in axes)
     changed = revised.texts != (revised.text,)
     return f"{revised.number},{number},{revised.start:.3f},{revised.end:.3f}{cells},{changed:d}\n"
 

@@ -68,6 +68,14 @@ def startup_of(text: str, controller: Controller) -> str:
         raise InputError(f"--startup {e}") from e
 
 
+def m_code_of(text: str) -> int:
+    """Return the number of an M code."""
+    number = text.upper().removeprefix("M")
+    if not number.isdecimal():
+        raise InputError(f"--harmless {text!r}: want an M code, such as M88")
+    return int(number)
+
+
 def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     """Return number and length, or diameter, of a tool [mm]."""
     name, _, length = (part.strip() for part in text.partition("="))

@@ -92,6 +92,7 @@ class Canon:
         self.feed = 0.0  # [mm/min]
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
         self.file = b""
+        self.files: dict[bytes, None] = {}  # that were opened
         self.hooks = Hooks()
         self.library = ctypes.PyDLL("librs274.so.0")
         self.sequence = self.library._ZN6Interp15sequence_numberEv
@@ -214,10 +215,10 @@ class Canon:
         self.tell("tooltable")
 
     def opened(self, name: bytes, mode: bytes) -> int:
-        """Tell of a file that is there, the program's own included."""
+        """Note a file that is there, the program's own included."""
         result: int = self.open_before(name, mode)
         if result and mode.startswith(b"r"):
-            self.write(f"opened {self.line} {os.path.realpath(name).decode('utf-8', 'surrogateescape')}\n")
+            self.files[os.path.realpath(name)] = None
         return result
 
     def tapped(self, line: int, x: float, y: float, z: float, scale: float) -> None:
@@ -378,6 +379,8 @@ def main() -> None:
             canon.text("error", gcode.strerror(result))
         else:
             canon.library._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+            with open(job["opened"], "wb") as file:  # noqa: PTH123
+                file.write(b"\0".join(canon.files))
             out.write("done 0\n")
 
 

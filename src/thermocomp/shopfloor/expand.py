@@ -112,10 +112,11 @@ def expand(
 ) -> Expansion:
     """Write a program out in plain lines that do the same on every machine, whatever its origins and tool lengths.
 
-    LinuxCNC's interpreter runs the program in two controllers with other origins, tool lengths, homes, parameters and
-    another start, and what both runs have in common is written. Then program and result are run in two more such
-    controllers and have to make the same moves within 1e-6 mm, with the same feeds, spindle, coolant, stops and tools,
-    and to leave the same origins behind. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are left out.
+    LinuxCNC's interpreter runs the program in two controllers with other origins, tool lengths, homes, parameters,
+    another tool in the spindle and another start, and what both runs have in common is written. Then program and result
+    are run in two more such controllers and have to make the same moves within 1e-6 mm, with the same feeds, spindle,
+    coolant, stops and tools, and to leave the same origins behind. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are left
+    out.
 
     Parameters
     ----------
@@ -145,7 +146,8 @@ def expand(
     Raises
     ------
     ProgramError
-        The program does something that depends on what is stored in the machine, or that has no plain words.
+        The program does something that depends on what is stored in the machine, or that has no plain words; a file
+        that was run has M19.
     InputError
         `out` exists already, or the program is not there.
     """

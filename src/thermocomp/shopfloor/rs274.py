@@ -6,6 +6,7 @@ with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
 
 import json
 import math
+import os
 import subprocess
 import tempfile
 from collections.abc import Generator, Iterator, Mapping, Sequence
@@ -232,7 +233,7 @@ def read(
     left : dict, optional
         Filled at the end with the parameters the controller would have stored afterwards.
     opened : set, optional
-        Filled with the files the interpreter opens: the program, and those of subprograms.
+        Filled at the end with the files the interpreter has opened: the program, and those of subprograms.
 
     Yields
     ------
@@ -266,10 +267,13 @@ def read(
                 encoding="utf-8",
             )
         try:
-            yield from _calls(process, folder, seconds, set() if opened is None else opened)
+            yield from _calls(process, folder, seconds)
         finally:
             process.kill()  # does nothing if it has ended
             process.communicate()
+        if opened is not None:
+            names = map(os.fsdecode, (folder / "opened").read_bytes().split(b"\0"))
+            opened.update(file for file in map(Path, names) if not file.is_relative_to(folder.resolve()))
         if left is not None:
             rows = (row.split() for row in (folder / "parameters").read_text(encoding="ascii").splitlines())
             left.update({int(row[0]): float(row[1]) for row in rows if len(row) == 2})
@@ -295,6 +299,7 @@ def _job(folder: Path, path: Path, stored: Stored, inch: bool, subroutines: Sequ
         "ini": str(folder / "ini"),
         "parameters": str(folder / "parameters"),
         "table": str(folder / "table"),
+        "opened": str(folder / "opened"),
         "tools": tools,
         "spindle": stored.spindle,
         "units": f"G21 G90 G17 G40 G49 G80 G94 {stored.startup}{start}",
@@ -303,7 +308,7 @@ def _job(folder: Path, path: Path, stored: Stored, inch: bool, subroutines: Sequ
     }
 
 
-def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int, opened: set[Path]) -> Iterator[Canonical]:
+def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int) -> Iterator[Canonical]:
     """Read what the child writes."""
     assert process.stdout is not None
     frame, plane, line, file, done = Frame(), 17, 0, "", False
@@ -330,9 +335,6 @@ def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int, opened:
             yield Canonical(kind, line, file, *nowhere, None, (), rest)
         elif kind == "file":
             file = Path(rest).name if rest else ""
-        elif kind == "opened":
-            if not Path(rest).is_relative_to(folder.resolve()):
-                opened.add(Path(rest))
         elif kind == "error":
             where = f" (in {file})" if file else ""
             raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {rest}")

@@ -8,8 +8,13 @@ import pytest
 
 from nc_law import STATED, Growing, Trial, revise
 from thermocomp.compensation.nc.following.block import Move, Point, Setup
+from thermocomp.compensation.nc.revising.coordinates import Coordinates
+from thermocomp.compensation.nc.revising.demand import Demand
 from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.compensation.nc.revising.revise import Revision
+from thermocomp.compensation.nc.revising.text import DIGITS
 from thermocomp.compensation.nc.revising.way import at, length
+from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.core.exceptions import ProgramError
 
 BEGIN = "G21 G90 G17 G94\nS3000 M3 F300\nG0 X0 Y0 Z10\n"
@@ -148,3 +153,35 @@ def test_along_an_arc() -> None:
     full = Move(False, (10.0, 0.0, 0.0), (10.0, 0.0, 0.0), Arc(17, (0.0, 0.0), True, 1))
     assert length(full) == pytest.approx(20 * math.pi)
     assert at(full, 0.25) == pytest.approx((0.0, -10.0, 0.0))
+
+
+class Fixed(Growing):
+    """A drift of Z that is there at once."""
+
+    def __init__(self, z: float) -> None:
+        super().__init__()
+        self.z = z
+
+    def deviation(self, point: Point) -> Vector:
+        return 0.0, 0.0, self.z
+
+
+@pytest.mark.parametrize("shift", [22.1, 0.1, 3.3, 12.7, -5.1, 31.9, 17.0, 8.2])
+@pytest.mark.parametrize("hole", ["Z-22 R2 Q4", "Z-18. R2. Q5.", "Z-6 R1 Q0.7", "Z-20.2 R0.4 Q2.06"])
+def test_a_shift_does_not_make_another_peck(hole: str, shift: float, tmp_path: Path) -> None:
+    """Where Q divides the depth, rounded numbers may leave a rest of 1e-15 mm, which is a peck."""
+    trial = tried(tmp_path, f"G98 G83 X1 {hole}\nX2\nG80\nG0 Z10\n", Fixed(-shift))
+    trial.proved()
+    row = trial.rows[4]
+    assert row.inner[2] == pytest.approx(shift, abs=2.0)
+
+
+def test_a_least_increment_coarser_than_the_step_is_used(tmp_path: Path) -> None:
+    """Four decimals of an inch are 2.5 um; a step of 1 um must not hold the correction for ever."""
+    path = tmp_path / "program.ngc"
+    path.write_text("G20 G90 G17 G94\nS3000 M3 F12.\nG0 X0. Y0. Z.4\nG1 Z-.04\n" + "X8.\nX0.\n" * 9 + "G0 Z.4\nM30\n")
+    setup = Setup(controller="fanuc", inch=False, speed=3000.0, integers="refuse")
+    run = Revision(setup, Kinematics(), Ending(), Coordinates(DIGITS["fanuc"], 1.0), Demand(1.0))
+    with path.open(newline="") as file:
+        list(run.revise(file))
+    assert run.left.most[2] < 5.0

@@ -237,7 +237,7 @@ def test_codes_of_the_maker_that_move_nothing(controller: str) -> None:
     assert blocks[1].codes == ("M88", "M101")
     assert blocks[4].tool_change == 1  # what is known stays what it is
     for text in ("M89", "M88 R1", "M188"):
-        with pytest.raises(ProgramError, match="harmless M|no code that uses it"):
+        with pytest.raises(ProgramError, match=r"harmless M|no code that uses it"):
             run(text, setup)
 
 

@@ -47,7 +47,7 @@ class Modal:
     naive : float
         G64 Q, or P without it: how far points may be off a line that replaces their lines [mm]; 0: none is replaced.
     exact_stop : bool
-        G61.1: the axes stop at the end of every move.
+        G61.1, or G61 of a Fanuc: the axes stop at the end of every move.
     """
 
     motion: str = ""
@@ -123,8 +123,9 @@ class Block:
         Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
-        `end` would not move it. False at the start of the program, after G53, G28, G30, M6, after a change
-        of the coordinate system or of the tool length that the file does not tell, and after an optional line that moved it.
+        `end` would not move it. False at the start of the program, after G53, G28, G30 and M6, after a
+        change of the coordinate system or of the tool length that the file does not tell, and after an optional line
+        that moved it.
     moves : list of Move
     feed : float
         F in force, in mm per minute, mm per turn or 1/min, according to ``modal.feed_mode``.

@@ -84,10 +84,10 @@ class Follower:
         if line.error:
             raise ProgramError(line.number, line.error)
         if line.flow:
-            remedy = "write them out in the CAM system" if self.state.fanuc else "--expand lets the interpreter unroll them"
-            raise ProgramError(
-                line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}"
+            remedy = (
+                "write them out in the CAM system" if self.state.fanuc else "--expand lets the interpreter unroll them"
             )
+            raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         orders = self._reader.read(line)
@@ -170,20 +170,7 @@ class Follower:
             self._once(orders, block, once)
         if code:
             self._move(orders, block, code)
-        if groups.get("motion") == "G80":
-            state.sticky = {}
-            state.level = None
-            if not state.fanuc:
-                state.moves_by("")
-            elif state.modal.motion in CYCLES:  # these are a group of their own there
-                state.moves_by(state.under)
-            block.modal = state.modal
-        else:
-            block.modal = state.modal
-            if code in _CURVES:
-                state.moves_by("")
-            elif code == "G31":  # holds for its line only
-                state.moves_by(before.motion)
+        self._after(groups, block, code, before.motion)
         if state.lathe and not all(move.rapid for move in block.moves):
             raise setting.lathe(orders, f"{state.lathe} before, and no M6")
         block.end = state.place
@@ -196,23 +183,39 @@ class Follower:
             block.ends = self._ended = stop in ("M2", "M30")
         return block
 
+    def _after(self, groups: dict[str, str], block: Block, code: str, before: str) -> None:
+        """Put the motion code in force that holds behind the line; `before` was in force before it."""
+        state = self.state
+        block.modal = state.modal
+        if groups.get("motion") == "G80":
+            state.sticky = {}
+            state.level = None
+            if not state.fanuc:
+                state.moves_by("")
+            elif state.modal.motion in CYCLES:  # these are a group of their own there
+                state.moves_by(state.under)
+            block.modal = state.modal
+        elif code in _CURVES:
+            state.moves_by("")
+        elif code == "G31":  # holds for its line only
+            state.moves_by(before)
+
     def _motion(self, orders: Orders) -> str:
         """Return the motion code that this line runs; empty if it makes no move of its own."""
         groups, values = orders.groups, orders.values
         told = groups.get("motion")
         once = groups.get("once")
-        if once is None and "tool length" not in groups:
+        smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
+        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros say which are smoothed
+            raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
+        if once is None and not smoothed and "tool length" not in groups:
             if told == "G80":
                 if not _AXIS_LETTERS.isdisjoint(values):
                     raise orders.error("axis words beside G80; write the motion code they are for")
                 return ""
             if told is not None:
                 return told
-        if self.state.fanuc and "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values):
-            if told or any(values.get(letter) for letter in _AXIS_LETTERS):
-                raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
-            return ""  # X0 Y0 Z0: these axes are smoothed
-        takes = once in TAKES_AXES or groups.get("tool length") == "G43.1"
+        takes = smoothed or once in TAKES_AXES or groups.get("tool length") == "G43.1"
         if once == "G4" and self.state.fanuc:
             takes = True
         if takes:
@@ -261,8 +264,6 @@ class Follower:
         state = self.state
         again = state.modal.motion == code
         if not again:
-            if state.modal.motion not in CYCLES:
-                state.under = state.modal.motion
             state.moves_by(code)
         if code not in CYCLES:
             if state.level is not None:

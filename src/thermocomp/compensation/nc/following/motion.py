@@ -232,13 +232,7 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
         _refuse_from_r(start[across], state.level, state.sticky["R"] * scale, orders)
-    for letter in "KL" if state.fanuc else "":
-        if values.get(letter) == 0.0:
-            raise orders.error(
-                f"{letter}0 stores the words of {code} and drills no hole here, which is not followed; remove the line "
-                f"and write {code} with all its words on the line of its first hole"
-            )
-    repeats = orders.whole("K" if state.fanuc and "K" in values else "L", least=1) or 1
+    repeats = _repeats(state, orders, code)
     x, y, z = (v / scale for v in start)
     run = Cycle(
         code,
@@ -273,6 +267,16 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     state.place, state.machine = start, at
     certain = modal.retract_stated or not modal.absolute or state.sticky["R"] >= state.level / scale
     state.known = mark(known, {across: 0.0}, to=certain and (at_r or state.level_known))
+
+
+def _repeats(state: State, orders: Orders, code: str) -> int:
+    for letter in "KL" if state.fanuc else "":
+        if orders.values.get(letter) == 0.0:
+            raise orders.error(
+                f"{letter}0 stores the words of {code} and drills no hole here, which is not followed; remove the line "
+                f"and write {code} with all its words on the line of its first hole"
+            )
+    return orders.whole("K" if state.fanuc and "K" in orders.values else "L", least=1) or 1
 
 
 def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:

@@ -37,8 +37,9 @@ def mark(known: Known, axes: Mapping[int, object], to: bool) -> Known:
 class Offsets:
     """The offsets in force, and per axis whether they are certain.
 
-    An offset that stood at the controller before the program started is not; nor is what the setup says of it; what the program states is.
-    After a change, a program coordinate is only known if the offset was certain before it and after it.
+    An offset that stood at the controller before the program started is not, nor is what the setup says of it; what the
+    program states is. After a change, a program coordinate is only known if the offset was certain before it and after
+    it.
 
     Parameters
     ----------

@@ -22,9 +22,13 @@ def lengths(state: State, orders: Orders) -> None:
     """Give lengths without a decimal point the value they have at this control."""
     if orders.groups.get("once") == "G4":
         return
-    setup, inch, none = state.setup, state.modal.inch, ""
-    if state.fanuc:  # K repeats a cycle; Q is a length in cycles, and a number elsewhere
-        none = "K" if orders.groups.get("motion", state.modal.motion) in CYCLES else "Q"
+    setup, inch, groups = state.setup, state.modal.inch, orders.groups
+    motion = groups.get("motion", state.modal.motion)
+    none = ""  # letters that count here: K repeats a Fanuc's cycle, Q is a number but in cycles, splines and G64
+    if "high speed" in groups or not (motion in CYCLES or motion == "G5" or "path" in groups):
+        none = "Q"
+    elif state.fanuc and motion in CYCLES:
+        none = "K"
     for letter, word in orders.words.items():
         if letter not in LENGTHS or letter in none or word.number is None or "." in word.value or not word.number:
             continue
@@ -187,7 +191,11 @@ def _modal_codes(state: State, orders: Orders) -> None:
         exact = groups["path"] == "G61" or (groups["path"] == "G61.1" and not state.fanuc)
         blend = 0.0 if exact else orders.values.get("P", 0.0) * state.scale
         naive = orders.values.get("Q", 0.0) * state.scale if blend and "Q" in orders.values else blend
-        fields |= {"blend": None if exact else blend, "naive": naive, "exact_stop": exact and (groups["path"] == "G61.1" or state.fanuc)}
+        fields |= {
+            "blend": None if exact else blend,
+            "naive": naive,
+            "exact_stop": exact and (groups["path"] == "G61.1" or state.fanuc),
+        }
     if "distance" in groups:
         fields["absolute"] = groups["distance"] == "G90"
     if "arc distance" in groups:

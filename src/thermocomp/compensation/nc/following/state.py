@@ -7,7 +7,7 @@ from typing import Final
 from thermocomp.compensation.nc.following import startup
 from thermocomp.compensation.nc.following.arcs import length
 from thermocomp.compensation.nc.following.block import Arc, Known, Modal, Move, Point, Setup
-from thermocomp.compensation.nc.following.codes import ROTARY
+from thermocomp.compensation.nc.following.codes import CYCLES, ROTARY
 from thermocomp.compensation.nc.following.offsets import Offsets
 from thermocomp.compensation.nc.following.orders import Orders
 
@@ -70,6 +70,8 @@ class State:
         """Put a motion code in force; snapshots of before are used again."""
         if motion == self.modal.motion:
             return
+        if motion in CYCLES and self.modal.motion not in CYCLES:
+            self.under = self.modal.motion
         self._variants[self.modal.motion] = self.modal
         known = self._variants.get(motion)
         if known is None:

@@ -19,7 +19,7 @@ from thermocomp.compensation.nc.following.block import Block
 from thermocomp.compensation.nc.revising.contact import CLEAR, Contact
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
 from thermocomp.compensation.nc.revising.method import AXES, PLANES, Method, refuse_probing
-from thermocomp.compensation.nc.revising.text import shifted
+from thermocomp.compensation.nc.revising.text import number, shifted, written
 from thermocomp.core.exceptions import ProgramError
 
 #: motions that take a word they did not have
@@ -91,7 +91,7 @@ class Coordinates(Method):
         named = self.named(block)
         goal = frame.words(demand)
         if goal != old or frame.turned:
-            goal = frame.words(self._limited(block, demand))
+            goal = frame.words(self._limited(block, frame, demand))
         holds = self._holds(block, frame)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
         if block.line.optional:
@@ -175,6 +175,8 @@ class Coordinates(Method):
         if not (self.fixed[axis] or self.doubtful[axis]) and (near or unsaid):
             # which level is the higher one must not change, nor what the axis carries at either
             goal = frame.words(self.carried)[axis]
+        if block.modal.motion in ("G73", "G83"):
+            goal = _same_pecks(block, words[0], goal, frame.digits)
         if goal != self._cycle or all(word in block.words for word in words):
             added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal
@@ -236,7 +238,7 @@ class Coordinates(Method):
             return self.helix and (AXES[first] in block.words or AXES[second] in block.words)
         return block.kind == "line" and modal.motion in PLAIN and bool(named)
 
-    def _limited(self, block: Block, demand: Vector) -> Vector:
+    def _limited(self, block: Block, frame: Frame, demand: Vector) -> Vector:
         """Return the demand, or what a cut may take of it, spread over the block."""
         out = []
         for i in range(3):
@@ -244,7 +246,9 @@ class Coordinates(Method):
             if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self._known[i] or self.contact.touching):
                 out.append(demand[i])
             else:
-                out.append(self.carried[i] + math.copysign(most, gap))
+                # where a least increment is coarser than the step, nothing smaller can be written
+                least = 10.0**-frame.digits / frame.scale[i]
+                out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
         return out[0], out[1], out[2]
 
     def _take(self, frame: Frame, old: Vector, new: list[float]) -> None:
@@ -256,3 +260,31 @@ class Coordinates(Method):
         else:
             x, y, z = (m if n != o else c for m, n, o, c in zip(moved, new, old, self.carried, strict=True))
             self.carried = (x, y, z)
+
+
+def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:
+    """Return the nearest shift with which a cycle pecks as often as without it.
+
+    Where Q divides the depth, the rounding of numbers decides whether there is one more.
+    """
+    feed = block.sticky["Q"]
+
+    def pecks(by: float) -> int:
+        levels = []
+        for letter in ("R", depth):
+            value, word = block.sticky[letter], block.words.get(letter)
+            plain = word is not None and word.number is not None
+            text = written(word, value, by, digits) if word and plain else number(value + by, digits)
+            levels.append(float(text) if by else value)
+        plane, bottom = levels
+        count, plane = 0, plane - feed
+        while plane > bottom:
+            count, plane = count + 1, plane - feed
+        return count
+
+    wanted, least = pecks(0.0), 10.0**-digits
+    for k in sorted(range(-20, 21), key=abs):
+        near = round(shift + k * least, digits)
+        if pecks(near) == wanted:
+            return near
+    return shift

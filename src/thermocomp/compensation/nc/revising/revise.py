@@ -8,6 +8,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from operator import sub
 from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Point, Setup
@@ -208,7 +209,7 @@ class Revision:
         return samples
 
     def _note_held(self, block: Block, demand: Vector, carried: Vector) -> None:
-        gap = max(abs(d - c) for d, c in zip(demand, carried, strict=True))
+        gap = max(map(abs, map(sub, demand, carried)))
         if gap <= self.demand.tolerance:
             return
         why = self.method.held_by(block)
@@ -289,6 +290,10 @@ def _name(system: int) -> str:
 
 def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
     """Yield deviation and the correction that is in force there: it changes evenly along a block."""
+    if before == after:
+        for _, deviation in samples:
+            yield deviation, after
+        return
     for share, deviation in samples:
         x, y, z = (b + share * (a - b) for b, a in zip(before, after, strict=True))
         yield deviation, (x, y, z)

@@ -66,7 +66,7 @@ def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: in
     changed = [(block.words[letter], shift) for letter, shift in shifts.items() if shift]
     changed.sort(key=_start, reverse=True)
     for word, shift in changed:
-        text = text[: word.start + 1] + _value(word, block.values[word.letter], shift, digits) + text[word.end :]
+        text = text[: word.start + 1] + written(word, block.values[word.letter], shift, digits) + text[word.end :]
     return text
 
 
@@ -79,9 +79,19 @@ def _end(line: Line) -> int:
     return max(word.end for word in line.words)
 
 
-def _value(word: Word, value: float, shift: float, digits: int) -> str:
+def written(word: Word, value: float, shift: float, digits: int) -> str:
+    """Return the text of a shifted value.
+
+    Parameters
+    ----------
+    word : Word
+    value, shift : float
+        In the program's units.
+    digits : int
+        Decimals at least; a word that has more keeps them.
+    """
     if word.number is None:
         return f"[{word.value.strip()}{'+' if shift > 0 else ''}{number(shift, digits)}]"
     point = word.value.find(".")
-    written = 0 if point < 0 else sum(map(str.isdigit, word.value[point:]))
-    return number(value + shift, max(digits, written))
+    decimals = 0 if point < 0 else sum(map(str.isdigit, word.value[point:]))
+    return number(value + shift, max(digits, decimals))
