@@ -92,7 +92,7 @@ def operations() -> Iterator[str]:
 
 
 def revise(program: Path, interpreter: str) -> dict[str, float]:
-    """Revise a program by the command; times in microseconds per line, memory in MB."""
+    """Revise a program by the command; times in us per line, of the processor for all it does, memory in MB."""
     sys.modules["matplotlib"] = None  # type: ignore[assignment]
     from thermocomp.cli.app import run
     from thermocomp.core.lineardynamic import LinearDynamic
@@ -117,6 +117,7 @@ def revise(program: Path, interpreter: str) -> dict[str, float]:
     folder = program.parent
     modelfile.write(models, folder / "model.json", overwrite=True)
     told = StringIO()
+    begin = time.process_time()
     options = ["--model", str(folder / "model.json"), "--cold", "--interpreter", interpreter, "--json", "--overwrite"]
     with redirect_stdout(told):
         if run(["revise", str(program), *options, "-o", str(folder / "revised.ngc")]):
@@ -126,6 +127,7 @@ def revise(program: Path, interpreter: str) -> dict[str, float]:
         "lines": found["lines"],
         "changed": found["changed"],
         "revising": found["us_per_line"],
+        "processor": 1e6 * (time.process_time() - begin) / found["lines"],
         "proving": 1e6 * found["proving_s"] / found["lines"],
         "moves": found["proof"]["moves"] if found["proof"] else 0,
         "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
@@ -138,7 +140,7 @@ def revisions() -> bool:
 
     jobs = [(size, "off") for size in SIZES] + ([(PROVED, "required")] if installed() is None else [])
     memory: dict[tuple[int, str], float] = {}
-    print(f"{'revise':<32} {'lines':>9} {'us/line':>8} {'changed':>9} {'proof us/line':>14} {'MB':>5}")
+    print(f"{'revise':<32} {'lines':>9} {'us/line':>8} {'CPU':>6} {'changed':>9} {'proof us/line':>14} {'MB':>5}")
     with tempfile.TemporaryDirectory() as folder:
         for size, interpreter in jobs:
             program = Path(folder, "program.ngc")
@@ -151,8 +153,8 @@ def revisions() -> bool:
             if interpreter == "required":
                 title, proof = "the same, proved by LinuxCNC", f"{found['proving']:.1f}"
             print(
-                f"{title:<32} {found['lines']:>9.0f} {found['revising']:>8.1f} {found['changed']:>9.0f} {proof:>14} "
-                f"{found['memory']:>5.0f}",
+                f"{title:<32} {found['lines']:>9.0f} {found['revising']:>8.1f} {found['processor']:>6.1f} {found['changed']:>9.0f} "
+                f"{proof:>14} {found['memory']:>5.0f}",
                 flush=True,
             )
     ratio = memory[SIZES[-1], "off"] / memory[SIZES[-2], "off"]

@@ -156,12 +156,58 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
     found = start.measured(stations, start.deviations(texts), {})
     drift = Drift(stations, found, zero="cold")
     assert drift.deviation((0.0, 0.0, 100.0)) == pytest.approx((3.0, 0.0, 4.5), abs=1e-6)
+    assert found.assumed == ()
     for wrong, says in [
-        ({"X": 3.0}, "that of Z at Z 0 mm is missing; give z_at_0=VALUEum"),
-        ({"X": 3.0, "Z": 4.0}, "no measured axis or target 'Z'"),
+        ({"X": 3.0}, "that of Z is missing; give Z=VALUEum"),
+        ({"X": 3.0, "Y": 4.0}, "no measured axis or target 'Y'"),
+        ({"X": 3.0, "Z": 4.0, "z_at_200": 5.0}, "Z and z_at_200 are given; take one of them away"),
+        ({"X": 3.0, "Z": 50.0}, r"Z \(the mean of 2 models\): 50 um; no speed from 0 to 6000 1/min leaves it"),
     ]:
         with pytest.raises(InputError, match=says):
             start.measured(stations, wrong, {})
+    three = [*stations, Station("Z", lags("z_at_400_um"), "Z", 400.0)]
+    with pytest.raises(InputError, match="that of Z at Z 400 mm is missing; give z_at_400=VALUEum"):
+        start.measured(three, {"X": 3.0, "z_at_0": 4.0, "z_at_200": 5.0}, {})
+
+
+@pytest.mark.parametrize("other", [lags, ticking])
+def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., ErrorModel]) -> None:
+    stations = [Station("Z", lags("z_at_0_um"), "Z", 0.0), Station("Z", other("z_at_600_um", 0.4), "Z", 600.0)]
+    whole = start.measured(stations, {"Z": 7.0}, {})
+    low, high = (float(s.deviation) for s in whole.states)
+    assert 0.5 * (low + high) == pytest.approx(7.0, abs=1e-6)
+    assert 0 < high < low
+    (said,) = whole.assumed
+    assert "Z was measured once" in said
+    assert "the mean of its 2 models is 7 um" in said
+    # one station tells the same speed, and so the same of the other
+    for name, value, told in [("z_at_0", low, 1), ("z_at_600_um", high, 0)]:
+        found = start.measured(stations, {name: value}, {})
+        assert float(found.states[told].deviation) == pytest.approx((low, high)[told], abs=1e-5)
+        assert f"at that speed {name} is {value:g} um" in found.assumed[0]
+    both = Drift(stations, start.measured(stations, {"z_at_0": low, "z_at_600": high}, {}), zero="cold")
+    mine = Drift(stations, whole, zero="cold")
+    assert mine.assumed == whole.assumed
+    both.advance(300.0, 3000.0)
+    mine.advance(300.0, 3000.0)
+    mine.state()
+    both.state()
+    assert mine.values == pytest.approx(both.values, abs=1e-5)
+
+
+def test_stations_that_are_proportional_stay_so() -> None:
+    stations = [Station("Z", lags("a_um", -1.0), "Z", 0.0), Station("Z", lags("b_um", -3.0), "Z", 600.0)]
+    one_of_them, other = start.measured(stations, {"Z": -12.0}, {}).states
+    assert float(one_of_them.deviation) == pytest.approx(-6.0, abs=1e-6)
+    assert float(other.deviation) == pytest.approx(-18.0, abs=1e-6)
+
+
+def test_a_station_without_memory_or_speed_cannot_be_fixed_by_another() -> None:
+    stations = [Station("Z", lags("a_um"), "Z", 0.0), Station("Z", static("b_um"), "Z", 600.0)]
+    with pytest.raises(InputError, match="model of b_um has no memory"):
+        start.measured(stations, {"Z": 2.0}, {})
+    with pytest.raises(InputError, match="model of b_um has no memory"):
+        start.measured(stations, {"a": 2.0}, {})
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,8 @@ class Drift:
     ----------
     time : float
         Since the start of the program, up to the last step of the models [s].
+    assumed : tuple of str
+        What the start has made of one measurement for several stations.
     beyond : dict of str to float
         Per axis, how far the positions asked for were beyond its outermost station, at most [mm].
 
@@ -86,6 +88,7 @@ class Drift:
             raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
         self.stations = tuple(stations)
         self.step = step
+        self.assumed = start.assumed
         self.beyond: dict[str, float] = {}
         self._others = dict(others or {})
         self._wiring = [Wiring(s.model, self._others) for s in stations]

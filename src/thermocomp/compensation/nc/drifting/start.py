@@ -21,6 +21,8 @@ from thermocomp.core.units import measured as with_unit
 _TRIED = 129
 #: how well it explains it [um]
 _CLOSE = 1e-9
+#: an autoregressive model has settled after that [s]
+_LONG = 2 * 86400.0
 
 
 class Start(NamedTuple):
@@ -32,6 +34,7 @@ class Start(NamedTuple):
     zeros: tuple[float, ...] | None = None  #: deviation that counted as zero in the last job, per station [um]
     zero_known: bool = False  #: that one was no prediction
     doubts: tuple[float, ...] | None = None  #: what the last job widened the bound by, per station [um]
+    assumed: tuple[str, ...] = ()  #: what was made of one measurement for several stations
 
 
 def cold(stations: Sequence[Station], others: Inputs) -> Start:
@@ -98,13 +101,14 @@ def measured(stations: Sequence[Station], deviations: Mapping[str, float], other
 
     An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
     that constant spindle speed, the least one in the trained range, at which the deviation is the measured one as soon
-    as the spindle stops.
+    as the spindle stops. One measurement fixes all stations of an axis: each gets the state of the one speed at which
+    the mean over them, or that of the one station that was measured, is the measured deviation.
 
     Parameters
     ----------
     stations : sequence of Station
     deviations : mapping of str to float
-        By axis, or by target where an axis has several stations; counted from the cold machine [um].
+        By axis, or by target: that of one station of an axis or of each; counted from the cold machine [um].
     others : mapping of str to Signal
         Inputs that the program does not tell.
 
@@ -115,25 +119,40 @@ def measured(stations: Sequence[Station], deviations: Mapping[str, float], other
     Raises
     ------
     InputError
-        A deviation is missing or belongs to no station; a model has no memory, or no speed in its trained range leaves
-        the measured deviation.
+        A deviation is missing, belongs to no station or to one that has another already; a model has no memory, or no
+        speed in its trained range leaves the measured deviation.
     """
-    wanted = [next((n for n in _names(s, stations) if n in deviations), "") for s in stations]
+    by_axis = {a: [s for s in stations if s.axis == a] for a in dict.fromkeys(s.axis for s in stations)}
+    known = [n for a, mine in by_axis.items() for n in (a, *(_names(s)[0] for s in mine if len(mine) > 1))]
+    told = {str(s): next((n for n in _names(s) if n in deviations), "") for s in stations}
     for name in deviations:
-        if name not in wanted:
-            raise unknown("measured axis or target", name, [_names(s, stations)[0] for s in stations])
-    for name, station in zip(wanted, stations, strict=True):
-        if not name:
-            raise InputError(
-                f"measured start: that of {station} is missing; give {_names(station, stations)[0]}=VALUEum too"
-            )
-    return Start(
-        tuple(
-            _explaining(s.model, Wiring(s.model, others), deviations[name])
-            for s, name in zip(stations, wanted, strict=True)
-        ),
-        known=True,
-    )
+        if name not in by_axis and name not in told.values():
+            raise unknown("measured axis or target", name, known)
+    states, assumed = dict[str, State](), []
+    for axis, mine in by_axis.items():
+        named = [s for s in mine if told[str(s)]]
+        if axis in deviations:
+            if named:
+                raise InputError(f"measured start: {axis} and {told[str(named[0])]} are given; take one of them away")
+            parts = [(mine, mine, deviations[axis])]
+        elif len(named) == 1:
+            parts = [(mine, named, deviations[told[str(named[0])]])]
+        else:
+            parts = [([s], [s], deviations[name]) for s in mine if (name := told[str(s)])]
+        if len(named) not in (1, len(mine)) and axis not in deviations:
+            missing = next(s for s in mine if not told[str(s)])
+            what, name = (missing, _names(missing)[0]) if named else (axis, axis)
+            raise InputError(f"measured start: that of {what} is missing; give {name}=VALUEum too")
+        for group, seen, deviation in parts:
+            found, speed = _explaining(group, seen, others, deviation)
+            states |= {str(s): state for s, state in zip(group, found, strict=True)}
+            if len(group) > 1:
+                what = f"the mean of its {len(mine)} models" if seen is group else told[str(seen[0])]
+                assumed.append(
+                    f"{axis} was measured once: all its models begin where {speed:.0f} 1/min, held for long, leaves "
+                    f"them; at that speed {what} is {deviation:g} um"
+                )
+    return Start(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
 
 
 def deviations(texts: Sequence[str]) -> dict[str, float]:
@@ -215,11 +234,10 @@ def identity(model: ErrorModel) -> str:
     return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
 
 
-def _names(station: Station, stations: Sequence[Station]) -> list[str]:
-    """Return how a measured deviation may be named, the best first: by the axis where that is enough."""
-    alone = sum(s.axis == station.axis for s in stations) == 1
+def _names(station: Station) -> list[str]:
+    """Return how a measured deviation of a station may be named, the best first; its axis is another name."""
     target = station.model.target
-    return [*([station.axis] if alone else []), target.removesuffix("_um"), target]
+    return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
 
 
 def _resting(model: ErrorModel, wiring: Wiring, speed: float) -> State:
@@ -244,46 +262,69 @@ def _restored(model: ErrorModel, saved: StationState) -> State:
     raise InputError(f"the state that the last job left of {saved.station} is not complete; start cold or measured")
 
 
-def _explaining(model: ErrorModel, wiring: Wiring, deviation: float) -> State:
-    """Return a state in which the model gives a deviation, the spindle standing still."""
-    if not math.isfinite(deviation):
-        raise InputError(f"measured deviation of {model.target}: {deviation} um is not a finite number")
-    if not model.remembers:
-        raise InputError(
-            f"model of {model.target} has no memory: what it says follows from the inputs of the moment alone, it "
-            "cannot start from a measured deviation; start cold"
-        )
-    still = wiring.values(0.0, 0.0)
-    if isinstance(model, Ticking):
-        reference = model.init().reference
-        return model.begin_at(deviation, still, np.where(np.isnan(reference), still, reference))
+def _explaining(
+    stations: Sequence[Station], seen: Sequence[Station], others: Inputs, deviation: float
+) -> tuple[list[State], float]:
+    """Return states of the stations of an axis, the spindle standing still, and the speed [1/min] that leaves them.
 
-    def stopped(speed: float) -> State:
-        return model.step(_resting(model, wiring, speed), still, 0.0)[0]
+    The mean over those that were seen is the measured deviation [um].
+    """
+    what = seen[0].model.target if len(seen) == 1 else f"{seen[0].axis} (the mean of {len(seen)} models)"
+    if not math.isfinite(deviation):
+        raise InputError(f"measured deviation of {what}: {deviation} um is not a finite number")
+    for model in (s.model for s in stations):
+        if not model.remembers:
+            raise InputError(
+                f"model of {model.target} has no memory: what it says follows from the inputs of the moment alone, it "
+                "cannot start from a measured deviation; start cold"
+            )
+    wirings = {str(s): Wiring(s.model, others) for s in stations}
+    if len(stations) == 1 and isinstance(stations[0].model, Ticking):
+        return [_begun(stations[0].model, wirings[str(stations[0])], deviation)], math.nan
+    for model in (s.model for s in stations):
+        if not any(i.quantity == SPEED for i in model.inputs):
+            raise InputError(
+                f"model of {model.target} is not driven by the spindle speed: no speed explains a measured deviation; "
+                "start cold or carry the state of the last job over"
+            )
+
+    def stopped(station: Station, speed: float) -> State:
+        return _stopped(station.model, wirings[str(station)], speed)
 
     def too_much(speed: float) -> float:
-        return float(stopped(speed).deviation) - deviation
+        return sum(float(stopped(s, speed).deviation) for s in seen) / len(seen) - deviation
 
-    speeds = [i for i in model.inputs if i.quantity == SPEED]
-    if not speeds:
-        raise InputError(
-            f"model of {model.target} is not driven by the spindle speed: no speed explains a measured deviation; "
-            "start cold or carry the state of the last job over"
-        )
+    speeds = [i for s in stations for i in s.model.inputs if i.quantity == SPEED]
     low = max(*(i.reference + i.low for i in speeds), 0.0)
     high = min(i.reference + i.high for i in speeds)
     tried = np.linspace(low, max(low, high), _TRIED).tolist()
     excess = [too_much(n) for n in tried]
     for k, found in enumerate(excess):
-        if abs(found) <= _CLOSE:
-            return stopped(tried[k])
-        if k and (found > 0) != (excess[k - 1] > 0):
-            return stopped(_bisected(too_much, tried[k - 1], tried[k]))
+        exact = abs(found) <= _CLOSE
+        if exact or (k and (found > 0) != (excess[k - 1] > 0)):
+            speed = tried[k] if exact else _bisected(too_much, tried[k - 1], tried[k])
+            return [stopped(s, speed) for s in stations], speed
     reach = [e + deviation for e in excess]
     raise InputError(
-        f"measured deviation of {model.target}: {deviation:g} um; no speed from {low:g} to {high:g} 1/min leaves it: "
+        f"measured deviation of {what}: {deviation:g} um; no speed from {low:g} to {high:g} 1/min leaves it: "
         f"the model goes from {min(reach):.3g} to {max(reach):.3g} um; check sign and zero of the measurement"
     )
+
+
+def _stopped(model: ErrorModel, wiring: Wiring, speed: float) -> State:
+    """Return the state of a machine that has settled at a constant speed, as soon as the spindle stops."""
+    if isinstance(model, Ticking):
+        reference, inputs = model.init().reference, wiring.values(0.0, speed)
+        begun = model.begin_at(0.0, inputs, np.where(np.isnan(reference), inputs, reference))
+        _, settled = model.step(begun, inputs, _LONG)
+        return _begun(model, wiring, float(settled))
+    return model.step(_resting(model, wiring, speed), wiring.values(0.0, 0.0), 0.0)[0]
+
+
+def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
+    """Return the state of an autoregressive model that is told its past."""
+    still, reference = wiring.values(0.0, 0.0), model.init().reference
+    return model.begin_at(deviation, still, np.where(np.isnan(reference), still, reference))
 
 
 def _bisected(too_much: Callable[[float], float], low: float, high: float) -> float:

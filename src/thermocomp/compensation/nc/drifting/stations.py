@@ -116,7 +116,7 @@ def checked(found: Sequence[Station]) -> list[Station]:
         if len(mine) == 1 and along != {None}:
             raise InputError(
                 f"{axis} has one model at a position ({names}): with one it cannot be told how the drift varies along "
-                f"{mine[0].along}; give another one, or say {mine[0].model.target}={axis}"
+                f"{mine[0].along}; give another one, or say --axis {mine[0].model.target}={axis}"
             )
         if len(mine) > 1 and (len(along) > 1 or None in along):
             raise InputError(f"{axis} has several models, {names}: want one, or one per position along a single axis")
@@ -134,8 +134,8 @@ def _by_name(model: ErrorModel, targets: Sequence[str]) -> Station:
         if along or axis == "Z":  # x_at_200 could be a place along X as well as along Z
             return Station(axis, model, along or axis, float(at))
     raise InputError(
-        f"the name of the target {model.target!r} does not say which axis it is; say {model.target}=Z, or "
-        f'"{model.target}=Z at Z 200 mm"; targets are {", ".join(targets)}'
+        f"the name of the target {model.target!r} does not say which axis it is; say --axis "
+        f'{model.target}=Z, or --axis "{model.target}=Z at Z 200 mm"; targets are {", ".join(targets)}'
     )
 
 

@@ -56,7 +56,7 @@ def _unit_needed(state: State, orders: Orders) -> None:
         if orders.values.get(letter) and not inverse:
             raise orders.error(
                 f"{letter}{orders.words[letter].value.strip()} before G20 or G21: inches or millimetres? write G20 or "
-                "G21 on a line before it, or say which unit the control starts with"
+                "G21 on a line before it, or say which unit the control starts with (--units)"
             )
 
 
@@ -125,7 +125,7 @@ def _unit_of_feed(state: State, orders: Orders) -> None:
     if not (state.unit_told or state.fanuc or state.modal.feed_mode == 93) and orders.values.get("F"):
         raise orders.error(
             f"F on the line of {code}: LinuxCNC reads it in the unit in force before; put it on a line after {code}, "
-            "or say which unit the control starts with"
+            "or say which unit the control starts with (--units)"
         )
     state.unit_told = True
 
