@@ -153,8 +153,8 @@ def revisions() -> bool:
             if interpreter == "required":
                 title, proof = "the same, proved by LinuxCNC", f"{found['proving']:.1f}"
             print(
-                f"{title:<32} {found['lines']:>9.0f} {found['revising']:>8.1f} {found['processor']:>6.1f} {found['changed']:>9.0f} "
-                f"{proof:>14} {found['memory']:>5.0f}",
+                f"{title:<32} {found['lines']:>9.0f} {found['revising']:>8.1f} {found['processor']:>6.1f} "
+                f"{found['changed']:>9.0f} {proof:>14} {found['memory']:>5.0f}",
                 flush=True,
             )
     ratio = memory[SIZES[-1], "off"] / memory[SIZES[-2], "off"]

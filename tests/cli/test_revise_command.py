@@ -38,8 +38,27 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     assert "DO NOT REVISE AGAIN" in header[0]
     assert "2026-01-31, for linuxcnc" in header[1]
     assert any("model model.json " in line and line.endswith(" for Z)") for line in header)
-    assert any("start cold, drift counts from the start of the program" in line for line in header)
+    assert any(line.endswith(" start cold)") for line in header)
+    assert any(line.endswith(" drift counts from the start of the program)") for line in header)
     assert any("bound Z" in line and " um" in line for line in header)
+
+
+def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
+    for k, axis in enumerate("xyz"):
+        write_models([judged(lags(f"{axis}_um", 0.1 * (k + 1)))], f"{axis}.json")
+    models = ["--model", "x.json", "y.json", "z.json"]
+    assert revise(*models) == 0
+    later = ["--pause", "2 days", "--every", "10 min", "--date", "2026-01-31"]
+    assert revise(*models, "--carried", "out.ngc.job.json", *later, out="next.ngc", start="") == 0
+    header = Path("next.ngc").read_text(encoding="ascii").splitlines()[1 : 1 + LINES]
+    assert [line.removeprefix(f"({MARK} ").split()[0] for line in header] == (
+        ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound"]
+    )
+    assert header[5].endswith("start 2 days after out.ngc.job.json)")
+    assert header[6].endswith("from where the last job counted it)")
+    assert header[7].endswith("steps 1 um)")
+    assert all(f"{axis} " in header[8] for axis in "XYZ")
+    assert header[8].endswith(" um)")
 
 
 def test_the_same_run_writes_the_same_bytes(job_folder: Path) -> None:
@@ -164,6 +183,9 @@ def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.
     assert float(first["correction_z_um"]) == pytest.approx(-float(first["drift_z_um"]), abs=1.0)
     assert revise("--carried", "out.ngc.job.json", "--pause", "8 h", out="late.ngc", start="") == 0
     assert float(table("late.ngc.csv")[0]["drift_z_um"]) == pytest.approx(0.0, abs=0.1)
+    header = Path("late.ngc").read_text(encoding="ascii").splitlines()[1 : 1 + LINES]
+    assert f"({MARK} start 8 h after out.ngc.job.json)" in header
+    assert f"({MARK} drift counts from where the last job counted it)" in header
     assert revise("--carried", "out.ngc.job.json", "--zero", "start", out="again.ngc", start="") == 0
     assert float(table("again.ngc.csv")[0]["drift_z_um"]) == 0.0
 

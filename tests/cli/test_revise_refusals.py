@@ -15,7 +15,8 @@ from thermocomp.core.model import ErrorModel
 @pytest.mark.parametrize(
     ("program", "message"),
     [
-        ("G90\nG0 X1\nM2\n", "part.ngc: line 2:"),  # unit
+        ("G90\nG0 X1\nM2\n", "part.ngc: line 2: X1 before G20 or G21: inches or millimetres?"),
+        ("G90\nG0 X1\nM2\n", "say which unit the control starts with (--units)"),
         ("G21\nM3\nG0 X1\nM2\n", "part.ngc: line 2: M3 and no spindle speed was stated"),
         (
             "G21\nG0 X1\nG1 X2 F100\nM2\n",
@@ -87,7 +88,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
     [
         (replace(lags("z_um"), honest_error=replace(HONEST, verdict="refused", reason="harm")), [], "was refused"),
         (judged(lags("z_um", room=True)), [], "wants t3_C, a temperature: it is not driven by the speed alone"),
-        (judged(lags("height_um")), [], "does not say which axis it is"),
+        (judged(lags("height_um")), [], "does not say which axis it is; say --axis height_um=Z, or --axis"),
         (judged(lags("z_um")), ["--axis", "zz=Z"], "there is no model of 'zz'"),
         (judged(lags("z_um")), ["--constant", "t3=20degC"], "driven by the spindle speed alone"),
         (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),

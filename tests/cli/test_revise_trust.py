@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from driftmodels import lags, static
-from reviseruns import PLATE, judged, revise, said, table, write_models
+from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
 from thermocomp.compensation.nc.revising.header import LINES, MARK
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import ncprogram
@@ -43,6 +44,38 @@ def test_a_model_that_was_never_judged_gives_no_bound(job_folder: Path, capsys: 
     assert axis["bound_um"] is None
     assert any("never judged" in w for w in warnings)
     assert "bound Z not known" in Path("out.ngc").read_text(encoding="ascii")
+
+
+def test_a_model_that_is_worse_than_the_drift_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = replace(lags("z_um", 0.1), honest_error=replace(HONEST, max_abs=9.6))
+    write_models([small], "small.json")
+    axis, warnings = bound(["--model", "small.json", "--tolerance", "0.1 um"], capsys)
+    said = f"may be wrong by 9.6 um, and the drift in the cuts is {axis['without_um']:.1f} um: revising may not help"
+    assert any(said in w for w in warnings)
+    _, warnings = bound([], capsys)
+    assert not any("may not help" in w or "nothing was taken off" in w for w in warnings)
+
+
+def test_it_is_told_if_nothing_was_taken_off(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # one long cut with no way up in it
+    cut = "G21 G90 G17 G54 G94\nS4000 M3\nG1 X100 Y0 Z-1 F50\n" + "X0\nX100\n" * 10 + "M5\nM2\n"
+    Path("part.ngc").write_text(cut, encoding="ascii")
+    axis, warnings = bound(["--method", "offset"], capsys)
+    said = f"nothing was taken off, and the drift in the cuts is {axis['without_um']:.1f} um: no safe point was found"
+    assert any(said in w and "--safe-z, or take --method coordinates" in w for w in warnings)
+    _, warnings = bound(["--method", "offset", "--tolerance", "300 um"], capsys)
+    assert not any("nothing was taken off" in w for w in warnings)
+    _, warnings = bound([], capsys)
+    assert not any("nothing was taken off" in w for w in warnings)
+
+
+def test_one_measurement_for_several_places(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_models([judged(lags("z_at_0_um")), judged(lags("z_at_600_um", 0.5))], "along.json")
+    options = ["--model", "along.json", "--origin", "G54=0 mm, 0 mm, 0 mm", "--json", "--overwrite"]
+    for given, first in [("z=12um", 16.0), ("z_at_600_um=6um", 12.0)]:
+        assert revise(*options, "--measured", given, start="") == 0
+        assert any("Z was measured once" in w for w in json.loads(capsys.readouterr().out)["warnings"])
+        assert float(table()[0]["drift_z_um"]) == pytest.approx(first, abs=1e-3)
 
 
 def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -84,7 +117,38 @@ def test_a_machine_file_tells_the_times(job_folder: Path, capsys: pytest.Capture
     Path("mill.toml").write_text(text.replace('acceleration = "0.5 m/s2"\n', "", 1), encoding="ascii")
     assert revise("--machine", "mill.toml", "--json", "--overwrite") == 0
     (note,) = json.loads(capsys.readouterr().out)["notes"]
-    assert "no rapid or acceleration of X" in note
+    assert "no acceleration of X: taken as 3 m/s2" in note
+    assert "rapid" not in note
+    bare = "".join(f"[axes.{name}]\ntravel = ['-500 mm', '500 mm']\n" for name in "YXZ")
+    Path("mill.toml").write_text(head + bare.replace("[axes.Y]", "[axes.Y]\nrapid = '9 m/min'"), encoding="ascii")
+    assert revise("--machine", "mill.toml", "--json", "--overwrite") == 0
+    rapid, acceleration = json.loads(capsys.readouterr().out)["notes"]
+    assert "no rapid of X, Z: taken as 30 m/min" in rapid
+    assert "no acceleration of X, Y, Z: taken as 3 m/s2" in acceleration
+
+
+def test_a_cut_outside_the_travel_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    head = 'structure = "w X\' b Z Y (C1) t"\n'
+    text = head + "".join(f"[axes.{name}]\ntravel = ['-500 mm', '500 mm']\n" for name in "XYZ")
+    Path("mill.toml").write_text(text, encoding="ascii")
+
+    def outside(*options: str) -> list[str]:
+        _, warnings = bound(["--machine", "mill.toml", *options], capsys)
+        return [w for w in warnings if "outside its travel" in w]
+
+    assert outside("--origin", "G54=0 mm, 0 mm, -480 mm") == []
+    assert outside("--origin", "G54=400.5 mm, 0 mm, 0 mm") == []  # by half a millimetre
+    (said,) = outside("--origin", "G54=450 mm, 0 mm, 0 mm")
+    assert "X goes to 550 mm at line 9, in machine coordinates: outside its travel, -500 to 500 mm; check" in said
+    Path("part.ngc").write_text(PLATE.replace("G1 Z-1 F300", "G1 Z-200000 F300"), encoding="ascii")
+    assert outside() == []  # nobody knows where G54 begins
+    assert outside("--origin", "G55=0 mm, 0 mm, 0 mm") == []
+    (said,) = outside("--origin", "G54=0 mm, 0 mm, 0 mm")
+    assert "Z goes to -200000 mm at line 8" in said
+    Path("part.ngc").write_text(PLATE.replace("Z2\nG1 Z-1", "G43 H1 Z2\nG1 Z-501.5"), encoding="ascii")
+    assert outside("--origin", "G54=0 mm, 0 mm, 0 mm") == []  # nor how long the tool is
+    (said,) = outside("--origin", "G54=0 mm, 0 mm, 0 mm", "--tool", "1=0 mm")
+    assert "Z goes to -501.5 mm" in said
 
 
 def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

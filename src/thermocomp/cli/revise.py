@@ -89,12 +89,14 @@ def revise(
         revision,
         drift,
         _files(found, drifting.hashes()),
-        f"{starting.words()}, drift counts {starting.counted()}",
+        starting.words(),
+        f"drift counts {starting.counted()}",
         f"method {way.words()}",
         reviserun.moment(date),
         way.interpreter,
         controller.diameters(expand=way.expand),
         way.folders(),
+        timing.travel(setup),
     )
     try:
         done = reviserun.revise(job, hidden=json)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from thermocomp.cli.options import Flag, OptionalNames
+from thermocomp.cli.revisetravel import Travel
 from thermocomp.cli.revisevalues import m_code_of, origin_of, point_of, positive, startup_of, tool_of, value
 from thermocomp.compensation.nc.drifting import start
 from thermocomp.compensation.nc.drifting.drift import Drift
@@ -165,8 +166,8 @@ class Starting:
     def words(self) -> str:
         """Return the start state in words."""
         if self.carried is not None:
-            after = f", {self.pause} later" if self.pause else ""
-            return f"as {self.carried.name} left it{after}"
+            name = self.carried.name
+            return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:
@@ -339,6 +340,12 @@ class Timing:
     tool_change: str = "8 s"
     stop: str = "60 s"
 
+    def travel(self, setup: Setup) -> Travel | None:
+        """Return what watches where the axes go, if the machine tells how far they can."""
+        if self.machine is None:
+            return None
+        return Travel(setup, {a.name: a.travel for a in read_machine(self.machine).axes})
+
     def kinematics(self) -> tuple[Kinematics, list[str]]:
         """Return how fast the machine is, and what of it is a guess."""
         change = value(self.tool_change, "time", "--tool-change", "8 s")
@@ -347,6 +354,10 @@ class Timing:
             guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
             return Kinematics(tool_change=change, stop=stop), [guess]
         machine = read_machine(self.machine)
-        silent = [a.name for a in machine.axes if a.name in "XYZ" and None in (a.rapid, a.acceleration)]
-        notes = [f"{self.machine}: no rapid or acceleration of {', '.join(silent)}: taken as 30 m/min and 3 m/s2"]
-        return Kinematics.of(machine, tool_change=change, stop=stop), notes if silent else []
+        axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
+        notes = [
+            f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"
+            for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
+            if (silent := [a.name for a in axes if getattr(a, what) is None])
+        ]
+        return Kinematics.of(machine, tool_change=change, stop=stop), notes

@@ -14,6 +14,7 @@ from typing import NamedTuple, TextIO
 from thermocomp import __version__
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
 from thermocomp.cli.progress import Share, by_share
+from thermocomp.cli.revisetravel import Travel
 from thermocomp.compensation.nc.drifting.drift import Drift
 from thermocomp.compensation.nc.reading.tokens import program_lines
 from thermocomp.compensation.nc.revising import diff, header
@@ -66,14 +67,17 @@ class Job:
     revision : Revision
     drift : Drift
         That of the revision.
-    models, start, method : list of str
-        For the header: which models, from what state, in what way.
+    models : sequence of str
+    start, zero, method : str
+        For the header: which models, from what state, what the drift counts from, in what way.
     when : date
     interpreter : {'auto', 'off', 'required'}
     diameters : dict of int to float, optional
         Of the tools, for the expansion [mm].
     subroutines : sequence of Path
         Folders of subprograms, for the expansion.
+    travel : Travel, optional
+        Watches where the axes go.
     """
 
     program: Path
@@ -82,11 +86,18 @@ class Job:
     drift: Drift
     models: Sequence[str]
     start: str
+    zero: str
     method: str
     when: datetime
     interpreter: str
     diameters: Mapping[int, float] | None = None
     subroutines: Sequence[Path] = ()
+    travel: Travel | None = None
+
+    @property
+    def begun(self) -> str:
+        """Return how the run begins, in words."""
+        return f"{self.start}, {self.zero}"
 
 
 class Bound(NamedTuple):
@@ -144,10 +155,11 @@ def revise(job: Job, *, hidden: bool) -> Done:
                 subroutines=job.subroutines,
             ).sources
         ledger, course = Ledger(), Course()
+        watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()
         try:
             with by_share("revising", hidden=hidden) as tell:
-                blank = _write(job, source, scratch, drafts[paths.table], (ledger, course), tell)
+                blank = _write(job, source, scratch, drafts[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
             if lines is not None and 0 < e.line <= len(lines):
                 raise ProgramError(lines[e.line - 1] or 1, f"(line {e.line} when expanded) {e.reason}") from e
@@ -167,13 +179,13 @@ def revise(job: Job, *, hidden: bool) -> Done:
         if paths.picture is not None:
             from thermocomp.report import revision as pictures
 
-            title = f"{job.program.name}, {job.start}"
+            title = f"{job.program.name}, {job.begun}"
             pictures.write(run, job.drift.axes, job.revision.tool_changes, title, drafts[paths.picture])
         return Done(run, bounds, proof, unproved, took, time.perf_counter() - begin)
 
 
 def _write(
-    job: Job, source: Path, folder: Path, table: Path, listeners: tuple[Ledger, Course], tell: Share
+    job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Share
 ) -> tuple[str, ...]:
     """Write program, diff and table, and return the header that still says nothing."""
     size = max(source.stat().st_size, 1)
@@ -242,6 +254,7 @@ def _facts(job: Job, bounds: Sequence[Bound]) -> list[str]:
         f"program {job.program.name}",
         *_together([f"model {m}" for m in job.models], 2),
         f"start {job.start}",
+        job.zero,
         job.method,
         "bound "
         + ", ".join(f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds),

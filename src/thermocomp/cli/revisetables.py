@@ -10,6 +10,7 @@ from rich.table import Table
 
 from thermocomp.cli.reviserun import Bound, Done, Job
 from thermocomp.compensation.nc.drifting.inputs import SPEED
+from thermocomp.compensation.nc.revising.offset import Offset
 
 #: lines from which on the time that one takes can be told
 MANY = 1000
@@ -23,7 +24,7 @@ def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
         f"runs {duration(revision.seconds)}; {_spindle(job)}; {_many(len(revision.tool_changes), 'tool change')}",
         soft_wrap=True,
     )
-    console.print(f"Start: {escape(job.start)}; {escape(job.method)}", soft_wrap=True)
+    console.print(f"Start: {escape(job.begun)}; {escape(job.method)}", soft_wrap=True)
     console.print(_bounds(done.bounds))
     if done.proof is not None:
         console.print(
@@ -44,8 +45,9 @@ def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
 
 def warnings(job: Job, done: Done) -> list[str]:
     """Return why the result may be worse than its bound says."""
-    drift = job.drift
-    found = [
+    drift, revision = job.drift, job.revision
+    found = list(drift.assumed)
+    found += [
         f"{o.name} went to {o.farthest:g} {o.unit}, and a model was trained from {o.low:g} to {o.high:g} {o.unit}: "
         f"outside its range for {duration(o.seconds)}, the bound is widened by all it says since"
         for o in drift.outside
@@ -60,11 +62,13 @@ def warnings(job: Job, done: Done) -> list[str]:
     ]
     found += [
         f"in the cuts the correction could not follow the drift at once because of {why}: {gap:.1f} um at line {line}"
-        for why, (gap, line) in job.revision.held.items()
+        for why, (gap, line) in revision.held.items()
     ]
-    if job.revision.idle:
-        found.append(f"{job.revision.idle} lines behind the end of the program are as they were: nobody runs them")
-    if job.revision.method.leaves_mark:
+    found += _hardly_worth(job, done)
+    found += [] if job.travel is None else job.travel.warnings()
+    if revision.idle:
+        found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
+    if revision.method.leaves_mark:
         found.append(
             "G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then; and a G92 that is in force when the "
             "program starts is lost"
@@ -81,6 +85,24 @@ def warnings(job: Job, done: Done) -> list[str]:
     return found
 
 
+def _hardly_worth(job: Job, done: Done) -> list[str]:
+    """Return why the revised program may be no better than the original."""
+    revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
+    if not done.run.carried.any():
+        if most <= revision.demand.tolerance:
+            return []
+        why = ", ".join(revision.held)
+        if isinstance(revision.method, Offset):
+            why = "no safe point was found: give --safe-z, or take --method coordinates"
+        return [f"nothing was taken off, and the drift in the cuts is {most:.1f} um" + (f": {why}" if why else "")]
+    return [
+        f"the model of {b.axis} may be wrong by {b.model:.1f} um, and the drift in the cuts is {b.without:.1f} um: "
+        "revising may not help"
+        for b in done.bounds
+        if b.model > b.without > 0
+    ]
+
+
 def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
     """Return all numbers, units in the names."""
     revision, paths = job.revision, job.paths
@@ -93,7 +115,7 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
         "spindle_1_per_min": [revision.slowest, revision.fastest],
         "tool_changes_s": revision.tool_changes,
         "models": list(job.models),
-        "start": job.start,
+        "start": job.begun,
         "method": job.method,
         "axes": [
             {

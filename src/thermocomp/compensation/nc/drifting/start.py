@@ -149,8 +149,8 @@ def measured(stations: Sequence[Station], deviations: Mapping[str, float], other
             if len(group) > 1:
                 what = f"the mean of its {len(mine)} models" if seen is group else told[str(seen[0])]
                 assumed.append(
-                    f"{axis} was measured once: all its models begin where {speed:.0f} 1/min, held for long, leaves "
-                    f"them; at that speed {what} is {deviation:g} um"
+                    f"{axis} was measured once: all its models begin as {speed:.0f} 1/min, held for long, leaves "
+                    f"them: there {what} is {deviation:g} um"
                 )
     return Start(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
 

@@ -9,7 +9,7 @@ from thermocomp.core.exceptions import ProgramError
 #: every line of a header begins so; a program that has one has been revised
 MARK = "THERMOCOMP"
 #: lines of a header, always so many: what they say is known only when the program has been read to its end
-LINES = 8
+LINES = 9
 #: widest comment that old controls read
 WIDTH = 78
 
@@ -27,7 +27,7 @@ def filled(facts: list[str], ending: str) -> tuple[str, ...]:
     Parameters
     ----------
     facts : list of str
-        At most seven; what does not fit into a comment is cut or replaced.
+        At most eight; what does not fit into a comment is cut or replaced.
     ending : str
         Of its lines.
 

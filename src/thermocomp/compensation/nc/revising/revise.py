@@ -24,7 +24,7 @@ from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
 from thermocomp.compensation.nc.revising.way import at, length
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
-from thermocomp.core.exceptions import ProgramError
+from thermocomp.core.exceptions import InputError, ProgramError
 
 #: lines by which the control is recognised that a program is for
 FIRST = 200
@@ -141,7 +141,7 @@ class Revision:
             if block.moves:
                 point = block.moves[-1].end
             deviation = self.drift.deviation(point)
-            demand = self.demand.at(end, self.drift, point)
+            demand = self._demanded(line.number, end, point)
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
@@ -173,6 +173,12 @@ class Revision:
         self.lines += 1
         self.changed += revised.texts != (revised.text,)
         return revised
+
+    def _demanded(self, line: int, end: float, point: Point) -> Vector:
+        try:
+            return self.demand.at(end, self.drift, point)
+        except InputError as e:
+            raise ProgramError(line, str(e)) from e
 
     def _cuts(self, block: Block) -> bool:
         """Return whether the tool may cut in a block: it moves in feed, or stands where it has cut."""
