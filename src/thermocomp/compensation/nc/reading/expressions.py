@@ -3,8 +3,8 @@
 Only what is certain has a value: parameters that the program has set itself, and those the caller knows. All others,
 such as probe results, offsets and positions, are unknown, and a value that needs one is refused.
 
-LinuxCNC, from loosest to tightest, each from left to right: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **; a sign
-belongs to the value behind it, so ``-2 ** 2`` is 4. Fanuc: comparisons; + - OR XOR; * / MOD AND.
+LinuxCNC, from loosest to tightest, each from left to right: AND OR XOR; EQ NE GT GE LT LE; ``+ -``; ``* / MOD``;
+``**``; a sign belongs to the value behind it, so ``-2 ** 2`` is 4. Fanuc: comparisons; ``+ - OR XOR``; ``* / MOD AND``.
 """
 
 import math
