@@ -15,7 +15,7 @@ from thermocomp.shopfloor import rs274
 Vector = tuple[float, float, float]
 NONE: Vector = (0.0, 0.0, 0.0)
 
-interpreter = pytest.mark.skipif(rs274.installed() is not None, reason=f"{rs274.installed()}")
+interpreter = pytest.mark.usefixtures("interpreter")
 
 
 def ledger(rows: Sequence[tuple[Vector, Vector]], *, inverse: Sequence[int] = ()) -> Ledger:

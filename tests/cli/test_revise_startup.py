@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 
 from reviseruns import revise, said
-from thermocomp.shopfloor import rs274
 
-interpreter = pytest.mark.skipif(rs274.installed() is not None, reason=f"{rs274.installed()}")
+interpreter = pytest.mark.usefixtures("interpreter")
 
 HEAD = "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\n"
 DRILL = f"{HEAD}G4 P600\nG81 X10 Y0 Z-2 R1 F100\nX20\nG80\nM5\nM2\n"
@@ -59,9 +58,11 @@ def test_what_is_told_for_the_expansion_has_to_make_sense(
     assert set(job_folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("proof", ["off", pytest.param("required", marks=interpreter)])
-def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proof: str) -> None:
+@pytest.mark.parametrize("proof", ["off", "required"])
+def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proof: str, request: pytest.FixtureRequest) -> None:
     """A program that says neither G98 nor G99: told, it comes out as one that says it."""
+    if proof == "required":
+        request.getfixturevalue("interpreter")
     results = []
     for startup, program in (
         ("G64 P0.01 G98", DRILL),

@@ -13,7 +13,6 @@ from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
 from thermocomp.compensation.nc.revising.header import LINES, MARK
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import ncprogram
-from thermocomp.shopfloor import rs274
 
 # -- how far to trust it ---------------------------------------------------------------------------------------------
 
@@ -177,7 +176,7 @@ def test_a_model_without_memory_follows_the_speed(job_folder: Path) -> None:
 
 # -- the interpreter -------------------------------------------------------------------------------------------------
 
-interpreter = pytest.mark.skipif(rs274.installed() is not None, reason=f"{rs274.installed()}")
+interpreter = pytest.mark.usefixtures("interpreter")
 
 
 @interpreter

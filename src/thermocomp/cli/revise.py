@@ -25,10 +25,10 @@ def revise(
     *,
     drifting: Drifting,
     output: Output,
-    starting: Starting = Starting(),  # noqa: B008 - frozen
-    way: Way = Way(),  # noqa: B008 - frozen
-    controller: Controller = Controller(),  # noqa: B008 - frozen
-    timing: Timing = Timing(),  # noqa: B008 - frozen
+    starting: Starting = Starting(),
+    way: Way = Way(),
+    controller: Controller = Controller(),
+    timing: Timing = Timing(),
     date: str | None = None,
     overwrite: Flag = False,
     json: Json = False,

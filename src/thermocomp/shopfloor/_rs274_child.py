@@ -94,10 +94,10 @@ class Canon:
         self.file = b""
         self.files: dict[bytes, None] = {}  # that were opened
         self.hooks = Hooks()
-        self.library = ctypes.PyDLL("librs274.so.0")
-        self.sequence = self.library._ZN6Interp15sequence_numberEv
+        self.linked = ctypes.PyDLL("librs274.so.0")
+        self.sequence = self.linked._ZN6Interp15sequence_numberEv
         self.sequence.argtypes = (P,)
-        self.name = self.library._ZN6Interp9file_nameEPcm
+        self.name = self.linked._ZN6Interp9file_nameEPcm
         self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
         self.buffer = ctypes.create_string_buffer(512)
         self.program = job["program"].encode()
@@ -378,7 +378,7 @@ def main() -> None:
         if result > gcode.MIN_ERROR:
             canon.text("error", gcode.strerror(result))
         else:
-            canon.library._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+            canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
             with open(job["opened"], "wb") as file:  # noqa: PTH123
                 file.write(b"\0".join(canon.files))
             out.write("done 0\n")

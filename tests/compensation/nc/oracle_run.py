@@ -175,6 +175,17 @@ class Oracle:
         return Ran([(n, k, tuple(v)) for n, k, v in got["out"]], got["error"], got["line"])
 
 
+def ends(texts: Iterable[str]) -> list[tuple[float, float, float] | None]:
+    """Return where each program of straight moves takes the tool [mm]; None: the interpreter refuses it."""
+    found: list[tuple[float, float, float] | None] = []
+    with Oracle() as oracle:
+        for text in texts:
+            ran = oracle.run(f"{text}\nM2\n")
+            x, y, z = next((v[:3] for _, kind, v in reversed(ran.out) if kind in ("rapid", "feed")), (0.0, 0.0, 0.0))
+            found.append(None if ran.error else (x, y, z))
+    return found
+
+
 class Comparison(NamedTuple):
     """How far the follower is from the interpreter."""
 

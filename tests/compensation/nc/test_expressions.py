@@ -4,8 +4,8 @@ from random import Random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from oracle_run import ends
 
-from nc_interpreter import ends, needs_interpreter
 from thermocomp.compensation.nc.reading.expressions import Parameters, evaluate
 from thermocomp.compensation.nc.reading.line import Assignment
 from thermocomp.compensation.nc.reading.systemparameters import what_is
@@ -239,7 +239,7 @@ def expression(random: Random, depth: int) -> str:
     return random.choice(["", "-"]) + bracket
 
 
-@needs_interpreter
+@pytest.mark.usefixtures("interpreter")
 @pytest.mark.parametrize("seed", range(5))
 def test_values_are_those_of_the_interpreter(seed: int) -> None:
     random, parameters = Random(seed), Parameters(values=KNOWN)

@@ -17,9 +17,7 @@ NC_FILES = Path("/usr/share/linuxcnc/ncfiles")
 MM = Setup(inch=False)
 LENGTHS = {n: float(n) for n in range(1, 100)}
 
-needs_linuxcnc = pytest.mark.skipif(
-    not NC_FILES.is_dir(), reason="needs the package linuxcnc-uspace: its interpreter is the judge"
-)
+needs_linuxcnc = pytest.mark.usefixtures("interpreter")
 
 
 def run(text: str, setup: Setup = MM) -> list[Block]:

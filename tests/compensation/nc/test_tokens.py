@@ -5,8 +5,9 @@ from random import Random
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from oracle_run import ends
 
-from nc_interpreter import PROGRAMS, ends, needs_interpreter, needs_programs
+from nc_interpreter import PROGRAMS, needs_programs
 from thermocomp.compensation.nc.reading import tokens
 from thermocomp.compensation.nc.reading.expressions import Parameters, evaluate
 from thermocomp.compensation.nc.reading.line import Line
@@ -365,7 +366,7 @@ TEXTS = [
 ]
 
 
-@needs_interpreter
+@pytest.mark.usefixtures("interpreter")
 @pytest.mark.parametrize("seed", range(4))
 def test_the_interpreter_reads_the_same(seed: int) -> None:
     random = Random(seed)

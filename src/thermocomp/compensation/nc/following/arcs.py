@@ -3,10 +3,8 @@
 import math
 from typing import Final
 
-from thermocomp.compensation.nc.following.block import Arc, Point
+from thermocomp.compensation.nc.following.block import PLANES, Arc, Point
 
-#: the plane's own axes and the one across it
-PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 #: the letters of the centre
 CENTRE: Final = {17: ("I", "J", "K"), 18: ("K", "I", "J"), 19: ("J", "K", "I")}
 
@@ -16,6 +14,8 @@ _SPIRAL: Final = {False: 0.02 * math.sqrt(2.0), True: 0.002 * math.sqrt(2.0) * 2
 _RELATIVE: Final = 0.001
 #: smaller radii are none, and half the way may be longer than R by so much [mm]
 _SMALLEST: Final = 0.00127
+#: an arc that turns through less ends where it starts: a full circle [rad]
+_FULL: Final = 1e-6
 
 Flat = tuple[float, float]
 
@@ -76,14 +76,19 @@ def centre_of_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> 
     return ((start[0] + end[0]) / 2.0 + y * side, (start[1] + end[1]) / 2.0 - x * side)
 
 
+def sweep(arc: Arc, start: Point, end: Point) -> float:
+    """Return the angle that an arc turns through, in its own sense [rad]; start and end in machine coordinates."""
+    first, second, _ = PLANES[arc.plane]
+    begin = math.atan2(start[second] - arc.centre[1], start[first] - arc.centre[0])
+    finish = math.atan2(end[second] - arc.centre[1], end[first] - arc.centre[0])
+    angle = (begin - finish if arc.clockwise else finish - begin) % math.tau
+    if angle < _FULL:
+        angle = math.tau
+    return angle + (arc.turns - 1) * math.tau
+
+
 def length(arc: Arc, start: Point, end: Point) -> float:
     """Return the length of an arc or helix [mm]; start and end in machine coordinates."""
     first, second, across = PLANES[arc.plane]
-    begin = math.atan2(start[second] - arc.centre[1], start[first] - arc.centre[0])
-    finish = math.atan2(end[second] - arc.centre[1], end[first] - arc.centre[0])
-    angle = (begin - finish if arc.clockwise else finish - begin) % (2.0 * math.pi)
-    if angle < 1e-6:
-        angle = 2.0 * math.pi
-    angle += (arc.turns - 1) * 2.0 * math.pi
     radius = math.dist((start[first], start[second]), arc.centre)
-    return math.hypot(radius * angle, end[across] - start[across])
+    return math.hypot(radius * sweep(arc, start, end), end[across] - start[across])

@@ -1,7 +1,7 @@
 """What a line of an NC program makes the machine do: the state it runs in, and its moves."""
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from thermocomp.compensation.nc.reading.line import Line, Word
 
@@ -65,6 +65,10 @@ class Modal:
     blend: float | None = 0.0
     naive: float = 0.0
     exact_stop: bool = False
+
+
+#: plane -> its two axes and the one across
+PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Arc(NamedTuple):

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from thermocomp.compensation.nc.following.arcs import PLANES
-from thermocomp.compensation.nc.following.block import Point
+from thermocomp.compensation.nc.following.block import PLANES, Point
 
 #: how far chip breaking and peck drilling stay off the ground [inch]
 BACK_OFF: Final = 0.01

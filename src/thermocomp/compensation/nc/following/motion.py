@@ -1,7 +1,7 @@
 """Moves: straight ones, arcs, cycles, home, machine coordinates, threads, probing, splines."""
 
-from thermocomp.compensation.nc.following.arcs import CENTRE, PLANES, ArcError, Flat, centre_of_radius, check_centre
-from thermocomp.compensation.nc.following.block import Arc, Block, Known, Move
+from thermocomp.compensation.nc.following.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
+from thermocomp.compensation.nc.following.block import PLANES, Arc, Block, Known, Move
 from thermocomp.compensation.nc.following.cycles import KEPT, Cycle, CycleError, pause
 from thermocomp.compensation.nc.following.offsets import mark, put
 from thermocomp.compensation.nc.following.orders import Orders

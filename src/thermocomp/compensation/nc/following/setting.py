@@ -3,8 +3,7 @@
 from typing import Final
 
 from thermocomp.compensation.nc.following import placing
-from thermocomp.compensation.nc.following.arcs import PLANES
-from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.following.codes import CYCLES, LENGTHS
 from thermocomp.compensation.nc.following.offsets import mark
 from thermocomp.compensation.nc.following.orders import Orders

@@ -3,11 +3,11 @@
 from collections import deque
 from collections.abc import Iterator
 
-from thermocomp.compensation.nc.following.block import Block, Move, Setup
+from thermocomp.compensation.nc.following.block import PLANES, Block, Move, Setup
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.tokens import read_lines
 from thermocomp.compensation.nc.revising.frame import Vector
-from thermocomp.compensation.nc.revising.method import PLANES, Change
+from thermocomp.compensation.nc.revising.method import Change
 from thermocomp.core.exceptions import ProgramError
 
 #: largest difference that is rounding [um]

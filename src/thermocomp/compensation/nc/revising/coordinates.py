@@ -15,10 +15,10 @@ What becomes of a block, by its kind:
 import math
 from dataclasses import dataclass, field
 
-from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.revising.contact import CLEAR, Contact
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, PLANES, Method, refuse_probing
+from thermocomp.compensation.nc.revising.method import AXES, Method, refuse_probing
 from thermocomp.compensation.nc.revising.text import number, shifted, written
 from thermocomp.core.exceptions import ProgramError
 

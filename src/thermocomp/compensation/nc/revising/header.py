@@ -1,7 +1,6 @@
 """The comment at the top of a revised program: what was done to it, and that it must not be done again."""
 
 import re
-from collections.abc import Iterator
 
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.core.exceptions import ProgramError
@@ -52,12 +51,6 @@ def refuse_revised(line: Line) -> None:
 def comes_first(line: Line) -> bool:
     """Return whether a line has to stay before the header: ``%``, the program's number, nothing at all."""
     return line.demarcation or not line.text.strip() or bool(_NUMBER.match(line.text) and not line.flow)
-
-
-def marks() -> Iterator[str]:
-    """Yield what the lines of an empty header begin with."""
-    for k in range(LINES):
-        yield f"({MARK} {k})"
 
 
 def _plain(text: str) -> str:

@@ -10,8 +10,6 @@ from thermocomp.compensation.nc.revising.text import Digits
 from thermocomp.core.exceptions import ProgramError
 
 AXES = "XYZ"
-#: plane -> its two axes and the one that stands on it
-PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Change(NamedTuple):

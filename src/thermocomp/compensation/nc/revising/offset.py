@@ -7,9 +7,9 @@ of the program stay untouched.
 
 from dataclasses import dataclass, field
 
-from thermocomp.compensation.nc.following.block import Block
+from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, PLANES, Method, refuse_probing
+from thermocomp.compensation.nc.revising.method import AXES, Method, refuse_probing
 from thermocomp.compensation.nc.revising.text import number
 from thermocomp.core.exceptions import ProgramError
 

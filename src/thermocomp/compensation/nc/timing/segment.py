@@ -2,7 +2,8 @@
 
 import math
 
-from thermocomp.compensation.nc.following.block import Block, Move
+from thermocomp.compensation.nc.following.arcs import sweep
+from thermocomp.compensation.nc.following.block import PLANES, Block, Move
 from thermocomp.core.exceptions import ProgramError
 
 Vector = tuple[float, float, float]
@@ -11,8 +12,6 @@ Vector = tuple[float, float, float]
 ACROSS, ALONG = math.sqrt(0.75), 0.5
 #: cycles that every piece of the path takes at least
 LEAST = 1.02
-#: of the axes: first and second of each plane, and the one across
-PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
 class Segment:
@@ -183,12 +182,9 @@ class Segments:
         if not first or not second:
             raise ProgramError(block.line.number, "an arc around its own start or end: check its centre")
         sense = -1.0 if arc.clockwise else 1.0
-        sweep = sense * (math.atan2(qj, qi) - math.atan2(pj, pi)) % math.tau
-        if sweep < 1e-9:
-            sweep = math.tau
-        sweep += math.tau * (arc.turns - 1)
+        turned = sweep(arc, move.start, move.end)
         climb = move.end[k] - move.start[k]
-        flat = math.hypot(sweep * (first + second) / 2.0, second - first)
+        flat = math.hypot(turned * (first + second) / 2.0, second - first)
         length = math.hypot(flat, climb)
 
         def direction(a: float, b: float, r: float) -> Vector:
@@ -211,6 +207,6 @@ class Segments:
             length / max(flat / min(ai, aj), abs(climb) / ak),
             radius=first,
             bend=first + climb * climb / first,
-            sweep=sweep,
+            sweep=turned,
             axis=(axis[0], axis[1], axis[2]),
         )

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.following.block import Block, Move, Point
+from thermocomp.compensation.nc.following.block import PLANES, Block, Move, Point
 from thermocomp.compensation.nc.timing.corners import Corners, together
-from thermocomp.compensation.nc.timing.segment import PLANES, Segment, Segments, Vector
+from thermocomp.compensation.nc.timing.segment import Segment, Segments, Vector
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Machine
 
