@@ -85,7 +85,8 @@ def stored(setup: Setup) -> rs274.Stored:
     return rs274.Stored(
         origins={system: origin for system, origin in setup.offsets.items() if system <= 9},
         lengths=setup.tools,
-        home28=setup.home,
+        home28=setup.home or (),
+        rotations=setup.rotations,
         startup=startup.whole(setup),
     )
 

@@ -305,7 +305,7 @@ class Controller:
             speed=0.0 if self.speed is None else positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
             offsets=dict(origin_of(text) for text in self.origin or ()),
             tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
-            home=(0.0, 0.0, 0.0) if self.home is None else point_of(self.home, f"--home {self.home!r}"),
+            home=None if self.home is None else point_of(self.home, f"--home {self.home!r}"),
             integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
             least=positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",

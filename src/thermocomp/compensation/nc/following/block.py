@@ -185,8 +185,14 @@ class Setup:
         the machine is, but are never certain: only what the program itself sets keeps an axis known.
     tools : dict of int to float
         Lengths of the tools [mm]; the same holds for them.
-    home : tuple of float
-        Where G28 goes, in machine coordinates [mm].
+    home : tuple of float or None
+        Where G28 goes, in machine coordinates [mm]; None: not stated.
+    rotations : dict of int to float
+        Rotations of work coordinate systems about Z that are stored in the controller [deg], as far as they are stated.
+    no_shift : bool
+        It is stated that no G92 or G52 is in force when the program starts.
+    rotary : dict of str to {'head', 'table'}
+        What the rotary axes A, B, C turn, as far as it is stated: the spindle or the workpiece.
     integers : {'whole', 'least', 'refuse'}
         What a length without a decimal point is: whole millimetres or inches, the least increment, or a reason to
         refuse.
@@ -204,7 +210,10 @@ class Setup:
     speed: float = 0.0
     offsets: dict[int, Point] = field(default_factory=dict)
     tools: dict[int, float] = field(default_factory=dict)
-    home: Point = (0.0, 0.0, 0.0)
+    home: Point | None = None
+    rotations: dict[int, float] = field(default_factory=dict)
+    no_shift: bool = False
+    rotary: dict[str, Literal["head", "table"]] = field(default_factory=dict)
     integers: Literal["whole", "least", "refuse"] = "whole"
     least: float = 0.001
     skip_optional: bool = False

@@ -74,7 +74,7 @@ def home(state: State, orders: Orders, block: Block) -> None:
         raise orders.error(f"{code} without axis words; name the axes that go home, such as {code} Z0")
     place, _ = state.goal(orders)
     start, between = state.machine, state.offsets.machine(place)
-    far = state.setup.home
+    far = state.setup.home or (0.0, 0.0, 0.0)
     if named or rotary:
         target = state.offsets.program(far)
         place = put(place, {i: target[i] for i in named})

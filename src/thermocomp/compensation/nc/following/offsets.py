@@ -49,7 +49,7 @@ class Offsets:
     def __init__(self, setup: Setup) -> None:
         self.system = 1
         self.origins: dict[int, Point] = dict(setup.offsets)
-        self.rotations: dict[int, float] = {}
+        self.rotations: dict[int, float] = dict(setup.rotations)
         self._certain_origins: dict[int, Known] = {}
         self.shift: Point = _ZERO
         self._kept: Point = _ZERO
