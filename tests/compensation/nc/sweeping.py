@@ -1,0 +1,120 @@
+"""One random program: revised by both methods and judged in drawn states of a controller."""
+
+import math
+import random
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import state_judge
+from machine_programs import program
+
+from nc_law import Steady, revise
+from thermocomp.compensation.nc.following.block import Point, Setup
+from thermocomp.compensation.nc.revising.demand import Field
+from thermocomp.compensation.nc.revising.frame import Vector
+from thermocomp.core.exceptions import InputError, ProgramError, ThermocompError
+
+WAYS = ("coordinates", "offset")
+
+
+@dataclass
+class Settling(Steady):
+    """It grows from the first minute on, to some 180 um in Z: as no machine drifts, so that a fault shows."""
+
+    axes: str = "XYZ"
+    time: float = 0.0
+
+    def advance(self, dt: float, speed: float) -> None:
+        """Let time pass."""
+        self.time += dt
+
+    def deviation(self, point: Point) -> Vector:
+        """Return the drift [um]."""
+        share = 1.0 - math.exp(-self.time / 60.0)
+        z = -60.0 - 120.0 * share + 0.02 * min(max(point[2], -100.0), 100.0)
+        if self.axes == "Z":
+            return 0.0, 0.0, z
+        return 40.0 + 60.0 * share, -30.0 - 70.0 * share, z
+
+    def field(self) -> Field:
+        """Return the drift as it is now."""
+        return Settling(self.axes, self.time).deviation
+
+
+@dataclass
+class Outcome:
+    """What became of a program."""
+
+    seed: int
+    way: str
+    axes: str
+    kind: str  #: revised, refused, report, wrong, invalid
+    reason: str = ""
+    moves: int = 0
+    original: str = ""
+    revised: str = ""
+
+    @property
+    def group(self) -> str:
+        """The reason without its line and its numbers."""
+        return re.sub(r"-?\d+\.\d+|(?<![\w.])-?\d+(?![\w.])", "#", re.sub(r"^(state \d+: )?line \d+[:,]? ?", "", self.reason))[:150]
+
+    def write(self, folder: Path) -> None:
+        """Write both programs and the reason."""
+        folder.mkdir(parents=True, exist_ok=True)
+        name = folder / f"{self.seed}-{self.way}"
+        name.with_suffix(".ngc").write_text(self.original, encoding="latin-1")
+        name.with_suffix(".revised.ngc").write_text(self.revised, encoding="latin-1")
+        name.with_suffix(".txt").write_text(f"{self.axes}\n{self.reason}\n", encoding="utf-8")
+
+
+def setup(way: str, axes: str) -> Setup:
+    """Return what is stated of the controller."""
+    rotations = dict.fromkeys(range(1, 10), 0.0) if axes != "Z" else {}
+    return Setup(
+        inch=False,
+        speed=3000.0,
+        rotations=rotations,
+        no_shift=way == "offset",
+        rotary=dict.fromkeys("ABC", "table"),
+    )
+
+
+def tried(seed: int, folder: Path) -> Iterator[Outcome]:
+    """Yield what becomes of the program of a seed by both ways, or that it is no program."""
+    text = program(seed)
+    axes = random.Random(seed).choice(("Z", "XYZ"))
+    try:
+        state_judge.run(text, state_judge.states(seed, state_judge.Stated(True, True))[0], folder)
+    except ThermocompError as error:
+        yield Outcome(seed, "", axes, "invalid", str(error))
+        return
+    for way in WAYS:
+        yield outcome(seed, text, way, axes, folder)
+
+
+def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
+    """Revise a program and have it judged."""
+    found = Outcome(seed, way, axes, "revised", original=text)
+    path = folder / "original.ngc"
+    path.write_text(text, encoding="latin-1", newline="")
+    try:
+        trial = revise(path, folder, Settling(axes), way, setup=setup(way, axes))
+    except InputError as error:
+        found.reason = error.reason if isinstance(error, ProgramError) else str(error)
+        found.kind = "report" if "please report" in found.reason else "refused"
+        return found
+    found.revised = trial.revised.read_text(encoding="latin-1")
+    most = tuple(max(abs(row.deviation[i]) for row in trial.rows) for i in range(3))
+    stated = state_judge.Stated(no_rotation=axes != "Z", no_shift=way == "offset")
+    try:
+        found.moves = state_judge.judge(
+            text, found.revised, (most[0], most[1], most[2]), state_judge.states(seed, stated), folder
+        ).moves
+    except state_judge.WrongError as error:
+        found.kind, found.reason = "wrong", str(error)
+    except state_judge.InvalidError as error:
+        found.kind, found.reason = "invalid", str(error)
+    return found
