@@ -44,8 +44,8 @@ def report(outcomes: list[Outcome]) -> bool:
         )
         well &= not counts["report"] and not counts["wrong"]
         for kind in ("refused", "report", "wrong"):
-            for reason, number in Counter(o.group for o in own if o.kind == kind).most_common():
-                example = next(o.seed for o in own if o.kind == kind and o.group == reason)
+            for reason, number in Counter(g for o in own if o.kind == kind for g in o.groups).most_common():
+                example = next(o.seed for o in own if o.kind == kind and reason in o.groups)
                 print(f"  {kind:8} {number:4}  {reason}  [seed {example}]")
     return well
 
@@ -66,7 +66,7 @@ def main() -> int:
             for outcome in found:
                 if outcome.kind in ("wrong", "report"):
                     outcome.write(options.wrong)
-                    print(f"\nseed {outcome.seed} {outcome.way} {outcome.axes}: {outcome.reason}", flush=True)
+                    print(f"\nseed {outcome.seed} {outcome.way} {outcome.axes}: {outcome.reasons[0]}", flush=True)
             print(f"\r{seeds.stop - options.seed} of {options.programs}", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return 0 if report(outcomes) else 1

@@ -26,7 +26,9 @@ class Writer:
         self.draw = draw
         self.lines: list[str] = []
         self.machine = draw.choice(("mill", "fourth", "fourth", "fifth"))
-        self.rotary = {"mill": "", "fourth": draw.choice("AAABC"), "fifth": draw.choice(("AC", "BC", "AB"))}[self.machine]
+        self.rotary = {"mill": "", "fourth": draw.choice("AAABC"), "fifth": draw.choice(("AC", "BC", "AB"))}[
+            self.machine
+        ]
         self.repeat = self.maybe(0.3)
         self.glued = self.maybe(0.2)
         self.numbered = self.maybe(0.25)

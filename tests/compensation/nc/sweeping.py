@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import state_judge
+import state_run
 from machine_programs import program
 
 from nc_law import Steady, revise
@@ -51,15 +52,15 @@ class Outcome:
     way: str
     axes: str
     kind: str  #: revised, refused, report, wrong, invalid
-    reason: str = ""
+    reasons: tuple[str, ...] = ()
     moves: int = 0
     original: str = ""
     revised: str = ""
 
     @property
-    def group(self) -> str:
-        """The reason without its line and its numbers."""
-        return re.sub(r"-?\d+\.\d+|(?<![\w.])-?\d+(?![\w.])", "#", re.sub(r"^(state \d+: )?line \d+[:,]? ?", "", self.reason))[:150]
+    def groups(self) -> list[str]:
+        """The reasons without lines and numbers."""
+        return list(dict.fromkeys(map(_group, self.reasons)))
 
     def write(self, folder: Path) -> None:
         """Write both programs and the reason."""
@@ -67,7 +68,12 @@ class Outcome:
         name = folder / f"{self.seed}-{self.way}"
         name.with_suffix(".ngc").write_text(self.original, encoding="latin-1")
         name.with_suffix(".revised.ngc").write_text(self.revised, encoding="latin-1")
-        name.with_suffix(".txt").write_text(f"{self.axes}\n{self.reason}\n", encoding="utf-8")
+        name.with_suffix(".txt").write_text(f"{self.axes}\n{chr(10).join(self.reasons)}\n", encoding="utf-8")
+
+
+def _group(reason: str) -> str:
+    plain = re.sub(r"^(state \d+: )?(line \d+[:,]? ?)?", "", reason)
+    return re.sub(r"'[^']*\d[^']*'", "'...'", re.sub(r"-?\d+\.\d+|(?<![\w.])-?\d+(?![\w.])", "#", plain))[:150]
 
 
 def setup(way: str, axes: str) -> Setup:
@@ -87,9 +93,9 @@ def tried(seed: int, folder: Path) -> Iterator[Outcome]:
     text = program(seed)
     axes = random.Random(seed).choice(("Z", "XYZ"))
     try:
-        state_judge.run(text, state_judge.states(seed, state_judge.Stated(True, True))[0], folder)
+        state_run.run(text, state_run.states(seed, state_run.Stated(True, True))[0], folder)
     except ThermocompError as error:
-        yield Outcome(seed, "", axes, "invalid", str(error))
+        yield Outcome(seed, "", axes, "invalid", (str(error),))
         return
     for way in WAYS:
         yield outcome(seed, text, way, axes, folder)
@@ -103,18 +109,18 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
     try:
         trial = revise(path, folder, Settling(axes), way, setup=setup(way, axes))
     except InputError as error:
-        found.reason = error.reason if isinstance(error, ProgramError) else str(error)
-        found.kind = "report" if "please report" in found.reason else "refused"
+        found.reasons = (f"line {error.line}: {error.reason}" if isinstance(error, ProgramError) else str(error),)
+        found.kind = "report" if "please report" in found.reasons[0] else "refused"
         return found
     found.revised = trial.revised.read_text(encoding="latin-1")
     most = tuple(max(abs(row.deviation[i]) for row in trial.rows) for i in range(3))
-    stated = state_judge.Stated(no_rotation=axes != "Z", no_shift=way == "offset")
+    stated = state_run.Stated(no_rotation=axes != "Z", no_shift=way == "offset")
     try:
         found.moves = state_judge.judge(
-            text, found.revised, (most[0], most[1], most[2]), state_judge.states(seed, stated), folder
+            text, found.revised, (most[0], most[1], most[2]), state_run.states(seed, stated), folder
         ).moves
     except state_judge.WrongError as error:
-        found.kind, found.reason = "wrong", str(error)
+        found.kind, found.reasons = "wrong", tuple(error.faults)
     except state_judge.InvalidError as error:
-        found.kind, found.reason = "invalid", str(error)
+        found.kind, found.reasons = "invalid", (str(error),)
     return found
