@@ -96,7 +96,7 @@ def revise(
         way.interpreter,
         controller.diameters(expand=way.expand),
         way.folders(),
-        timing.travel(setup),
+        timing.travel(),
     )
     try:
         done = reviserun.revise(job, hidden=json)

@@ -340,11 +340,11 @@ class Timing:
     tool_change: str = "8 s"
     stop: str = "60 s"
 
-    def travel(self, setup: Setup) -> Travel | None:
+    def travel(self) -> Travel | None:
         """Return what watches where the axes go, if the machine tells how far they can."""
         if self.machine is None:
             return None
-        return Travel(setup, {a.name: a.travel for a in read_machine(self.machine).axes})
+        return Travel({a.name: a.travel for a in read_machine(self.machine).axes})
 
     def kinematics(self) -> tuple[Kinematics, list[str]]:
         """Return how fast the machine is, and what of it is a guess."""

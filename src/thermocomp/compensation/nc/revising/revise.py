@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from operator import sub
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.following.block import Block, Point, Setup
+from thermocomp.compensation.nc.following.block import Block, Point, Setup, system_name
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.reading.recognise import recognise
@@ -46,6 +46,7 @@ class Revised(NamedTuple):
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
+    other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
 
 
 @dataclass
@@ -120,7 +121,7 @@ class Revision:
         recognise(first)
         lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
         check = Check(self.setup)
-        steered, known = _Spindle(self.setup), _Places(self.setup)
+        steered = _Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -131,7 +132,9 @@ class Revision:
                 yield self._header(line.text, deviation, carried)
                 headed = True
             if self.drift.by_position:
-                known.check(block)
+                _refuse_unknown_place(block)
+            if block.turned:
+                _refuse_turned(block, self.setup)
             cutting = self._cuts(block)
             samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
             self.seconds = end
@@ -145,6 +148,8 @@ class Revision:
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
+            if (carried[0] or carried[1]) and not block.modal.rotation_told:
+                _refuse_untold_rotation(block)
             if cutting:
                 samples.append((1.0, deviation))
                 ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
@@ -153,7 +158,18 @@ class Revision:
             self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
-                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner)
+                Revised(
+                    line.number,
+                    line.text,
+                    change.texts,
+                    block,
+                    start,
+                    end,
+                    deviation,
+                    carried,
+                    change.inner,
+                    change.other,
+                )
             )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
@@ -258,40 +274,45 @@ class _Spindle:
         return block.speed
 
 
-@dataclass
-class _Places:
-    """Whether it is known where the tool is, for a drift that depends on it."""
-
-    setup: Setup
-    _said: set[int] = field(default_factory=set)
-    _tool: int = 0
-
-    def check(self, block: Block) -> None:
-        """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
-        if block.tool_change is not None:
-            self._tool = block.tool_change
-        if "G10" in block.codes and block.values.get("L") == 2:
-            self._said.add(int(block.values.get("P", 0)) or block.modal.system)
-        if "G43" in block.codes:
-            tool = int(block.values.get("H", self._tool))
-            if tool and tool not in self.setup.tools:
-                raise ProgramError(
-                    block.line.number,
-                    f"the drift depends on the place, and the length of tool {tool} is unknown: --tool '{tool}=120 mm'",
-                )
-        system = block.modal.system
-        if any(not m.rapid for m in block.moves) and system not in self.setup.offsets and system not in self._said:
-            raise ProgramError(
-                block.line.number,
-                f"the drift depends on the place, and where {_name(system)} begins is unknown: "
-                f"--origin '{_name(system)}=0 mm, 0 mm, 0 mm'",
-            )
+def _refuse_unknown_place(block: Block) -> None:
+    """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
+    modal = block.modal
+    if (modal.origin_told and modal.untold_tool is None) or all(m.rapid for m in block.moves):
+        return
+    name, tool = system_name(modal.system), modal.untold_tool
+    if not modal.origin_told:
+        what = f"where {name} begins is unknown: --origin '{name}=0 mm, 0 mm, 0 mm'"
+    elif tool == -1:
+        what = "the length of the tool in the spindle is unknown: write its number (T, M6, or H)"
+    else:
+        what = f"the length of tool {tool} is unknown: --tool '{tool}=120 mm'"
+    raise ProgramError(block.line.number, f"the drift depends on the place, and {what}")
 
 
-def _name(system: int) -> str:
-    if system > 100:
-        return f"G54.1 P{system - 100}"
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
+def _refuse_turned(block: Block, setup: Setup) -> None:
+    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle: it grows along the tool."""
+    for letter, angle in block.turned.items():
+        side = setup.rotary.get(letter)
+        if side == "table":
+            continue
+        where = "gets another zero" if math.isnan(angle) else f"is at {angle:g} deg"
+        what = (
+            "it is in the head, so the spindle grows along the tool and not along Z: not supported"
+            if side
+            else "does it turn the spindle or the workpiece? say so with --machine, whose structure names it: "
+            f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
+        )
+        raise ProgramError(block.line.number, f"{letter} {where}, and {what}")
+
+
+def _refuse_untold_rotation(block: Block) -> None:
+    """Raise `ProgramError`: a stored rotation of the coordinates would turn corrections of X and Y."""
+    name = system_name(block.modal.system)
+    raise ProgramError(
+        block.line.number,
+        f"X or Y is corrected, and a rotation of {name} that is stored in the controller (G10 L2 R) would turn that: "
+        f"say that there is none (--rotation none) or which (--rotation '{name}=12 deg')",
+    )
 
 
 def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
