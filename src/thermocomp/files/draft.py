@@ -12,11 +12,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
-try:
-    import fcntl
-except ImportError:  # not on Windows: nothing is locked there, so nothing of others is removed
-    fcntl = None  # type: ignore[assignment]
-
 _PREFIX = ".thermocomp-"
 _NAME = re.compile(re.escape(_PREFIX) + "[0-9a-f]{32}")
 _LOCK = "lock"
@@ -85,12 +80,12 @@ def _made(folder: Path) -> tuple[Path, int]:
 
 
 def _locked(lock: int, *, wait: bool = True) -> bool:
-    """Lock a file; return False where that cannot be."""
-    if fcntl is None:
-        return False
+    """Lock a file; return False where that cannot be: then nothing of others is removed either."""
     try:
+        import fcntl  # not on Windows
+
         fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:  # somebody has it, or the disk knows no locks
+    except (ImportError, OSError):  # or somebody has it, or the disk knows no locks
         return False
     return True
 
