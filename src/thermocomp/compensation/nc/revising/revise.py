@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from operator import sub
+from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Point, Setup
@@ -18,7 +18,8 @@ from thermocomp.compensation.nc.reading.recognise import recognise
 from thermocomp.compensation.nc.reading.tokens import read_lines
 from thermocomp.compensation.nc.revising import header
 from thermocomp.compensation.nc.revising.check import Check
-from thermocomp.compensation.nc.revising.demand import Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.demand import Cut, Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
@@ -46,6 +47,7 @@ class Revised(NamedTuple):
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
+    cut: Cut | None = None  #: what was met in it, if the tool cuts
 
 
 @dataclass
@@ -60,11 +62,17 @@ class Revision:
         At its start state.
     method : Method
     demand : Demand
+    header_lines : int
+        Lines of the header.
 
     Attributes
     ----------
     left : Left
         What the correction leaves of the drift in the cuts.
+    elsewhere : Elsewhere
+        What another work offset would cost, where the drift depends on the place.
+    corrected : bool
+        A correction was in force at some time.
     lines, changed : int
         Lines read, and how many of them are not as they were.
     seconds : float
@@ -74,7 +82,7 @@ class Revision:
     slowest, fastest : float
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
-        What kept a correction from following the drift in a cut, by how much at most [um], and in which line.
+        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
     idle : int
         Lines behind the end of the program that have words: nothing is corrected there.
     """
@@ -84,7 +92,10 @@ class Revision:
     drift: Drifting
     method: Method
     demand: Demand
+    header_lines: int = header.LINES
     left: Left = field(default_factory=Left, init=False)
+    elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
+    corrected: bool = field(default=False, init=False)
     lines: int = field(default=0, init=False)
     changed: int = field(default=0, init=False)
     seconds: float = field(default=0.0, init=False)
@@ -94,6 +105,7 @@ class Revision:
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
+    _why: str = field(default="", init=False)  # what has held the correction in the cut before
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
@@ -145,15 +157,20 @@ class Revision:
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
+            cut = None
             if cutting:
                 samples.append((1.0, deviation))
                 ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
-                self.left.take(line.number, _beside(samples, *ends))
-                self._note_held(block, demand, ends[1])
+                cut = self.left.take(line.number, _beside(samples, *ends))
+                self._note_held(block, demand, samples[0][1], ends, cut)
+                if self.drift.by_position:
+                    self.elsewhere.take(end, point, self.drift)
+            else:
+                self._why = ""
             self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
-                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner)
+                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner, cut)
             )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
@@ -167,11 +184,14 @@ class Revision:
             yield line
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
-        return Revised(0, "", header.blank(ending(text)), None, 0.0, 0.0, deviation, carried, carried)
+        return Revised(
+            0, "", header.blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+        )
 
     def _told(self, revised: Revised) -> Revised:
         self.lines += 1
         self.changed += revised.texts != (revised.text,)
+        self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
         return revised
 
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
@@ -214,13 +234,23 @@ class Revision:
                 samples.append((k / pieces, self.drift.deviation(place)))
         return samples
 
-    def _note_held(self, block: Block, demand: Vector, carried: Vector) -> None:
-        gap = max(map(abs, map(sub, demand, carried)))
-        if gap <= self.demand.tolerance:
+    def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
+        """Note what keeps the correction from following in a cut that began at a drift."""
+        tolerance = self.demand.tolerance
+        gap = max(*map(abs, cut.left[0]), *map(abs, cut.left[1]))
+        if gap <= tolerance:
+            self._why = ""
             return
-        why = self.method.held_by(block)
-        if gap > self.held.get(why, (0.0, 0))[0]:
-            self.held[why] = gap, block.line.number
+        if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
+            self._why = self.method.held_by(block)
+        elif self.demand.every is not None:
+            self._why = "the time between renewals"
+        elif gap > max(map(abs, map(add, drift, ends[0]))):
+            self._why = "the length of the line, along which the drift is uneven"
+        else:
+            self._why = self._why or "the moves before the cut, which could not take it up"
+        if gap > self.held.get(self._why, (0.0, 0))[0]:
+            self.held[self._why] = gap, block.line.number
 
     def _refuse_open(self) -> None:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
