@@ -4,7 +4,6 @@ import math
 import random
 
 import numpy as np
-import pytest
 
 from thermocomp.compensation.nc.following.block import Block, Modal, Move
 from thermocomp.compensation.nc.reading.line import Line

@@ -107,7 +107,7 @@ def opposed(deviation: Vector) -> Vector:
 
 
 class Cut(NamedTuple):
-    """What was met in a block in which the tool cuts, at its ends and inside: per axis the lowest and the highest [um]."""
+    """What was met in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
 
     drift: tuple[Vector, Vector]
     left: tuple[Vector, Vector]  #: what the correction leaves of it

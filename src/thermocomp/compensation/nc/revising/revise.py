@@ -313,12 +313,13 @@ class _Places:
         if any(not m.rapid for m in block.moves) and system not in self.setup.offsets and system not in self._said:
             raise ProgramError(
                 block.line.number,
-                f"the drift depends on the place, and where {_name(system)} begins is unknown: "
-                f"--origin '{_name(system)}=0 mm, 0 mm, 0 mm'",
+                f"the drift depends on the place, and where {system_name(system)} begins is unknown: "
+                f"--origin '{system_name(system)}=0 mm, 0 mm, 0 mm'",
             )
 
 
-def _name(system: int) -> str:
+def system_name(system: int) -> str:
+    """Return the code of a work coordinate system."""
     if system > 100:
         return f"G54.1 P{system - 100}"
     return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
