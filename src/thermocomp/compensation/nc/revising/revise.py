@@ -8,17 +8,18 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from operator import sub
+from operator import add, sub
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.following.block import Block, Point, Setup, system_name
+from thermocomp.compensation.nc.following.block import Block, Point, Setup
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.reading.recognise import recognise
 from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising import header
+from thermocomp.compensation.nc.revising import header, known
 from thermocomp.compensation.nc.revising.check import Check
-from thermocomp.compensation.nc.revising.demand import Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.demand import Cut, Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
@@ -46,7 +47,8 @@ class Revised(NamedTuple):
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
-    other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
+    cut: Cut | None = None  #: what was met in it, if the tool cuts
+    other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
 
 
 @dataclass
@@ -61,11 +63,17 @@ class Revision:
         At its start state.
     method : Method
     demand : Demand
+    header_lines : int
+        Lines of the header.
 
     Attributes
     ----------
     left : Left
         What the correction leaves of the drift in the cuts.
+    elsewhere : Elsewhere
+        What another work offset would cost, where the drift depends on the place.
+    corrected : bool
+        A correction was in force at some time.
     lines, changed : int
         Lines read, and how many of them are not as they were.
     seconds : float
@@ -75,7 +83,7 @@ class Revision:
     slowest, fastest : float
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
-        What kept a correction from following the drift in a cut, by how much at most [um], and in which line.
+        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
     idle : int
         Lines behind the end of the program that have words: nothing is corrected there.
     """
@@ -85,7 +93,10 @@ class Revision:
     drift: Drifting
     method: Method
     demand: Demand
+    header_lines: int = header.LINES
     left: Left = field(default_factory=Left, init=False)
+    elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
+    corrected: bool = field(default=False, init=False)
     lines: int = field(default=0, init=False)
     changed: int = field(default=0, init=False)
     seconds: float = field(default=0.0, init=False)
@@ -95,6 +106,7 @@ class Revision:
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
+    _why: str = field(default="", init=False)  # what has held the correction in the cut before
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
@@ -121,7 +133,7 @@ class Revision:
         recognise(first)
         lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
         check = Check(self.setup)
-        steered = _Spindle(self.setup)
+        steered = known.Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -131,10 +143,7 @@ class Revision:
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
                 headed = True
-            if self.drift.by_position:
-                _refuse_unknown_place(block)
-            if block.turned:
-                _refuse_turned(block, self.setup)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
             samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
             self.seconds = end
@@ -148,13 +157,17 @@ class Revision:
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
-            if (carried[0] or carried[1]) and not block.modal.rotation_told:
-                _refuse_untold_rotation(block)
+            known.refuse_untold_rotation(block, carried)
+            cut = None
             if cutting:
                 samples.append((1.0, deviation))
                 ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
-                self.left.take(line.number, _beside(samples, *ends))
-                self._note_held(block, demand, ends[1])
+                cut = self.left.take(line.number, _beside(samples, *ends))
+                self._note_held(block, demand, samples[0][1], ends, cut)
+                if self.drift.by_position:
+                    self.elsewhere.take(end, point, self.drift)
+            else:
+                self._why = ""
             self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
@@ -168,6 +181,7 @@ class Revision:
                     deviation,
                     carried,
                     change.inner,
+                    cut,
                     change.other,
                 )
             )
@@ -183,11 +197,14 @@ class Revision:
             yield line
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
-        return Revised(0, "", header.blank(ending(text)), None, 0.0, 0.0, deviation, carried, carried)
+        return Revised(
+            0, "", header.blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+        )
 
     def _told(self, revised: Revised) -> Revised:
         self.lines += 1
         self.changed += revised.texts != (revised.text,)
+        self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
         return revised
 
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
@@ -230,13 +247,23 @@ class Revision:
                 samples.append((k / pieces, self.drift.deviation(place)))
         return samples
 
-    def _note_held(self, block: Block, demand: Vector, carried: Vector) -> None:
-        gap = max(map(abs, map(sub, demand, carried)))
-        if gap <= self.demand.tolerance:
+    def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
+        """Note what keeps the correction from following in a cut that began at a drift."""
+        tolerance = self.demand.tolerance
+        gap = max(*map(abs, cut.left[0]), *map(abs, cut.left[1]))
+        if gap <= tolerance:
+            self._why = ""
             return
-        why = self.method.held_by(block)
-        if gap > self.held.get(why, (0.0, 0))[0]:
-            self.held[why] = gap, block.line.number
+        if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
+            self._why = self.method.held_by(block)
+        elif self.demand.every is not None:
+            self._why = "the time between renewals"
+        elif gap > max(map(abs, map(add, drift, ends[0]))):
+            self._why = "the length of the line, along which the drift is uneven"
+        else:
+            self._why = self._why or "the moves before the cut, which could not take it up"
+        if gap > self.held.get(self._why, (0.0, 0))[0]:
+            self.held[self._why] = gap, block.line.number
 
     def _refuse_open(self) -> None:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
@@ -244,75 +271,6 @@ class Revision:
             raise ProgramError(
                 self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
             )
-
-
-@dataclass
-class _Spindle:
-    """Spindle speed, also of a program that finds the spindle running."""
-
-    setup: Setup
-    _told: bool = False
-
-    def speed(self, block: Block) -> float:
-        """Return the speed in a block [1/min].
-
-        Raises
-        ------
-        ProgramError
-            The program cuts, and nobody knows how fast the spindle turns.
-        """
-        if not self._told:
-            self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
-            if not self._told and self.setup.speed:
-                return self.setup.speed
-            if not self._told and any(not m.rapid for m in block.moves):
-                raise ProgramError(
-                    block.line.number,
-                    "the program cuts, but has not said how fast the spindle turns (S, M3): its drift is unknown; "
-                    "state the speed it finds with --speed",
-                )
-        return block.speed
-
-
-def _refuse_unknown_place(block: Block) -> None:
-    """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
-    modal = block.modal
-    if (modal.origin_told and modal.untold_tool is None) or all(m.rapid for m in block.moves):
-        return
-    name, tool = system_name(modal.system), modal.untold_tool
-    if not modal.origin_told:
-        what = f"where {name} begins is unknown: --origin '{name}=0 mm, 0 mm, 0 mm'"
-    elif tool == -1:
-        what = "the length of the tool in the spindle is unknown: write its number (T, M6, or H)"
-    else:
-        what = f"the length of tool {tool} is unknown: --tool '{tool}=120 mm'"
-    raise ProgramError(block.line.number, f"the drift depends on the place, and {what}")
-
-
-def _refuse_turned(block: Block, setup: Setup) -> None:
-    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle: it grows along the tool."""
-    for letter, angle in block.turned.items():
-        side = setup.rotary.get(letter)
-        if side == "table":
-            continue
-        where = "gets another zero" if math.isnan(angle) else f"is at {angle:g} deg"
-        what = (
-            "it is in the head, so the spindle grows along the tool and not along Z: not supported"
-            if side
-            else "does it turn the spindle or the workpiece? say so with --machine, whose structure names it: "
-            f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
-        )
-        raise ProgramError(block.line.number, f"{letter} {where}, and {what}")
-
-
-def _refuse_untold_rotation(block: Block) -> None:
-    """Raise `ProgramError`: a stored rotation of the coordinates would turn corrections of X and Y."""
-    name = system_name(block.modal.system)
-    raise ProgramError(
-        block.line.number,
-        f"X or Y is corrected, and a rotation of {name} that is stored in the controller (G10 L2 R) would turn that: "
-        f"say that there is none (--rotation none) or which (--rotation '{name}=12 deg')",
-    )
 
 
 def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
