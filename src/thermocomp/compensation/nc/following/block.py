@@ -38,7 +38,9 @@ class Modal:
     system : int
         Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
     rotation : float
-        Rotation of the work coordinate system about Z [deg].
+        Of the program's coordinates about Z, stored or by G68 [deg].
+    turned : bool
+        G68 is in force.
     retract : {98, 99}
     retract_stated : bool
         The program has said which; else it is what the controller happens to stand at.
@@ -60,6 +62,7 @@ class Modal:
     diameter: bool = False
     system: int = 1
     rotation: float = 0.0
+    turned: bool = False
     retract: int = 98
     retract_stated: bool = False
     blend: float | None = 0.0

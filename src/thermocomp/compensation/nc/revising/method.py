@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Modal
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.text import Digits
+from thermocomp.compensation.nc.revising.text import LONGEST, Digits, parted
 from thermocomp.core.exceptions import ProgramError
 
 AXES = "XYZ"
@@ -68,6 +68,8 @@ class Method(ABC):
         """
         before, self.inner = self.carried, None
         texts = self._revise(block, demand)
+        if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
+            texts = (*texts[:-1], *parted(texts[-1]))
         return Change(texts, before, self.carried, self.inner or self.carried)
 
     @property

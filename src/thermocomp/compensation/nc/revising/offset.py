@@ -76,6 +76,7 @@ class Offset(Method):
             )
             and modal.absolute
             and not modal.cutter
+            and not modal.turned
             and not block.line.optional
             and bool(self.named(block))
         )
