@@ -99,7 +99,9 @@ def judge(
         compared += 1
         moves += len(was.moves)
         if (fault := _calls(was, now)) is None:
-            faults += (f for a, b in zip(was.moves, now.moves, strict=True) for f in _moved(a, b, most))
+            faults += (
+                f for a, b in zip(was.moves, now.moves, strict=True) for f in _moved(a, b, most, a.line in machine)
+            )
             lasts = {a.line: _shift(a.end, b.end) for a, b in zip(was.moves, now.moves, strict=True)}
             if not state.jog:
                 first.setdefault(state.skip, lasts)
@@ -132,8 +134,8 @@ def _calls(was: Ran, now: Ran) -> str | None:
     return None
 
 
-def _moved(a: Move, b: Move, most: Vector) -> Iterator[str]:
-    """Yield what is wrong with a move."""
+def _moved(a: Move, b: Move, most: Vector, leaves: bool) -> Iterator[str]:
+    """Yield what is wrong with a move; one to machine coordinates leaves its shift, and is as much longer."""
     shift = _shift(a.end, b.end)
     where = f"line {a.line}, {a.kind}"
     for value, limit, letter in zip(shift, most, "XYZ", strict=True):
@@ -143,7 +145,7 @@ def _moved(a: Move, b: Move, most: Vector) -> Iterator[str]:
         yield f"{where}: another axis than X, Y, Z goes elsewhere"
     if a.steps < STILL <= b.steps and turned(a.start, a.end) > STILL:
         yield f"{where}: moves X, Y or Z by {b.steps * 1e3:.2f} um, the original only turns"
-    elif a.kind != "rapid":
+    elif a.kind != "rapid" and not leaves:
         allowed = max(SHARE * a.seconds, SECONDS) if a.steps >= STILL else 1e-6 * a.seconds
         if abs(a.seconds - b.seconds) > allowed:
             yield f"{where}: takes {b.seconds:.4f} s instead of {a.seconds:.4f} s"

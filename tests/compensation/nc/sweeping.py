@@ -1,9 +1,12 @@
-"""One random program: revised by both methods and judged in drawn states of a controller."""
+"""Random programs: revised by both methods, and judged in drawn states of a controller."""
 
 import math
 import random
 import re
-from collections.abc import Iterator
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +21,8 @@ from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.core.exceptions import InputError, ProgramError, ThermocompError
 
 WAYS = ("coordinates", "offset")
+#: programs that a process takes at a time
+PIECE = 5
 
 
 @dataclass
@@ -124,3 +129,60 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
     except state_judge.InvalidError as error:
         found.kind, found.reasons = "invalid", (str(error),)
     return found
+
+
+def sweep(seeds: range, processes: int = 1) -> Iterator[Outcome]:
+    """Yield what becomes of the programs of some seeds, in their order."""
+    pieces = [seeds[k : k + PIECE] for k in range(0, len(seeds), PIECE)]
+    if processes == 1:
+        for some in pieces:
+            yield from _piece(some)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        for found in pool.map(_piece, pieces):
+            yield from found
+
+
+def _piece(seeds: range) -> list[Outcome]:
+    with tempfile.TemporaryDirectory(prefix="sweep-") as folder:
+        return [found for seed in seeds for found in tried(seed, Path(folder))]
+
+
+class Counts:
+    """What a sweep has found.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    """
+
+    def __init__(self, outcomes: Sequence[Outcome]) -> None:
+        self._outcomes = outcomes
+        self.programs = len({o.seed for o in outcomes})
+        self.valid = self.programs - len({o.seed for o in outcomes if o.kind == "invalid"})
+
+    def of(self, way: str, kind: str) -> list[Outcome]:
+        """Return the outcomes of one way and kind."""
+        return [o for o in self._outcomes if o.way == way and o.kind == kind]
+
+    def refused(self, way: str) -> float:
+        """Return the share of valid programs that were refused."""
+        return len(self.of(way, "refused")) / max(self.valid, 1)
+
+    def __str__(self) -> str:
+        rows = [f"programs {self.programs}, valid {self.valid}"]
+        for way in WAYS:
+            counts = {kind: self.of(way, kind) for kind in ("revised", "refused", "report", "wrong")}
+            moves = sum(o.moves for o in counts["revised"])
+            rows.append(
+                f"{way}: revised {len(counts['revised'])}, refused {len(counts['refused'])} ({self.refused(way):.1%}), "
+                f"please report {len(counts['report'])}, wrong {len(counts['wrong'])}; {moves:,} moves right"
+            )
+            for kind in ("refused", "report", "wrong"):
+                seeds: dict[str, int] = {}
+                reasons: Counter[str] = Counter()
+                for o in counts[kind]:
+                    reasons.update(o.groups)
+                    seeds |= dict.fromkeys(o.groups, o.seed)
+                rows += (f"  {kind:8} {n:4}  {group} [seed {seeds[group]}]" for group, n in reasons.most_common())
+        return "\n".join(rows)
