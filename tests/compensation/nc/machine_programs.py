@@ -30,7 +30,7 @@ _TRIFLES = {
 
 
 def program(seed: int) -> str:
-    """Return a program of 15 to 80 lines, its letters within Latin-1."""
+    """Return a program of some 15 to 80 lines, its letters within Latin-1."""
     w = Writer(random.Random(seed))
     _begin(w)
     length = w.draw.randint(14, 66)

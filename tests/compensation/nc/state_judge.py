@@ -83,7 +83,7 @@ def judge(
     """
     machine, kept = _machine_lines(original), _kept(original)
     compared = moves = 0
-    first: dict[bool, dict[int, Vector]] = {}
+    first: dict[bool, dict[int, list[Vector]]] = {}
     wrong: list[str] = []
     for number, state in enumerate(drawn):
         try:
@@ -102,19 +102,21 @@ def judge(
             faults += (
                 f for a, b in zip(was.moves, now.moves, strict=True) for f in _moved(a, b, most, a.line in machine)
             )
-            lasts = {a.line: _shift(a.end, b.end) for a, b in zip(was.moves, now.moves, strict=True)}
+            shifts: dict[int, list[Vector]] = {}
+            for a, b in zip(was.moves, now.moves, strict=True):
+                shifts.setdefault(a.line, []).append(_shift(a.end, b.end))
             if not state.jog:
-                first.setdefault(state.skip, lasts)
-                faults += _in_machine(lasts, machine)
-            faults += _same(lasts, first.get(state.skip, {}), kept, bool(state.jog))
+                first.setdefault(state.skip, shifts)
+                faults += _in_machine(shifts, machine)
+            faults += _same(shifts, first.get(state.skip, {}), kept, bool(state.jog))
             faults += _left(was.left, now.left)
         else:
             faults.append(fault)
         wrong += (f"state {number}: {fault}" for fault in faults)
-    if compared < len(drawn) / 2:
-        raise InvalidError(f"it runs in {compared} of {len(drawn)} states")
     if wrong:
         raise WrongError(wrong)
+    if compared < len(drawn) / 2:
+        raise InvalidError(f"it runs in {compared} of {len(drawn)} states")
     return Judgement(compared, moves)
 
 
@@ -179,24 +181,44 @@ def _shift(a: Sequence[float], b: Sequence[float]) -> Vector:
 
 
 def _same(
-    lasts: dict[int, Vector], first: dict[int, Vector], kept: dict[int, frozenset[int]], jogged: bool
+    shifts: dict[int, list[Vector]],
+    first: dict[int, list[Vector]],
+    kept: dict[int, tuple[frozenset[int], bool]],
+    jogged: bool,
 ) -> Iterator[str]:
-    """Yield differences to the first state; an axis that a line does not position keeps what it carries in this one."""
-    carried: Vector = (0.0, 0.0, 0.0)
-    for line, shift in lasts.items():
-        for axis, (value, wanted) in enumerate(zip(shift, first.get(line, shift), strict=True)):
-            keeps = axis in kept.get(line, ()) and abs(value - carried[axis]) <= ROUNDING
-            if abs(value - wanted) > ROUNDING and not keeps and not (jogged and abs(value) <= ROUNDING):
+    """Yield differences to the first state, where the lines end.
+
+    An axis that a line does not position keeps what it carries in this state; behind a hole it may be that of R, or of
+    the level where the cycle began.
+    """
+    carried = level = (0.0, 0.0, 0.0)
+    for line, (*within, shift) in shifts.items():
+        wanted = first.get(line, [shift])
+        free, drills = kept.get(line, (frozenset(), False))
+        if not drills:
+            level = shift
+        for axis, value in enumerate(shift):
+            allowed = {wanted[-1][axis]}
+            if axis in free:
+                allowed.add(carried[axis])
+            if drills and axis == 2:
+                allowed |= {carried[2], level[2], *(s[2] for s in within)}
+            if jogged:
+                allowed.add(0.0)
+            if all(abs(value - a) > ROUNDING for a in allowed):
                 how = "after a hand has moved the axes " if jogged else ""
-                yield f"line {line}: {how}{'XYZ'[axis]} is shifted by {value:.2f} um, in the first by {wanted:.2f} um"
+                yield (
+                    f"line {line}: {how}{'XYZ'[axis]} is shifted by {value:.2f} um, in the first by "
+                    f"{wanted[-1][axis]:.2f} um"
+                )
         carried = shift
 
 
-def _kept(text: str) -> dict[int, frozenset[int]]:
-    """Return, by line, the axes that a line does not position, or goes back with to where a cycle began."""
+def _kept(text: str) -> dict[int, tuple[frozenset[int], bool]]:
+    """Return, by line, the axes that it does not position, and whether it drills."""
     lines = text.split("\n")
     return {
-        number: frozenset(i for i, letter in enumerate("XYZ") if letter not in bare(line) or (i == 2 and mode.drills))
+        number: (frozenset(i for i, letter in enumerate("XYZ") if letter not in bare(line)), mode.drills)
         for number, (line, mode) in enumerate(zip(lines, followed(lines), strict=True), 1)
     }
 
@@ -213,10 +235,10 @@ def _machine_lines(text: str) -> dict[int, tuple[int, ...]]:
     return found
 
 
-def _in_machine(lasts: dict[int, Vector], machine: dict[int, tuple[int, ...]]) -> Iterator[str]:
-    for line in lasts.keys() & machine.keys():
+def _in_machine(shifts: dict[int, list[Vector]], machine: dict[int, tuple[int, ...]]) -> Iterator[str]:
+    for line in shifts.keys() & machine.keys():
         for axis in machine[line]:
-            if abs(value := lasts[line][axis]) > ROUNDING:
+            if abs(value := shifts[line][-1][axis]) > ROUNDING:
                 yield f"line {line}: {'XYZ'[axis]} goes to machine coordinates shifted by {value:.2f} um"
 
 
