@@ -220,6 +220,9 @@ def turn(w: Writer) -> None:
         elif w.maybe(0.2):
             w.feed(f=200, Z=(w.at["Z"] or 0.0) - 0.5)
     w.rapid(Z=w.clear)
+    if w.maybe(0.15):  # the turns are forgotten
+        w.put(f"G92 {a}0")
+        w.at[a] = 0.0
 
 
 def wind(w: Writer) -> None:

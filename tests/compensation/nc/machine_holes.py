@@ -31,6 +31,9 @@ def drill(w: Writer) -> None:
         w.put("G80")
     if w.maybe(0.2):
         w.put("G4 P0.3")
+    elif w.maybe(0.2):
+        w.put(f"G80 G0 Z{w.number(w.clear)}")
+        w.at["Z"] = w.rounded("Z", w.clear)
     for _ in range(draw.choice((0, 1, 2))):
         w.motion = ""
         x += 10.0

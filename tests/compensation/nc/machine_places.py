@@ -74,14 +74,18 @@ def tool(w: Writer, first: bool = False) -> None:
     number, other = draw.randint(1, 6), draw.randint(1, 6)
     w.put(draw.choice((f"T{number} M6", f"M6 T{number}", f"T{number}\nM6")))
     length = f"G43 H{number}"
-    more = ("G43", "", f"G43.1 Z{w.number(112.345)}", f"{length}\nG43.2 H{other}")
-    if text := draw.choice((length,) * 6 + more):
+    more = ("G43", "", f"G43.1 Z{w.number(112.345)}", f"{length}\nG43.2 H{other}", "with Z", "with Z")
+    text = draw.choice((length,) * 6 + more)
+    if text and text != "with Z":
         w.put(text)
     w.put(draw.choice((f"S{draw.randint(8, 120) * 100} M3", f"M3 S{draw.randint(8, 120) * 100}")))
     if w.maybe(0.3):
         w.put("M8")
     w.motion = ""
     w.lost("X", "Y", "Z")
+    if text == "with Z":
+        w.put(draw.choice((f"G0 G43 Z{w.number(w.clear)} H{number}", f"G43 H{number} G0 Z{w.number(w.clear)}")))
+        w.at["Z"], w.motion = w.rounded("Z", w.clear), "G0"
     if not first:
         wake(w)
 

@@ -23,6 +23,7 @@ _NOTES = (
 _TRIFLES = {
     "dwell": ("G4 P0.2", "G4 P0.5", "G4 P1.", "G4 P2"),
     "coolant": ("M8", "M7", "M9"),
+    "safe": ("G90", "G40", "G17 G40", "G94", "G90 G17"),
     "path": ("G64", "G61", "G64 P0.005", "G61.1"),
     "/": ("/M8", "/M9", "/M1", "/G4 P0.5", "/M0"),
     "stop": ("M0", "M1", "M1", "M60"),
@@ -95,7 +96,9 @@ def _end(w: Writer) -> None:
 def _trifle(w: Writer) -> None:
     """Put a line that moves nothing, one that the operator may skip, or a stop."""
     draw = w.draw
-    kind = draw.choice(("blank", "note", "dwell", "coolant", "speed", "path", "/", "/ move", "stop", "stop", "stop"))
+    kind = draw.choice(
+        ("blank", "note", "dwell", "coolant", "safe", "speed", "path", "/", "/ move", "stop", "stop", "stop")
+    )
     if kind == "blank":
         w.lines.append("")
     elif kind == "note":
@@ -106,7 +109,7 @@ def _trifle(w: Writer) -> None:
         _skipped(w)
     else:
         w.put(draw.choice(_TRIFLES[kind]))
-        if kind in ("/", "stop"):
+        if kind in ("/", "stop", "safe"):
             w.stopped()
         if kind == "stop":
             machine_places.wake(w)

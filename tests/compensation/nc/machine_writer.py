@@ -137,6 +137,9 @@ class Writer:
         words += [c + (self.angle(v) if c in "ABC" else self.number(v)) for c, v in named.items()]
         if code == "G1":
             words += self._f(f)
+        elif self.maybe(0.05):
+            words.append(self.draw.choice(("M8", "M9", "S4000 M3", "G90", "G64")))
+            words[0] = words[0] if self.maybe(0.5) else f"G90 {words[0]}" if "G90" not in words else words[0]
         self.motion = code
         self.put(" ".join(words))
 
