@@ -12,6 +12,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
+from state_pieces import joined
 from state_run import MOVES, STILL, Move, Ran, State, bare, followed, run, turned
 
 from thermocomp.core.exceptions import ProgramError, ThermocompError
@@ -92,7 +93,7 @@ def judge(
             continue  # such as arcs of G18 in rotated coordinates
         faults: list[str] = []
         try:
-            now = run(revised, state, folder)
+            now = joined(was, run(revised, state, folder), most)
         except ProgramError as error:
             wrong.append(f"state {number}: the interpreter refuses the revised program: {error}")
             continue

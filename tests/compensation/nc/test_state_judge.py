@@ -123,3 +123,14 @@ def test_what_is_wrong_is_told(original: str, revised: str, expected: str, tmp_p
 def test_a_program_that_does_not_run_is_not_judged(tmp_path: Path) -> None:
     with pytest.raises(InvalidError):
         judge("G1 X1\nM2\n", "G1 X1\nM2\n", NOTHING, states(1, Stated(True, True)), tmp_path)
+
+
+def test_pieces_of_a_cut_are_one_move(tmp_path: Path) -> None:
+    original = "G0 X0 Y0 Z0\nG1 X100 F100\nY50\nG3 X50 Y100 I-50 J0\nG2 X50 Y100 I5 J0\nM2\n"
+    revised = (
+        "G0 X0 Y0 Z0\nG1 X40 Z0.03 F100\nX100 Z0.02\nY50\nG3 X85.355339 Y85.355339 I-50 J0 Z0.03\nX50 Y100 I-35.355339"
+        " J-35.355339 Z0.05\nG2 X60 I5 J0\nX50 I-5 J0\nM2\n"
+    )
+    assert judged(original, revised, tmp_path) == []
+    assert judged(original, revised.replace("X40 Z0.03", "X40 Y1"), tmp_path)
+    assert judged(original, revised.replace("X40 Z0.03", "X40 F90"), tmp_path)
