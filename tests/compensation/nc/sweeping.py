@@ -26,8 +26,8 @@ PIECE = 5
 
 
 @dataclass
-class Settling(Steady):
-    """It grows from the first minute on, to some 180 um in Z: as no machine drifts, so that a fault shows."""
+class Swinging(Steady):
+    """It swings by up to 180 um within minutes, and never rests: as no machine drifts, so that every fault shows."""
 
     axes: str = "XYZ"
     time: float = 0.0
@@ -38,15 +38,13 @@ class Settling(Steady):
 
     def deviation(self, point: Point) -> Vector:
         """Return the drift [um]."""
-        share = 1.0 - math.exp(-self.time / 60.0)
-        z = -60.0 - 120.0 * share + 0.02 * min(max(point[2], -100.0), 100.0)
-        if self.axes == "Z":
-            return 0.0, 0.0, z
-        return 40.0 + 60.0 * share, -30.0 - 70.0 * share, z
+        x, y, z = (math.sin(self.time / period) for period in (31.0, 37.0, 45.0))
+        z = -90.0 - 85.0 * z + 0.02 * min(max(point[2], -100.0), 100.0)
+        return (50.0 + 50.0 * x, -50.0 - 50.0 * y, z) if self.axes != "Z" else (0.0, 0.0, z)
 
     def field(self) -> Field:
         """Return the drift as it is now."""
-        return Settling(self.axes, self.time).deviation
+        return Swinging(self.axes, self.time).deviation
 
 
 @dataclass
@@ -112,7 +110,7 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
     path = folder / "original.ngc"
     path.write_text(text, encoding="latin-1", newline="")
     try:
-        trial = revise(path, folder, Settling(axes), way, setup=setup(way, axes))
+        trial = revise(path, folder, Swinging(axes), way, setup=setup(way, axes))
     except InputError as error:
         found.reasons = (f"line {error.line}: {error.reason}" if isinstance(error, ProgramError) else str(error),)
         found.kind = "report" if "please report" in found.reasons[0] else "refused"
