@@ -4,6 +4,7 @@ Everything streams: lines are read, followed, timed, corrected and read again on
 whole (`Revision`) grows with it.
 """
 
+import copy
 import itertools
 import math
 from collections.abc import Iterable, Iterator
@@ -24,6 +25,7 @@ from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
 from thermocomp.compensation.nc.revising.way import at, length
+from thermocomp.compensation.nc.timing.segment import check_feed
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
 from thermocomp.core.exceptions import InputError, ProgramError
 
@@ -33,6 +35,7 @@ FIRST = 200
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
+_ROTARY = frozenset("ABC")
 
 
 class Revised(NamedTuple):
@@ -107,6 +110,46 @@ class Revision:
     _touching: bool = field(default=False, init=False)
     _why: str = field(default="", init=False)  # what has held the correction in the cut before
 
+    def rehearse(self, texts: Iterable[str]) -> Iterator[Block]:
+        """Go through a program and correct nothing: what will be refused whatever the drift is refused now, and soon.
+
+        Parameters
+        ----------
+        texts : iterable of str
+            Its lines, with their endings.
+
+        Yields
+        ------
+        Block
+            One for every line.
+
+        Raises
+        ------
+        ProgramError
+            A line cannot be read, followed or shifted safely.
+        """
+        method, steered, known = copy.deepcopy(self.method), _Spindle(self.setup), _Places(self.setup)
+        nothing: Vector = (0.0, 0.0, 0.0)
+        modal, seen = None, set[tuple[str, ...]]()
+        for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
+            steered.speed(block)
+            if self.drift.by_position:
+                known.check(block)
+            for move in block.moves:
+                check_feed(move, block)
+            # lines with the words and in the state of one before tell a method that corrects nothing nothing new
+            words = tuple(block.words)
+            if block.kind != "line" or block.line.optional or block.modal is not modal:
+                modal = block.modal
+                seen.clear()
+            elif words in seen:
+                yield block
+                continue
+            if _ROTARY.isdisjoint(words):  # of those the place counts too
+                seen.add(words)
+            method.revise(block, nothing)
+            yield block
+
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
 
@@ -127,10 +170,7 @@ class Revision:
         InputError
             It is not an ISO program.
         """
-        rest = iter(texts)
-        first = list(itertools.islice(rest, FIRST))
-        recognise(first)
-        lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
+        lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
         check = Check(self.setup)
         steered, known = _Spindle(self.setup), _Places(self.setup)
         point: Point = (0.0, 0.0, 0.0)
@@ -316,6 +356,14 @@ class _Places:
                 f"the drift depends on the place, and where {system_name(system)} begins is unknown: "
                 f"--origin '{system_name(system)}=0 mm, 0 mm, 0 mm'",
             )
+
+
+def _recognised(texts: Iterable[str]) -> Iterator[str]:
+    """Pass lines on, if they are of a control that is known."""
+    rest = iter(texts)
+    first = list(itertools.islice(rest, FIRST))
+    recognise(first)
+    return itertools.chain(first, rest)
 
 
 def system_name(system: int) -> str:
