@@ -48,9 +48,9 @@ def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
     for k, axis in enumerate("xyz"):
         write_models([judged(lags(f"{axis}_um", 0.1 * (k + 1)))], f"{axis}.json")
     models = ["--model", "x.json", "y.json", "z.json"]
-    assert revise(*models) == 0
+    assert revise(*models, "--rotation", "none") == 0
     later = ["--pause", "2 days", "--every", "10 min", "--date", "2026-01-31"]
-    assert revise(*models, "--carried", "out.ngc.job.json", *later, out="next.ngc", start="") == 0
+    assert revise(*models, "--carried", "out.ngc.job.json", *later, "--rotation", "none", out="next.ngc", start="") == 0
     header = [line for line in Path("next.ngc").read_text(encoding="ascii").splitlines() if MARK in line]
     assert [line.removeprefix(f"({MARK} ").split()[0] for line in header] == (
         ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound", "UNPROVED:"]
@@ -127,7 +127,7 @@ def test_the_offset_method_leaves_the_words_alone(job_folder: Path) -> None:
 
 def test_numbers_for_programs(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("x_um", -0.5)), judged(lags("z_um"))], "two.json")
-    assert revise("--model", "two.json", "--json", "--every", "5 min") == 0
+    assert revise("--model", "two.json", "--json", "--every", "5 min", "--rotation", "none") == 0
     told = json.loads(capsys.readouterr().out)
     assert told["lines"] == 23
     assert told["files"]["program"] == "out.ngc"

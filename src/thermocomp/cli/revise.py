@@ -102,7 +102,7 @@ def revise(
         unproved=way.unproved,
         diameters=controller.diameters(expand=way.expand),
         subroutines=way.folders(),
-        travel=None if machine is None else Travel(setup, {a.name: a.travel for a in machine.axes}),
+        travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
     )
     try:
         # a pipe gets its lines on stderr, whatever stdout is for

@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 
 from thermocomp.assessment.precompensation import Proof
-from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.following.block import Setup, system_name
 from thermocomp.compensation.nc.revising.course import Bound
 from thermocomp.compensation.nc.revising.elsewhere import AWAY, Elsewhere
 from thermocomp.compensation.nc.revising.header import wrapped
-from thermocomp.compensation.nc.revising.revise import system_name
 
 UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
 #: most lines for the models, for the place, and for the proof

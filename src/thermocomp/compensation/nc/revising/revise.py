@@ -13,11 +13,12 @@ from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Point, Setup
+from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.reading.recognise import recognise
 from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising import header
+from thermocomp.compensation.nc.revising import header, known
 from thermocomp.compensation.nc.revising.check import Check
 from thermocomp.compensation.nc.revising.demand import Cut, Demand, Drifting, Left
 from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
@@ -35,7 +36,7 @@ FIRST = 200
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
-_ROTARY = frozenset("ABC")
+_PLAIN = frozenset(("G0", "G1"))
 
 
 class Revised(NamedTuple):
@@ -51,6 +52,7 @@ class Revised(NamedTuple):
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
     cut: Cut | None = None  #: what was met in it, if the tool cuts
+    other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
 
 
 @dataclass
@@ -128,24 +130,24 @@ class Revision:
         ProgramError
             A line cannot be read, followed or shifted safely.
         """
-        method, steered, known = copy.deepcopy(self.method), _Spindle(self.setup), _Places(self.setup)
+        method, steered = copy.deepcopy(self.method), known.Spindle(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
         for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
             steered.speed(block)
-            if self.drift.by_position:
-                known.check(block)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
             for move in block.moves:
                 check_feed(move, block)
             # lines with the words and in the state of one before tell a method that corrects nothing nothing new
             words = tuple(block.words)
-            if block.kind != "line" or block.line.optional or block.modal is not modal:
+            plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional
+            if not plain or block.modal is not modal:
                 modal = block.modal
                 seen.clear()
             elif words in seen:
                 yield block
                 continue
-            if _ROTARY.isdisjoint(words):  # of those the place counts too
+            if plain and ROTARY.isdisjoint(words):  # of those the place counts too
                 seen.add(words)
             method.revise(block, nothing)
             yield block
@@ -172,7 +174,7 @@ class Revision:
         """
         lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
         check = Check(self.setup)
-        steered, known = _Spindle(self.setup), _Places(self.setup)
+        steered = known.Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -182,8 +184,7 @@ class Revision:
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
                 headed = True
-            if self.drift.by_position:
-                known.check(block)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
             samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
             self.seconds = end
@@ -197,6 +198,7 @@ class Revision:
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
+            known.refuse_untold_rotation(block, carried)
             cut = None
             if cutting:
                 samples.append((1.0, deviation))
@@ -210,7 +212,19 @@ class Revision:
             self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
-                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner, cut)
+                Revised(
+                    line.number,
+                    line.text,
+                    change.texts,
+                    block,
+                    start,
+                    end,
+                    deviation,
+                    carried,
+                    change.inner,
+                    cut,
+                    change.other,
+                )
             )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
@@ -300,77 +314,12 @@ class Revision:
             )
 
 
-@dataclass
-class _Spindle:
-    """Spindle speed, also of a program that finds the spindle running."""
-
-    setup: Setup
-    _told: bool = False
-
-    def speed(self, block: Block) -> float:
-        """Return the speed in a block [1/min].
-
-        Raises
-        ------
-        ProgramError
-            The program cuts, and nobody knows how fast the spindle turns.
-        """
-        if not self._told:
-            self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
-            if not self._told and self.setup.speed:
-                return self.setup.speed
-            if not self._told and any(not m.rapid for m in block.moves):
-                raise ProgramError(
-                    block.line.number,
-                    "the program cuts, but has not said how fast the spindle turns (S, M3): its drift is unknown; "
-                    "state the speed it finds with --speed",
-                )
-        return block.speed
-
-
-@dataclass
-class _Places:
-    """Whether it is known where the tool is, for a drift that depends on it."""
-
-    setup: Setup
-    _said: set[int] = field(default_factory=set)
-    _tool: int = 0
-
-    def check(self, block: Block) -> None:
-        """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
-        if block.tool_change is not None:
-            self._tool = block.tool_change
-        if "G10" in block.codes and block.values.get("L") == 2:
-            self._said.add(int(block.values.get("P", 0)) or block.modal.system)
-        if "G43" in block.codes:
-            tool = int(block.values.get("H", self._tool))
-            if tool and tool not in self.setup.tools:
-                raise ProgramError(
-                    block.line.number,
-                    f"the drift depends on the place, and the length of tool {tool} is unknown: --tool '{tool}=120 mm'",
-                )
-        system = block.modal.system
-        if any(not m.rapid for m in block.moves) and system not in self.setup.offsets and system not in self._said:
-            raise ProgramError(
-                block.line.number,
-                f"the drift depends on the place, and where {system_name(system)} begins is unknown: "
-                f"--origin '{system_name(system)}=0 mm, 0 mm, 0 mm'",
-            )
-
-
 def _recognised(texts: Iterable[str]) -> Iterator[str]:
     """Pass lines on, if they are of a control that is known."""
     rest = iter(texts)
     first = list(itertools.islice(rest, FIRST))
     recognise(first)
     return itertools.chain(first, rest)
-
-
-def system_name(system: int) -> str:
-    """Return the code of a work coordinate system."""
-    if system > 100:
-        return f"G54.1 P{system - 100}"
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
 
 
 def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
