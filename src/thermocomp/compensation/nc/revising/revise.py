@@ -26,7 +26,6 @@ from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
 from thermocomp.compensation.nc.revising.way import at, length
-from thermocomp.compensation.nc.timing.segment import check_feed
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
 from thermocomp.core.exceptions import InputError, ProgramError
 
@@ -136,8 +135,6 @@ class Revision:
         for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
             steered.speed(block)
             known.refuse(block, self.setup, by_position=self.drift.by_position)
-            for move in block.moves:
-                check_feed(move, block)
             # lines with the words and in the state of one before tell a method that corrects nothing nothing new
             words = tuple(block.words)
             plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional

@@ -120,14 +120,6 @@ class Segment:
         return 0.5 * self.acceleration * (1.0 - self.gives) * (ALONG if self.radius else 1.0)
 
 
-def check_feed(move: Move, block: Block) -> None:
-    """Raise `ProgramError` if a move goes somewhere in feed, and nobody knows how fast."""
-    if not (move.feed > 0.0 or move.rapid or move.seconds) and (
-        move.start != move.end or move.rotary or move.arc is not None
-    ):
-        raise ProgramError(block.line.number, "it moves in feed, and no feed is in force: write F before it")
-
-
 class Segments:
     """Makes segments of moves.
 
@@ -173,8 +165,10 @@ class Segments:
 
     def _asked(self, move: Move, length: float, block: Block) -> float:
         """Return the speed that the program asks for [mm/s]."""
-        check_feed(move, block)
-        return min(length / move.seconds if move.seconds else move.feed / 60.0, self.feed)
+        speed = length / move.seconds if move.seconds else move.feed / 60.0
+        if not speed > 0.0:
+            raise ProgramError(block.line.number, "it moves in feed, and no feed is in force: write F before it")
+        return min(speed, self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
         """Return what an arc or a helix is to the planner."""
