@@ -99,9 +99,9 @@ def test_what_is_revised_is_never_refused_before() -> None:
     assert min(revised, refusals) > 30
 
 
-@pytest.mark.parametrize("between", ["X5 Y5 Z2 M0", "X5 Y5 Z2 M1", "G53 G0 X0 Y0\nG1", "M0"])
+@pytest.mark.parametrize("between", ["X5 Z2 M0", "X5 Z2 M1", "G53 G0 X0 Y0\nG1", "M0"])
 def test_what_clears_a_doubt_is_not_passed_over(between: str) -> None:
-    text = f"{HEAD}X1 Y1\n{between}\nX1 Y1\nG92 X0\nG0 Z10\nM2\n"
+    text = f"{HEAD}X1 Y1\n{between}\nX1 Y1\nG92 Y0\nG0 Z10\nM2\n"
     assert list(revision().revise(text.splitlines(keepends=True)))
     assert refused(text) == ""
 
