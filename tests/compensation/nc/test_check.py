@@ -5,9 +5,10 @@ import pytest
 from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising.check import LONGEST, Check
+from thermocomp.compensation.nc.revising.check import Check
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Change
+from thermocomp.compensation.nc.revising.text import LONGEST
 from thermocomp.core.exceptions import ProgramError
 
 BEGIN = ["G21 G90 G17 S500 M3\n", "G0 X0 Y0 Z5 F100\n"]

@@ -133,6 +133,14 @@ def test_where_a_cycle_ends_unsaid_no_word_is_added_behind_it(tmp_path: Path) ->
     assert all("Z" in row.texts[0] for row in trial.rows if row.text.startswith(("G1 X50", "X60")))
 
 
+def test_a_line_with_a_long_comment_may_grow(tmp_path: Path) -> None:
+    """LinuxCNC takes what is behind the 252nd character for the next line."""
+    text = f"G1 Z-1 ({'a' * 235})\nX5\nG0 Z10\n"
+    trial = revise(program(tmp_path, Feature("", text)), tmp_path, Steady(), "coordinates")
+    assert trial.proved().moves >= 3
+    assert trial.rows[4].texts == (f"({'a' * 235})\n", "G1 Z-1.025\n")
+
+
 def cut(folder: Path, moves: str, step: float = 1.0) -> list[tuple[float, float]]:
     """Return way [mm] and change of the correction of Z [um] of each block of a cut, the drift growing fast."""
     path = program(folder, Feature("", f"G1 Z-1\n{moves}G0 Z10\n"))

@@ -297,3 +297,58 @@ def test_diameters_are_told_as_radii() -> None:
     blocks = run("G7 G0 X10\nG91 X10\nG8 G90 X10\n")
     assert [b.end[0] for b in blocks] == [5.0, 10.0, 10.0]
     assert blocks[0].modal.diameter
+
+
+def test_fanuc_goes_home_beside_a_motion_code() -> None:
+    setup = Setup("fanuc", inch=False)
+    text = "G1 X1. Y1. Z5. F100\n{}\nG90 X2.\n"
+    for line in ("G0 G91 G28 Z0.", "G91 G28 G00 Z0.", "G28 G91 Z0. G0"):
+        _, home, behind = run(text.format(line), setup)
+        assert home.kind == "home"
+        assert [m.end for m in home.moves] == [(1.0, 1.0, 5.0), (1.0, 1.0, 0.0)]
+        assert behind.moves[0].rapid
+    blocks = run("G0 Z5.\nG99 G81 X1. Y0 Z-1. R1. F100\nG0 G28 Z5.\nX3.\n", setup)
+    assert [(b.kind, len(b.moves)) for b in blocks[2:]] == [("home", 2), ("line", 1)]  # the cycle has ended
+
+
+def test_fanuc_moves_beside_g80() -> None:
+    setup = Setup("fanuc", inch=False)
+    blocks = run("G0 X0 Y0 Z5.\nG99 G81 X1. Z-1. R2. F100\nG80 Z50.\nX5.\nG80 X6. Y1.\n", setup)
+    assert [(b.kind, b.moves[0].rapid, b.end) for b in blocks[2:]] == [
+        ("line", True, (1.0, 0.0, 50.0)),
+        ("line", True, (5.0, 0.0, 50.0)),
+        ("line", True, (6.0, 1.0, 50.0)),
+    ]
+    blocks = run("G0 Z5.\nG1 X0 F100\nG99 G81 X1. Z-1. R2.\nG80 X5.\n", setup)
+    assert not blocks[3].moves[0].rapid
+
+
+def test_fanuc_stores_the_words_of_a_cycle() -> None:
+    setup = Setup("fanuc", inch=False)
+    for word in ("K0", "L0", "X0. L0"):
+        blocks = run(f"G0 X0 Y0 Z5.\nG98 G81 Z-1. R2. F100 {word}\nX1.\nG80\n", setup)
+        assert [len(b.moves) for b in blocks] == [1, 0, 5, 0]
+        assert blocks[1].sticky == {"Z": -1.0, "R": 2.0}
+        assert blocks[2].end == (1.0, 0.0, 5.0)
+
+
+def test_look_ahead_moves_nothing() -> None:
+    assert [len(b.moves) for b in run("G103 P1\nG0 X1.\nG103\n", Setup("fanuc", inch=False))] == [0, 1, 0]
+
+
+def test_fanuc_turns_its_coordinates() -> None:
+    """About a centre in program coordinates, behind G52 and before the origin."""
+    setup = Setup("fanuc", offsets={1: (100.0, 200.0, 300.0)}, inch=False)
+    text = "G54 G52 X1. Y2.\nG0 X0 Y0 Z5.\nG68 X10. Y0. R90.\nZ3.\nX12. Y0\nY3.\nG91 X1.\nG90\nG69\nX0 Y0\nG69\nX1.\n"
+    blocks = run(text, setup)
+    assert blocks[3].moves[0].end == pytest.approx((101.0, 202.0, 303.0))
+    assert blocks[4].moves[0].end == pytest.approx((111.0, 204.0, 303.0))
+    assert blocks[5].moves[0].end == pytest.approx((108.0, 204.0, 303.0))
+    assert blocks[6].moves[0].end == pytest.approx((108.0, 205.0, 303.0))
+    assert blocks[9].moves[0].end == pytest.approx((101.0, 202.0, 303.0))
+    assert [b.modal.rotation for b in blocks[1:10]] == [0, 90, 90, 90, 90, 90, 90, 0, 0]
+    assert [b.known[0] for b in blocks[1:]] == [True, False, False, True, True, True, True, False, True, True, True]
+    with pytest.raises(ProgramError, match="no decimal point"):
+        run("G68 X0 Y0 R30\n", Setup("fanuc", inch=True, integers="refuse"))
+    turned = run("G68 X0 Y0 R30000\n", Setup("fanuc", inch=True, integers="least"))
+    assert turned[0].modal.rotation == pytest.approx(30.0)

@@ -63,6 +63,17 @@ def test_refused_by_name(text: str, name: str) -> None:
         recognise(list(split_lines(text)))
 
 
+@pytest.mark.parametrize(
+    "text", ["N10 G71 G90 G17\n", "G90G71\n", "G0 X1\nN5G70\n", "%_N_PART_MPF\nG71\n", "G71 X1 Y2\n"]
+)
+def test_units_of_a_sinumerik_are_no_lathe_cycle(text: str) -> None:
+    with pytest.raises(InputError, match=r"Sinumerik") as found:
+        recognise(list(split_lines(text)))
+    assert "lathe" not in str(found.value)
+    if "%" not in text:
+        assert "write G20 for G70 and G21 for G71" in str(found.value)
+
+
 @pytest.mark.parametrize("coding", ["utf-16-le", "utf-16-be"])
 def test_utf_16_without_a_mark(coding: str) -> None:
     lines = list(split_lines("%\nG21 G0 X1\n(Taschenfräser → 5)\n".encode(coding).decode("latin-1")))
@@ -83,7 +94,7 @@ def test_a_refusal_says_what_to_do() -> None:
         "%\nO1234 (PLATE; TRANS, MCALL CYCLE81, R1=5)\nN10 G90 G54 G17 G40 G80 G49\nG91 G28 Z0\nT1 M6\n"
         "G0 G90 X0. Y0. S3000 M3\nG43 H1 Z50. M8\nG81 G98 Z-10. R2. F100.\nG80\nM30\n%\n",
         "O0001\nG15 G40 G43 H2 Z1.\nG16\nG15\n",
-        "G70\nG71\nG71 P10 Q20\n",
+        "G71 P10 Q20\nG70 P10 Q20\nG71 Q100 X1 Z2 D1 I1 R1\nG71U2.R1.\nG70 I5. J15. L12\n",
         "#1=5\n#100=#1*2(R1=5)\n#<trans>=5\no<rot> call [1]\no<id>sub\nIF[#1GT2]GOTO10\nWHILE[#1LT5]DO1\nEND1\n",
         "; TRANS X=5, R1=5, CYCLE81(1), T=1, 5 L X+10 FMAX\n",
         "(BEGIN PGM TOOL CALL 5)\nG0 X1\n",

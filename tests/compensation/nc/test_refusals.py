@@ -176,19 +176,15 @@ def test_a_speed_that_was_never_told() -> None:
         ("G16", "polar"),
         ("G51 X1", "scaling"),
         ("G51.1 X0", "mirroring"),
-        ("G68 X0 Y0 R30", "rotated"),
         ("G43.4 H1", "tool centre point"),
         ("G12.1", "polar interpolation"),
         ("G7.1 C10", "cylindrical"),
-        ("G65 P9000", "macro"),
+        ("G66 P9000", "G65 on every line"),
         ("G76 X1 Z-1 R1", "G86"),
         ("M198 P1", "subprogram"),
         ("G28", "without axis words"),
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
-        ("IF [#1 EQ 1] GOTO 10", "CAM system"),
-        ("WHILE [#1 LT 2] DO1", "CAM system"),
-        ("M98 P1000", "CAM system"),
         ("M10", "if it moves nothing, name it with --harmless M10"),
         ("G999", "unknown (fanuc): nobody knows what it does; remove it"),
         ("T0101", "a lathe program: X is a diameter"),
@@ -198,8 +194,32 @@ def test_a_speed_that_was_never_told() -> None:
         ("G54 P1", "write G54.1 P1"),
         ("G0 X1.\nG5.1 Q1 X5.", "on a line of its own"),
         ("G0 G8 P1 X5.", "on a line of its own"),
-        ("G99 G81 X1. Z-1. R1. F100 K0", "K0 stores the words of G81 and drills no hole"),
-        ("G99 G81 X1. Z-1. R1. F100 L0", "L0 stores the words of G81 and drills no hole"),
+        ("G99 G81 X1. Z-1. R1. F100 K0", "X beside K0"),
+        ("G0 X2. Y0\nG99 G81 X1. Z-1. R1. F100 L0", "X beside L0"),
+        ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91", "G91 while G81 is in force"),
+        ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 X1. K3", "G91 while G81 is in force"),
+        ("G0 Z5.\nG91 G81 X1. Z-1. R-2. F100\nG90 G82 X1. Z-1. R2.", "G90 while G81 is in force"),
+        ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 G28 Z0", "G91 while G81 is in force"),
+        ("G0 Z5.\nG98 G81 X1. Z-1. R6. F100", "R is 1 mm above the level"),
+        ("G0 Z5.\nG91 G81 X1. Z-1. R2. F100", "R is 2 mm above the level"),
+        ("G2 X1. Y0. R5. F100\nG81 X1. Z-3. R-2.\nG80 Z5.", "neither G0 nor G1"),
+        ("G0 G52 X1.", "both would use the axis words"),
+        ("G18 G68 X0 Z0 R30.", "G68 in G18"),
+        ("G68 X0 R30.", "G68 without Y"),
+        ("G68 X0 Y0", "the angle"),
+        ("G68 X0 Y0 Z0 R10.", "G68 with Z"),
+        ("G68 X0 Y0 I1. J0 K0 R10.", "no code that uses it"),
+        ("G91 G68 X0 Y0 R30.", "G68 in G91"),
+        ("G41 D1\nG68 X0 Y0 R30.", "G40 before"),
+        ("G0 X0\nG68 X0 Y0 R30.\nX5.", "to X and Y in G90"),
+        ("G0 X0\nG68 X0 Y0 R30.\nG91 X5. Y5.", "to X and Y in G90"),
+        ("G0 X0\nG68 X0 Y0 R30.\nG81 Z-5. R-1. F100", "to X and Y in G90"),
+        ("G0 X0\nG68 X0 Y0 R30.\nX1. Y1.\nG69\nY5.", "first move behind G69"),
+        ("G68 X0 Y0 R30.\nG68 X0 Y0 R60.", "G69 before"),
+        ("G68 X0 Y0 R30.\nG55", "G69 before"),
+        ("G68 X0 Y0 R30.\nG52 X5.", "G69 before"),
+        ("G68 X0 Y0 R30.\nG91 G28 Z0", "G69 before"),
+        ("G68 X0 Y0 R30.\nG18", "G69 before"),
         ("G81 X1. Z-1. R1. F100\nG80\nX2.", "no motion code is in force"),
     ],
 )
@@ -209,6 +229,12 @@ def test_fanuc_refusals(text: str, reason: str) -> None:
     assert reason in caught.value.reason
     assert "--expand" not in caught.value.reason  # which is LinuxCNC's
     assert caught.value.line == 2 + text.count("\n")
+
+
+@pytest.mark.parametrize("text", ["IF [#1 EQ 1] GOTO 10", "WHILE [#1 LT 2] DO1", "M98 P1000", "M97 P10", "G65 P9000"])
+def test_fanuc_refusals_that_expand_helps_with(text: str) -> None:
+    with pytest.raises(ProgramError, match=r"^line 2: .*--expand writes"):
+        run(f"G21 G90\n{text}\n", Setup("fanuc", inch=False))
 
 
 def test_integers_can_be_refused() -> None:

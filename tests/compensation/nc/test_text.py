@@ -12,7 +12,7 @@ from thermocomp.compensation.nc.reading.line import Line, Word
 from thermocomp.compensation.nc.revising import header
 from thermocomp.compensation.nc.revising.diff import CONTEXT, unified
 from thermocomp.compensation.nc.revising.frame import Frame
-from thermocomp.compensation.nc.revising.text import DIGITS, number, shifted
+from thermocomp.compensation.nc.revising.text import DIGITS, LONGEST, number, parted, shifted
 from thermocomp.core.exceptions import ProgramError
 
 
@@ -59,6 +59,14 @@ def test_an_expression_is_wrapped() -> None:
 def test_a_word_is_added_behind_the_last_one() -> None:
     b = block("X5 (note)\n", ("X", "5", 5.0, 5.0))
     assert shifted(b, {"X": 0.01}, {"Z": -1.02}, 4) == "X5.01 Z-1.02 (note)\n"
+
+
+def test_a_long_comment_gets_a_line_of_its_own() -> None:
+    long = "a" * 230
+    assert parted(f"N5 G1 X1.0 (b) Y2.0 ({long})\r\n") == (f"(b) ({long})\r\n", "N5 G1 X1.0  Y2.0\r\n")
+    assert parted(f"G1 X1.0 ; {long} \n") == (f"; {long}\n", "G1 X1.0\n")
+    for same in (f"G1 X1.0 (short){' ' * 200}\n", "G1" + " " * LONGEST + "X1\n"):
+        assert parted(same) == (same,)
 
 
 def test_digits_of_the_controllers() -> None:

@@ -38,13 +38,15 @@ class Modal:
     system : int
         Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
     rotation : float
-        Rotation of the work coordinate system about Z [deg].
+        Of the program's coordinates about Z, stored or by G68 [deg].
     rotation_told : bool
         Program or setup say it; else one that is stored in the controller may be in force.
     origin_told : bool
         Program or setup say where the work coordinate system begins.
     untold_tool : int or None
         Tool whose length is in force, and neither program nor setup say it; -1: of a tool that is not known either.
+    turned : bool
+        G68 is in force.
     retract : {98, 99}
     retract_stated : bool
         The program has said which; else it is what the controller happens to stand at.
@@ -69,6 +71,7 @@ class Modal:
     rotation_told: bool = False
     origin_told: bool = False
     untold_tool: int | None = None
+    turned: bool = False
     retract: int = 98
     retract_stated: bool = False
     blend: float | None = 0.0

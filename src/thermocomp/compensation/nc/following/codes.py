@@ -115,9 +115,8 @@ _LINUXCNC_G: Final = (
 
 _NO_SCALING = "scaling is not supported; write the coordinates out"
 _NO_MIRROR = "mirroring is not supported; write the coordinates out"
-_NO_ROTATION = "rotated coordinates are not supported; write the coordinates out"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
-_MACRO = "macro calls are not followed; write the moves out in the CAM system"
+_WRITTEN = "--expand writes it into the program"
 _NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
 
 _FANUC_G: Final = (
@@ -142,15 +141,16 @@ _FANUC_G: Final = (
     Code("G51.1", "mirror", "mirror image", _NO_MIRROR),
     Code("G54.1", "system", "one of the additional work coordinate systems"),
     Code("G61.1", "path", "high accuracy"),
-    Code("G65", "once", "macro call", _MACRO),
-    Code("G66", "call", "modal macro call", _MACRO),
+    Code("G65", "once", "macro call", f"macros are not followed; {_WRITTEN}"),
+    Code("G66", "call", "modal macro call", "modal macro calls are not supported; write G65 on every line that calls"),
     Code("G67", "call", "modal macro call off"),
-    Code("G68", "rotation", "rotation", _NO_ROTATION),
+    Code("G68", "rotation", "rotation"),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
     Code("G69", "rotation", "rotation off"),
     Code("G76", "motion", "fine boring", "it shifts the tool at the bottom by a parameter of the control; use G86"),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
+    Code("G103", "look ahead", "limits how far the control looks ahead"),
     Code("G187", "high speed", "smoothness"),
 )
 
@@ -187,7 +187,8 @@ _LINUXCNC_M: Final = (
 )
 
 _FANUC_M: Final = (
-    Code("M98", "stop", "subprogram call", f"{_CALL} in the CAM system"),
+    Code("M97", "stop", "call of a line", f"subprograms are not followed; {_WRITTEN}"),
+    Code("M98", "stop", "subprogram call", f"subprograms are not followed; {_WRITTEN}"),
     Code("M29", "tapping", "rigid tapping"),
     Code("M198", "stop", "subprogram call", f"{_CALL} in the CAM system"),
 )
@@ -233,9 +234,9 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
         "J": _ARCS,
         "K": _ARCS | CYCLES,
         "L": CYCLES | {"G10"},
-        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G187"},
+        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G103", "G187"},
         "Q": frozenset({"G5.1", "G73", "G83", "G74", "G84"}),
-        "R": CYCLES | _ARCS | {"G5.1", "G10"},
+        "R": CYCLES | _ARCS | {"G5.1", "G10", "G68"},
     },
 }
 

@@ -7,7 +7,7 @@ move with its interpreter. What cannot be followed for certain is refused with l
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from thermocomp.compensation.nc.following import motion, placing, setting
+from thermocomp.compensation.nc.following import fanuc, motion, placing, setting
 from thermocomp.compensation.nc.following.block import Block, Setup
 from thermocomp.compensation.nc.following.codes import CYCLES, STOPS, TAKES_AXES
 from thermocomp.compensation.nc.following.orders import Orders, Reader
@@ -84,9 +84,7 @@ class Follower:
         if line.error:
             raise ProgramError(line.number, line.error)
         if line.flow:
-            remedy = (
-                "write them out in the CAM system" if self.state.fanuc else "--expand lets the interpreter unroll them"
-            )
+            remedy = "--expand writes them out" if self.state.fanuc else "--expand lets the interpreter unroll them"
             raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
@@ -157,6 +155,8 @@ class Follower:
         state, values, groups = self.state, orders.values, orders.groups
         before = state.modal
         code = self._motion(orders)
+        if state.fanuc:
+            fanuc.check_codes(state, orders, code)
         if values.keys() - _PLAIN_LETTERS:
             self._reader.check_letters(orders, code)
         block = Block(orders.line, before, "none", orders.codes, orders.words, values, state.place)
@@ -168,6 +168,8 @@ class Follower:
         once = groups.get("once")
         if once is not None:
             self._once(orders, block, once)
+        if state.turned_anew:
+            fanuc.check_place(state, orders, code)
         if code:
             self._move(orders, block, code)
         self._after(groups, block, code, before.motion)
@@ -208,24 +210,20 @@ class Follower:
         groups, values = orders.groups, orders.values
         told = groups.get("motion")
         once = groups.get("once")
+        turns = groups.get("rotation") == "G68"
         smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
         if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros say which are smoothed
             raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
-        if once is None and not smoothed and "tool length" not in groups:
+        if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":
-                if not _AXIS_LETTERS.isdisjoint(values):
-                    raise orders.error("axis words beside G80; write the motion code they are for")
-                return ""
+                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(orders)
             if told is not None:
                 return told
-        takes = smoothed or once in TAKES_AXES or groups.get("tool length") == "G43.1"
+        takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
         if once == "G4" and self.state.fanuc:
             takes = True
         if takes:
-            if told not in (None, "G80"):
-                raise orders.error(
-                    f"{told} beside {once or 'G43.1'}: both would use the axis words; put one on its own line"
-                )
+            self._beside(orders, told, "G68" if turns else once or "G43.1")
             return ""
         if told is not None and told != "G80":
             return told
@@ -235,6 +233,18 @@ class Follower:
         if not force or told == "G80":
             raise orders.error("axis words, and no motion code is in force; write G0, G1 ... before them")
         return force
+
+    def _beside_g80(self, orders: Orders) -> str:
+        if not self.state.fanuc:
+            raise orders.error("axis words beside G80; write the motion code they are for")
+        return fanuc.motion_beside_g80(self.state, orders)
+
+    def _beside(self, orders: Orders, told: str | None, other: str) -> None:
+        """Take in a motion code beside another one that takes the axis words."""
+        if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
+            fanuc.put_in_force(self.state, told)
+        elif told not in (None, "G80"):
+            raise orders.error(f"{told} beside {other}: both would use the axis words; put one on its own line")
 
     def _turns(self, orders: Orders) -> bool:
         """Whether the line is an arc without axis words: a full circle."""

@@ -1,5 +1,6 @@
 """Moves: straight ones, arcs, cycles, home, machine coordinates, threads, probing, splines."""
 
+from thermocomp.compensation.nc.following import fanuc
 from thermocomp.compensation.nc.following.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
 from thermocomp.compensation.nc.following.block import PLANES, Arc, Block, Known, Move
 from thermocomp.compensation.nc.following.cycles import KEPT, Cycle, CycleError, pause
@@ -234,7 +235,10 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
         _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, orders)
-    repeats = _repeats(state, orders, code)
+    block.kind, block.sticky = "cycle", state.sticky
+    if state.fanuc and not fanuc.drills(state, orders):
+        return
+    repeats = orders.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
     x, y, z = (v / scale for v in start)
     run = Cycle(
         code,
@@ -248,8 +252,6 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         state.level / scale,
         repeats,
     )
-    block.kind = "cycle"
-    block.sticky = state.sticky
     _turn_for_a_tap(state, orders, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
     at = state.machine
@@ -266,16 +268,6 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         known = mark(known, {i: 0.0 for i in range(3) if "XYZ"[i] in named}, to=True)
     state.place, state.machine = start, at
     state.known = mark(known, {across: 0.0}, to=_ends_certainly(state))
-
-
-def _repeats(state: State, orders: Orders, code: str) -> int:
-    for letter in "KL" if state.fanuc else "":
-        if orders.values.get(letter) == 0.0:
-            raise orders.error(
-                f"{letter}0 stores the words of {code} and drills no hole here, which is not followed; remove the line "
-                f"and write {code} with all its words on the line of its first hole"
-            )
-    return orders.whole("K" if state.fanuc and "K" in orders.values else "L", least=1) or 1
 
 
 def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:

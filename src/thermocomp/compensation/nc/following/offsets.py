@@ -55,6 +55,7 @@ class Offsets:
         self.shift: Point = _ZERO
         self._kept: Point = _ZERO
         self._certain_shift: Known = _NEVER
+        self._turn: tuple[float, float, float] | None = None
         self.tool: Point = _ZERO
         self.certain_tool: Known = (True, True, False)
         self._update()
@@ -67,6 +68,13 @@ class Offsets:
         turned = math.radians(self.rotation)
         self._cos, self._sin = math.cos(turned), math.sin(turned)
         x, y, z = (origin[i] + external[i] + self.tool[i] for i in range(3))
+        if self._turn is not None:  # within the system: its centre stays where it was without it
+            a, b, angle = self._turn
+            x, y = x + a * self._cos - b * self._sin, y + a * self._sin + b * self._cos
+            self.rotation += angle
+            turned = math.radians(self.rotation)
+            self._cos, self._sin = math.cos(turned), math.sin(turned)
+            x, y = x - a * self._cos + b * self._sin, y - a * self._sin - b * self._cos
         self._base = (x, y, z)
         #: what is added to program coordinates; None while they are rotated
         self.sum: Point | None = None
@@ -91,7 +99,7 @@ class Offsets:
 
     def state(self) -> tuple[object, ...]:
         """Return all that tells whether something has changed."""
-        return (self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
+        return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
 
     def machine(self, place: Point) -> Point:
         """Return the machine coordinates of a place in program coordinates [mm]."""
@@ -108,6 +116,11 @@ class Offsets:
         x, y, z = (point[i] - self._base[i] for i in range(3))
         x, y = x * self._cos + y * self._sin, y * self._cos - x * self._sin
         return (x - self.shift[0], y - self.shift[1], z - self.shift[2])
+
+    def turn(self, centre: tuple[float, float] | None, angle: float = 0.0) -> None:
+        """G68: turn X and Y of the program about a place in program coordinates [mm, deg]; None: G69."""
+        self._turn = None if centre is None else (centre[0] + self.shift[0], centre[1] + self.shift[1], angle)
+        self._update()
 
     def select(self, system: int) -> Known:
         """G54 and its like; returns per axis whether a known program coordinate still is."""

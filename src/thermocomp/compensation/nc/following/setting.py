@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from thermocomp.compensation.nc.following import placing
+from thermocomp.compensation.nc.following import fanuc, placing
 from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.following.codes import CYCLES, LENGTHS
 from thermocomp.compensation.nc.following.offsets import mark
@@ -36,7 +36,8 @@ def lengths(state: State, orders: Orders) -> None:
                 f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends on "
                 "the control; say which with --integers"
             )
-        orders.values[letter] = word.number * setup.least / (MM if inch else 1.0)
+        angle = letter == "R" and "rotation" in groups
+        orders.values[letter] = word.number * setup.least / (MM if inch and not angle else 1.0)
 
 
 def check_units(state: State, orders: Orders) -> None:
@@ -116,6 +117,8 @@ def settle(state: State, orders: Orders, block: Block) -> None:
         placing.tool_length(state, orders)
     if "system" in groups:
         placing.select_system(state, orders)
+    if "rotation" in groups:
+        fanuc.rotate(state, orders)
 
 
 def _unit_of_feed(state: State, orders: Orders) -> None:

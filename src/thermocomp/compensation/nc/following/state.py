@@ -45,6 +45,7 @@ class State:
         self.tool = -1
         self.lathe: str | None = ""  # Fanuc: a T word that may be a lathe's; None: M6 has come
         self.under = ""  # Fanuc: the motion that G80 brings back
+        self.turned_anew = ""  # Fanuc: G68 or G69, and X and Y have not been named since
         self.lengths: dict[int, float] = {}  # that the program has set
         self.doubtful: dict[int, float] = dict(setup.tools)
         self.shifted_by = ""

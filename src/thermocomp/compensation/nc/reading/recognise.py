@@ -49,6 +49,12 @@ _KINDS = (
         raw=r"%_N_\S+_(MPF|SPF|INI)|\s*;\s*\$PATH\s*=",
     ),
     _Kind(
+        "for a control that reads G70 as inches and G71 as millimetres, such as a Siemens Sinumerik",
+        # elsewhere they are lathe cycles or rows of holes, which have words of their own
+        code=r"^(?!.*[DIJKLPQRUW]\s*[-+.0-9#\[]).*(?<![A-Z#\[<])G7[01](?![0-9.])",
+        advice="if all else in it is plain ISO, write G20 for G70 and G21 for G71; if not, " + _POST,
+    ),
+    _Kind(
         "G-code of a 3-D printer",
         code=r"^\s*M(10[49]|140|190)\s+S[0-9.]+\s*$|^\s*G92\s+E-?[0-9.]+\s*$",
         raw=r"\s*;\s*(FLAVOR:|LAYER_COUNT:|Generated (with|by) (Cura|PrusaSlicer|Slic3r|SuperSlicer|OrcaSlicer))",

@@ -8,12 +8,11 @@ from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.tokens import read_lines
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Change
+from thermocomp.compensation.nc.revising.text import LONGEST
 from thermocomp.core.exceptions import ProgramError
 
 #: largest difference that is rounding [um]
 ROUNDING = 0.1
-#: characters of a line that every control reads
-LONGEST = 240
 
 
 class Check:

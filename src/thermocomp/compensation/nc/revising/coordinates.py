@@ -115,7 +115,7 @@ class Coordinates(Method):
             for i, letter in enumerate("IJK"):
                 if letter in block.words:
                     shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
-        self._take(frame, old, new)
+        self._take(block, frame, old, new)
         return shifted(block, shifts, added, frame.digits)
 
     def _add(
@@ -160,9 +160,22 @@ class Coordinates(Method):
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
             raise ProgramError(block.line.number, "an optional line that drills: decide with --block-delete")
-        self._take(frame, old, new)
+        if not block.moves:  # K0: it stores its words, and drills where later lines say
+            return self._store(block, axis, frame, old, goal[axis])
+        self._take(block, frame, old, new)
         if block.modal.absolute:
             self._levels(block, axis, frame, goal[axis], shifts, added)
+        return shifted(block, shifts, added, frame.digits)
+
+    def _store(self, block: Block, axis: int, frame: Frame, old: Vector, goal: float) -> str:
+        carried, before = self.carried, (self.fixed[axis], self.doubtful[axis])
+        shifts, added = dict[str, float](), dict[str, float]()
+        if block.modal.absolute:
+            self._levels(block, axis, frame, goal, shifts, added)
+            # the axes stay where they are, and may get a word that says so
+            shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
+            self.carried, self.inner = carried, None
+            self.fixed[axis], self.doubtful[axis] = before
         return shifted(block, shifts, added, frame.digits)
 
     def _levels(
@@ -280,15 +293,15 @@ class Coordinates(Method):
                 out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
         return out[0], out[1], out[2]
 
-    def _take(self, frame: Frame, old: Vector, new: list[float]) -> None:
-        if tuple(new) == old:
-            return
-        moved = frame.shift((new[0], new[1], new[2]))
+    def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
+        """Carry the new words; an axis whose word has not changed does too if it stands on the line in G90."""
+        words = block.words if block.modal.absolute else {}
+        taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
         if frame.turned:
-            self.carried = moved
-        else:
-            x, y, z = (m if n != o else c for m, n, o, c in zip(moved, new, old, self.carried, strict=True))
-            self.carried = (x, y, z)
+            taken[0] = taken[1] = taken[0] or taken[1]
+        moved = frame.shift((new[0], new[1], new[2]))
+        x, y, z = (m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
+        self.carried = (x, y, z)
 
 
 def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from thermocomp.compensation.nc.following.block import Block, Known, Modal
 from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.text import Digits
+from thermocomp.compensation.nc.revising.text import LONGEST, Digits, parted
 from thermocomp.core.exceptions import ProgramError
 
 AXES = "XYZ"
@@ -81,6 +81,8 @@ class Method(ABC):
             for i in range(3):
                 self.doubt(i, self.carried[i])
         texts = self._revise(block, demand)
+        if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
+            texts = (*texts[:-1], *parted(texts[-1]))
         self.before = block.known
         other = None
         if any(self.doubtful):

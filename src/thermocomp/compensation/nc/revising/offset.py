@@ -75,6 +75,7 @@ class Offset(Method):
             )
             and modal.absolute
             and not modal.cutter
+            and not modal.turned
             and not block.line.optional
             and bool(self.named(block))
             and not self.stands(block)

@@ -1,10 +1,16 @@
 """Writing a shift into the words of a line; whatever is not shifted stays as it is, byte for byte."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from thermocomp.compensation.nc.following.block import Block
 from thermocomp.compensation.nc.reading.line import Line, Word
+
+#: characters of a line that every control reads: LinuxCNC takes what is behind the 252nd for the next line
+LONGEST = 240
+
+_COMMENTS = re.compile(r"\([^()]*\)|;.*")
 
 #: letter -> what is added to its value, in the program's units
 Shifts = Mapping[str, float]
@@ -68,6 +74,16 @@ def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: in
     for word, shift in changed:
         text = text[: word.start + 1] + written(word, block.values[word.letter], shift, digits) + text[word.end :]
     return text
+
+
+def parted(text: str) -> tuple[str, ...]:
+    """Return a line, the comments of one that is too long on a line before it, where controls show them anyway."""
+    comments = _COMMENTS.findall(text)
+    if len(text) <= LONGEST or not comments:
+        return (text,)
+    code = _COMMENTS.sub("", text)
+    ending = code[len(code.rstrip()) :].lstrip(" \t")
+    return " ".join(c.rstrip() for c in comments) + ending, code.rstrip() + ending
 
 
 def _start(change: tuple[Word, float]) -> int:
