@@ -16,6 +16,7 @@ from thermocomp.compensation.nc.drifting.inputs import SPEED
 from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.revising.course import Bound
 from thermocomp.compensation.nc.revising.offset import Offset
+from thermocomp.compensation.nc.revising.revise import TELLING
 
 #: lines from which on the time that one takes can be told
 MANY = 1000
@@ -114,8 +115,8 @@ def nothing(job: Job, done: Done) -> str:
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
     said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
-    if most <= tolerance:
-        return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"
+    if most <= TELLING * tolerance:
+        return f"{said}, and it is taken off from some {tolerance:g} um on; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
         why = ", ".join(revision.held) or "the time between renewals"
         return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"

@@ -35,6 +35,8 @@ FIRST = 200
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
+#: the drift goes on within a line: so much more than the tolerance may be left before anything is said to hold it
+TELLING = 1.1
 _PLAIN = frozenset(("G0", "G1"))
 
 
@@ -288,8 +290,8 @@ class Revision:
     def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
         """Note what keeps the correction from following in a cut that began at a drift."""
         tolerance = self.demand.tolerance
-        gap = max(*map(abs, cut.left[0]), *map(abs, cut.left[1]))
-        if gap <= tolerance:
+        gap = max(max(cut.left[1]), -min(cut.left[0]))
+        if gap <= TELLING * tolerance:
             self._why = ""
             return
         if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
