@@ -59,8 +59,8 @@ def test_table_picture_and_message_tell_one_figure(
     """The drift is uneven along a long line, and arcs hold the correction: most is left within a line."""
     monkeypatch.chdir(tmp_path)
     write_models([judged(lags("z_um", 4.0))], "model.json")
-    cut = "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F50\nG2 X0 Y0 I20\nG1 X900\nX0 F2000\nG2 X0 Y0 I9\nG0 Z5\nM2\n"
-    Path("part.ngc").write_text(cut, encoding="ascii")
+    head, arcs = "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F50\n", "G2 X0 Y0 I20\nG2 X0 Y0 I90\n"
+    Path("part.ngc").write_text(f"{head}{arcs}G1 X900\nX0 F2000\n{arcs}G0 Z5\nM2\n", encoding="ascii")
     drawn: list[Figure] = []
     draw = pictures.draw
 

@@ -116,7 +116,7 @@ def nothing(job: Job, done: Done) -> str:
     said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
     if most <= TELLING * tolerance:
-        return f"{said}, and it is taken off from some {tolerance:g} um on; run the original, or give a smaller --tolerance"
+        return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
         why = ", ".join(revision.held) or "the time between renewals"
         return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"
