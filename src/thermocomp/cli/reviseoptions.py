@@ -206,6 +206,9 @@ class Way:
     safe_z : str
         At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
         after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
+    split : bool
+        Split a long cut where one straight change of the correction would leave more than a step in its middle (method
+        coordinates, linuxcnc).
     expand : bool
         Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
     subroutines : list of Path
@@ -220,6 +223,7 @@ class Way:
     step: str = "1 um"
     largest: str = "400 um"
     safe_z: str | None = None
+    split: bool = True
     expand: Flag = False
     subroutines: OptionalPaths = None
     unproved: Flag = False
