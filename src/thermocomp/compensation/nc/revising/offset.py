@@ -75,6 +75,7 @@ class Offset(Method):
                 or (block.kind == "cycle" and modal.retract_stated and not self._cycling)
             )
             and modal.absolute
+            and bool(block.moves)
             and not modal.cutter
             and not modal.turned
             and not block.line.optional
@@ -90,7 +91,7 @@ class Offset(Method):
             high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
             level = block.end[2] == block.start[2]
             self._up = rapid and ((high and not block.line.optional) or (self._up and level))
-        if block.moves:
+        if block.moves or block.kind == "cycle":  # K0 stores its words, for the level where the tool is now
             self._cycling = block.kind == "cycle"
 
     # -- what --------------------------------------------------------------------------------------------------------
@@ -118,7 +119,7 @@ class Offset(Method):
             return
         if self.names_place(block):
             self._refuse_mixed(block, self.named(block), "names a place")
-        if kind in ("none", "set") or not block.modal.absolute:
+        if kind in ("none", "set") or not block.modal.absolute or not block.moves:
             return
         after = list(self.carried)
         for i in self.named(block):
