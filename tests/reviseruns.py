@@ -47,10 +47,13 @@ def write_models(models: Sequence[ErrorModel], path: str) -> None:
     modelfile.write(models, path)
 
 
-def revise(*options: str, program: str = "part.ngc", out: str = "out.ngc", start: str = "--cold") -> int:
+def revise(
+    *options: str, program: str = "part.ngc", out: str = "out.ngc", start: str = "--cold", proved: bool = False
+) -> int:
+    """Run the command; unless asked for no interpreter starts, which takes its time."""
     given = ["--model", "model.json"] if "--model" not in options else []
     begun = [start] if start else []
-    proof = ["--interpreter", "off"] if "--interpreter" not in options else []
+    proof = [] if proved else ["--unproved"]
     return run(["revise", program, *given, *begun, *proof, *options, "-o", out])
 
 

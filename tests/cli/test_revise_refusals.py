@@ -43,7 +43,7 @@ def test_programs_that_are_refused(
 def test_what_the_program_does_not_say_can_be_given(job_folder: Path) -> None:
     Path("part.ngc").write_text("G0 X1 Z5\nM3\nG1 Z2 F100\nM5\nM2\n", encoding="ascii")
     assert revise() == 2
-    assert revise("--units", "inch", "--speed", "3000 1/min") == 0
+    assert revise("--units", "inch", "--speed", "3000 1/min", "--tolerance", "0.01 um") == 0
     assert {float(r["drift_z_um"]) > 0 for r in table()[2:3]} == {True}
 
 
@@ -101,9 +101,17 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--date", "today"], "write year-month-day"),
         (
             judged(lags("z_um")),
-            ["--controller", "fanuc", "--interpreter", "required"],
-            "does not read Fanuc's programs",
+            ["--method", "offset"],
+            "G52, which wipes a G92 or G52 that is in force when the program",
         ),
+        (
+            judged(lags("z_um")),
+            ["--method", "offset"],
+            "make sure that none is, and say --no-g92; or take --method coord",
+        ),
+        (judged(lags("z_um")), ["--rotation", "G54=12"], "--rotation 'G54=12': write an angle in degrees, such as"),
+        (judged(lags("z_um")), ["--rotation", "none", "G54=1 deg"], "--rotation 'none': want a work coordinate system"),
+        (judged(lags("z_um")), ["--rotation", "G60=1 deg"], "--rotation 'G60=1 deg': want a work coordinate system"),
         (judged(lags("z_um")), ["--controller", "fanuc", "--expand"], "does not read Fanuc's programs"),
         (judged(lags("z_um")), ["--machine", "gone.toml"], "gone.toml"),
     ],

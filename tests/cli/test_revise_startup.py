@@ -58,10 +58,10 @@ def test_what_is_told_for_the_expansion_has_to_make_sense(
     assert set(job_folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("proof", ["off", "required"])
-def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proof: str, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize("proved", [False, True])
+def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proved: bool, request: pytest.FixtureRequest) -> None:
     """A program that says neither G98 nor G99: told, it comes out as one that says it."""
-    if proof == "required":
+    if proved:
         request.getfixturevalue("interpreter")
     results = []
     for startup, program in (
@@ -72,7 +72,7 @@ def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proof: str, reque
     ):
         written(program)
         told = ["--startup", startup] if startup else []
-        assert revise(*told, "--interpreter", proof, "--overwrite") == 0
+        assert revise(*told, "--overwrite", proved=proved) == 0
         lines = Path("out.ngc").read_text(encoding="ascii").splitlines()
         results.append([line for line in lines if line[:1] != "(" and line not in ("G98", "G99")])
     assert results[0] == results[2]
@@ -87,8 +87,8 @@ def test_a_loop_of_cycles_is_unrolled_as_told(job_folder: Path, capsys: pytest.C
     assert "part.ngc: line 6: it cannot be expanded: where Z goes depends on" in said(capsys)
     plain = {}
     for code in ("G98", "G99"):
-        options = ["--startup", f"G64 P0.01 {code}", "--interpreter", "required", "--json", "--overwrite"]
-        assert revise("--expand", *options) == 0
+        options = ["--startup", f"G64 P0.01 {code}", "--tolerance", "0.1 um", "--json", "--overwrite"]
+        assert revise("--expand", *options, proved=True) == 0
         assert json.loads(capsys.readouterr().out)["proof"]["moves"] >= 7
         plain[code] = Path("out.ngc.expanded").read_text(encoding="ascii").splitlines()
     assert "G21 G64 P0.01 G98" in plain["G98"]
@@ -102,7 +102,7 @@ def test_cutter_compensation_is_worked_out_for_diameters(job_folder: Path, capsy
     for options in ([], ["--diameter", "2=10 mm"]):
         assert revise("--expand", *options) == 2
         assert "part.ngc: line 8: it cannot be expanded: where X, Y goes depends on" in said(capsys)
-    assert revise("--expand", "--diameter", "1=10 mm", "T2=8 mm", "--interpreter", "required") == 0
+    assert revise("--expand", "--diameter", "1=10 mm", "T2=8 mm", proved=True) == 0
     plain = Path("out.ngc.expanded").read_text(encoding="ascii").splitlines()
     assert "G1 X25 Y15 Z-1" in plain
     assert not any("G41" in line for line in plain)
@@ -115,7 +115,7 @@ def test_subprograms_are_found_in_folders(job_folder: Path, capsys: pytest.Captu
     Path("subs/slot.ngc").write_text(SLOT, encoding="ascii")
     assert revise("--expand") == 2
     assert "part.ngc: line 5:" in said(capsys)
-    assert revise("--expand", "--subroutines", "subs", "--interpreter", "required") == 0
+    assert revise("--expand", "--subroutines", "subs", proved=True) == 0
     assert any(line.startswith("G1 X7") for line in Path("out.ngc.expanded").read_text(encoding="ascii").splitlines())
 
 

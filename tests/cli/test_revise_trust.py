@@ -10,9 +10,9 @@ import pytest
 
 from driftmodels import lags, static
 from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
-from thermocomp.compensation.nc.revising.header import LINES, MARK
+from thermocomp.assessment.precompensation import Proof, prove
+from thermocomp.compensation.nc.revising.header import MARK
 from thermocomp.core.polynomial import Polynomial
-from thermocomp.files import ncprogram
 
 # -- how far to trust it ---------------------------------------------------------------------------------------------
 
@@ -53,19 +53,6 @@ def test_a_model_that_is_worse_than_the_drift_is_told(job_folder: Path, capsys: 
     assert any(said in w for w in warnings)
     _, warnings = bound([], capsys)
     assert not any("may not help" in w or "nothing was taken off" in w for w in warnings)
-
-
-def test_it_is_told_if_nothing_was_taken_off(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # one long cut with no way up in it
-    cut = "G21 G90 G17 G54 G94\nS4000 M3\nG1 X100 Y0 Z-1 F50\n" + "X0\nX100\n" * 10 + "M5\nM2\n"
-    Path("part.ngc").write_text(cut, encoding="ascii")
-    axis, warnings = bound(["--method", "offset"], capsys)
-    said = f"nothing was taken off, and the drift in the cuts is {axis['without_um']:.1f} um: no safe point was found"
-    assert any(said in w and "--safe-z, or take --method coordinates" in w for w in warnings)
-    _, warnings = bound(["--method", "offset", "--tolerance", "300 um"], capsys)
-    assert not any("nothing was taken off" in w for w in warnings)
-    _, warnings = bound([], capsys)
-    assert not any("nothing was taken off" in w for w in warnings)
 
 
 def test_one_measurement_for_several_places(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,13 +142,19 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
         "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z-1. F300.\nX100. F50.\nG0 Z50.\nM30\n%\n"
     )
     Path("50%.nc").write_bytes(program.replace("\n", "\r\n").encode("ascii"))
-    assert revise("--controller", "fanuc", "--interpreter", "auto", program="50%.nc", out="out.nc") == 0
-    assert "not proved by LinuxCNC's interpreter: a Fanuc program" in " ".join(capsys.readouterr().out.split())
+    before = set(job_folder.iterdir())
+    assert revise("--controller", "fanuc", program="50%.nc", out="out.nc", proved=True) == 2
+    assert "it cannot be proved: a Fanuc program is not LinuxCNC's language; --unproved writes it" in said(capsys)
+    assert set(job_folder.iterdir()) == before
+    assert revise("--controller", "fanuc", program="50%.nc", out="out.nc") == 0
+    assert "but no interpreter has judged it (--unproved)" in " ".join(capsys.readouterr().out.split())
     lines = Path("out.nc").read_bytes().decode("ascii").split("\r\n")
     assert lines[:2] == ["%", "O1234"]
-    header = lines[2 : 2 + LINES]
+    header = [line for line in lines if MARK in line]
+    assert lines[2 : 2 + len(header)] == header
     assert all(line.startswith(f"({MARK} ") and line == line.upper() and "%" not in line for line in header)
-    words = [w for line in lines[2 + LINES :] for w in line.split() if w.startswith("Z-")]
+    assert f"({MARK} UNPROVED: NO INTERPRETER HAS JUDGED IT)" in header
+    words = [w for line in lines[2 + len(header) :] for w in line.split() if w.startswith("Z-")]
     assert words
     assert all(len(w.partition(".")[2]) <= 3 for w in words)
 
@@ -182,8 +175,8 @@ interpreter = pytest.mark.usefixtures("interpreter")
 @interpreter
 @pytest.mark.parametrize("method", ["coordinates", "offset"])
 def test_the_interpreter_proves_it(job_folder: Path, method: str, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--interpreter", "required", "--method", method]
-    assert revise(*options, *(["--safe-z", "20 mm"] if method == "offset" else []), "--json") == 0
+    options = ["--no-g92", "--safe-z", "20 mm"] if method == "offset" else []
+    assert revise("--method", method, *options, "--json", proved=True) == 0
     proof = json.loads(capsys.readouterr().out)["proof"]
     assert proof["moves"] > 12
     assert proof["largest_um"] < 1e-3
@@ -191,11 +184,12 @@ def test_the_interpreter_proves_it(job_folder: Path, method: str, capsys: pytest
 
 @interpreter
 def test_what_the_interpreter_does_not_run_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Path("part.ngc").write_text(PLATE.replace("T2 M6", "T2 M6\nM198"), encoding="ascii")
+    Path("part.ngc").write_text(PLATE.replace("T2 M6", "T99999 M6"), encoding="ascii")
     before = set(job_folder.iterdir())
-    code = revise("--interpreter", "required")
-    assert code == 2
-    assert "part.ngc:" in said(capsys)
+    assert revise(proved=True) == 2
+    message = said(capsys)
+    assert "part.ngc: it cannot be proved: LinuxCNC's interpreter does not run the original: line 14: " in message
+    assert message.endswith("; --unproved writes it all the same, and its header says so")
     assert set(job_folder.iterdir()) == before
 
 
@@ -204,15 +198,15 @@ def test_a_wrong_move_is_found_and_nothing_is_written(
     job_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The last line of defence: a program that was spoilt behind all other checks."""
-    fill = ncprogram.fill
+    asked = prove
 
-    def spoil(draft: Path, target: Path, lines: Any) -> None:
-        fill(draft, target, lines)
-        target.write_bytes(target.read_bytes().replace(b"\nX20", b"\nX21"))
+    def spoil(original: Path, revised: Path, *others: Any) -> Proof:
+        revised.write_bytes(revised.read_bytes().replace(b"\nX20", b"\nX21"))
+        return asked(original, revised, *others)
 
-    monkeypatch.setattr(ncprogram, "fill", spoil)
+    monkeypatch.setattr("thermocomp.cli.reviserun.prove", spoil)
     before = set(job_folder.iterdir())
-    assert revise("--interpreter", "auto") == 2
+    assert revise(proved=True) == 2
     assert "part.ngc: line 18: LinuxCNC's interpreter disagrees: it moves X by 1000.00 um instead of 0.00 um" in said(
         capsys
     )
@@ -227,7 +221,7 @@ def test_loops_are_unrolled_where_asked(job_folder: Path, capsys: pytest.Capture
     )
     Path("part.ngc").write_text(loop, encoding="ascii")
     assert revise() == 2
-    assert revise("--expand", "--interpreter", "required", "--json") == 0
+    assert revise("--expand", "--json", proved=True) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["proof"]["moves"] >= 10
     assert told["files"]["expanded"] == "out.ngc.expanded"

@@ -49,6 +49,29 @@ def test_a_written_code_is_read_as_it_was(axes: tuple[str, ...], count: int, spl
     assert Structure.parse("".join(structure.workpiece) + "F" + "".join(structure.tool)) == structure
 
 
+@pytest.mark.parametrize(
+    ("code", "linear", "rotary", "written"),
+    [
+        ("w C' A' X' b Y Z (C1) t", "XYZ", {"C": "table", "A": "table"}, "w C' A' X' b Y Z (C1) t"),
+        ("w X' A' b Y Z C1 t", "XYZ", {"A": "table"}, "w A' X' b Y Z (C1) t"),
+        ("w X' b B Z Y t", "XZY", {"B": "head"}, "w X' b Z Y B (C1) t"),
+        ("w X' b Z Y C B (C1) t", "XZY", {"C": "head", "B": "head"}, "w X' b Z Y C B (C1) t"),
+        ("w C1' X' b Z Y B1 t", "XZY", {"C": "table", "B": "head"}, "w C' X' b Z Y B (C1) t"),
+        ("CAXFYZ", "XYZ", {"C": "table", "A": "table"}, "w C' A' X' b Y Z (C1) t"),
+        ("XFZYB", "XZY", {"B": "head"}, "w X' b Z Y B (C1) t"),
+    ],
+)
+def test_rotary_axes_are_in_the_table_or_in_the_head(
+    code: str, linear: str, rotary: dict[str, str], written: str
+) -> None:
+    found = Structure.parse(code)
+    assert found.axes == tuple(linear)
+    assert found.rotary == rotary
+    assert found.code == written
+    assert Structure.parse(written) == found
+    assert hash(found) == hash(Structure.parse(written))
+
+
 def test_beyond_an_axis_is_what_moves_the_tool_against_it() -> None:
     """On a table-moving machine too: seen from the X slide of the table, Y and Z move the tool."""
     structure = Structure.parse("w X' Y' b Z (C1) t")
@@ -71,13 +94,15 @@ def test_beyond_an_axis_is_what_moves_the_tool_against_it() -> None:
         ("w X' b X t", "axis X is there twice"),
         ("w X b Z t", "'X' .* stands on the workpiece's side and needs a prime: X'"),
         ("w X' b Z' Y t", "\"Z'\" .* stands on the tool's side and has no prime: Z"),
-        ("w C' X' b Y Z t", "axis C: only the linear axes"),
-        ("XFZYB", "axis B: only the linear axes"),
+        ("w U' b Y Z t", "axis U: only the linear axes X, Y and Z and the rotary axes A, B and C"),
+        ("w C' b B t", "has no axis"),
+        ("w C' C' X' b Z t", "axis C is there twice"),
+        ("w B' X' b B Z t", "axis B is there twice"),
+        ("w C X' b Z t", "'C' .* stands on the workpiece's side and needs a prime: C'"),
+        ("w X' b A' Z t", "\"A'\" .* stands on the tool's side and has no prime: A"),
         ("w x b Z t", "'X' .* stands on the workpiece's side and needs a prime: X'"),
-        ("w B' X' b Z t", "axis B: only the linear axes"),
-        ("w X' b B Z t", "axis B: only the linear axes"),
-        ("w X' b (C1) Z t", "is no axis: want X, Y or Z"),
-        ("w X'- b Z t", "is no axis: want X, Y or Z"),
+        ("w X' b (C1) Z t", "is no axis: want X, Y, Z, A, B or C"),
+        ("w X'- b Z t", "is no axis: want X, Y, Z, A, B or C"),
         ("w (C1) b Z X t", r"\(C1\) .*: a spindle on the workpiece's side is not supported"),
         ("w (C) Z' X' b t", r"\(C\) .*: a spindle on the workpiece's side is not supported"),
         ("w(c')z'bxt", "a spindle on the workpiece's side is not supported"),

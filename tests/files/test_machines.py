@@ -171,6 +171,10 @@ MM = 'write a length with its unit, such as "600 mm"'
         (HEAD.replace("w X' b Z Y (C1) t", "w X b Z Y t"), "structure: 'X' in 'w X b Z Y t' stands on the workpiece's"),
         (HEAD.replace('"w X\' b Z Y (C1) t"', "3"), "structure: 3: must be a text in quotes"),
         (HEAD.replace("w X' b Z Y (C1) t", "XFZ"), "axes.Y: there is no axis 'Y' in the structure"),
+        (
+            HEAD.replace("w X' b Z Y (C1) t", "w A' X' b Z Y (C1) t") + '[axes.A]\ntravel = ["0 mm", "1 mm"]',
+            "axes.A: A is a rotary axis: it has no table",
+        ),
         (HEAD + '[axes.U]\ntravel = ["0 mm", "1 mm"]', "axes.U: there is no axis 'U' in the structure"),
         (AXES.replace("[axes.Y]", "[spindle]"), "spindle.travel: there is no key 'travel'; there are measured_tool"),
         ("structure = 'XFY'\n[axes.X]\ntravel = ['0 mm', '1 mm']", "axes.Y: is missing: the structure"),

@@ -1,11 +1,12 @@
 """The picture of a revised program says how far the tool would drift, and what is left."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from thermocomp.compensation.nc.revising.course import Run
+from thermocomp.compensation.nc.revising.course import Bound, Run
 from thermocomp.report import revision
 
 
@@ -20,11 +21,19 @@ def made(seconds: float = 600.0, n: int = 50) -> Run:
     return Run(time, drift, carried, left, np.full((n, 2), 4000.0))
 
 
+X = Bound("X", 0.0, 0.0, 0.0, 0.0, 0, math.nan)
+Z = Bound("Z", -3.0, 20.0, 20.0, 0.81, 7, 9.0)
+
+
 def test_panels_and_their_titles() -> None:
-    figure = revision.draw(made(), ["X", "Z"], [60.0, 300.0], "part.ngc, cold")
+    figure = revision.draw(made(), [X, Z], [60.0, 300.0], "part.ngc, cold")
     x, z, speed = figure.axes
-    assert x.get_title("left") == "X: the tool drifts by up to 0.0 um, at most 0.0 um of it is left in the cuts"
-    assert z.get_title("left") == "Z: the tool drifts by up to 20.0 um, at most 0.8 um of it is left in the cuts"
+    assert x.get_title("left") == (
+        "X: the tool drifts by up to 0.0 um; in the cuts at most 0.0 um is left; the model was never judged: no bound"
+    )
+    assert z.get_title("left") == (
+        "Z: the tool drifts by up to 20.0 um; in the cuts at most 0.8 um is left; bound 9.8 um"
+    )
     assert speed.get_xlabel() == "time since the start of the program [min]"
     assert speed.get_xlim() == (0.0, 10.0)
     drift, taken, left = z.lines[1:4]
@@ -41,9 +50,9 @@ def test_panels_and_their_titles() -> None:
 
 def test_a_long_run_is_shown_in_hours_and_many_tool_changes_are_only_counted(tmp_path: Path) -> None:
     changes = [float(k) for k in range(100)]
-    figure = revision.draw(made(3 * 3600.0), ["Z"], changes, "")
+    figure = revision.draw(made(3 * 3600.0), [Z], changes, "")
     assert figure.axes[-1].get_xlabel().endswith("[h]")
     assert figure.axes[-1].get_xlim()[1] == pytest.approx(3.0)
     assert [t.get_text() for t in figure.legends[0].get_texts()][-1] == "100 tool changes, not shown"
-    revision.write(made(), ["Z"], changes, "part.ngc", tmp_path / "a.part")
+    revision.write(made(), [Z], changes, "part.ngc", tmp_path / "a.part")
     assert (tmp_path / "a.part").read_bytes().startswith(b"\x89PNG")

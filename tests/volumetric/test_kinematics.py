@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 
 from thermocomp.core.components import COMPONENTS
-from thermocomp.core.machine import Machine
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Axis, Machine
+from thermocomp.core.structure import Structure
 from thermocomp.volumetric import exact
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from volumetricmachine import FloatArray, by_hand, machines, random_values
@@ -28,6 +30,14 @@ LEVERS = {
     "XYZF": {"X": (5.0, 180.0, 170.0), "Y": (5.0, 0.0, 170.0), "Z": (5.0, 0.0, -100.0)},
     "XZY": {"X": (5.0, 180.0, 170.0), "Z": (5.0, 180.0, -100.0), "Y": (5.0, 0.0, -100.0)},
 }
+
+
+def test_rotary_axes_are_refused_not_passed_over() -> None:
+    machine = Machine("Mill 5", Structure.parse("w C' X' b Z B (C1) t"), tuple(Axis(a, (0.0, 600.0)) for a in "XZ"))
+    with pytest.raises(InputError, match=r"Mill 5: rotary axis C, B in the structure \"w C' X' b Z B \(C1\) t\""):
+        Kinematics(machine)
+    with pytest.raises(InputError, match="rotary axis C, B"):
+        exact.error(machine, np.zeros(len(COMPONENTS)), POINT)
 
 
 def first_and_exact(machine: Machine, **components: float) -> tuple[FloatArray, FloatArray]:

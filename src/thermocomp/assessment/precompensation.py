@@ -78,6 +78,19 @@ class Proof(NamedTuple):
 
     moves: int  #: canonical moves that were compared
     largest: float  #: largest difference between a move and what was asked for [um]
+    states: int = 1  #: stored states of the controller
+    slower: float = 0.0  #: by how much a move takes longer or shorter, at most [%]
+    held: tuple[str, ...] = ()  #: what was the same in all of them
+    drawn: tuple[str, ...] = ()  #: and what was not
+
+    @property
+    def sentence(self) -> str:
+        """In which states it was proved."""
+        return f"in {self.states} controller state{'s' * (self.states != 1)}"
+
+
+class Unprovable(InputError):  # noqa: N818 - no fault of anybody
+    """Nothing can be said about a program: it is not refused for a fault, but nobody has judged it."""
 
 
 def stored(setup: Setup) -> rs274.Stored:
@@ -122,7 +135,7 @@ def prove(
     ------
     ProgramError
         A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp.
-    InputError
+    Unprovable
         The interpreter refuses the original, so nothing can be proved; or it is not installed.
     """
     moves, largest = 0, 0.0
@@ -156,7 +169,7 @@ class _Told(NamedTuple):
 
 def _pairs(original: Path, revised: Path, setup: Setup) -> Generator[tuple[_Told, _Told]]:
     if (reason := rs274.installed()) is not None:
-        raise InputError(reason)
+        raise Unprovable(reason)
     line = 0
     with closing(_told(original, setup, "original")) as first, closing(_told(revised, setup, REVISED)) as second:
         for was, now in zip_longest(first, second):
@@ -194,7 +207,7 @@ def _told(path: Path, setup: Setup, whose: str) -> Generator[_Told]:
     except ProgramError as e:
         if whose == REVISED:
             raise _fault(e.line, f"does not run the {whose}: {e.reason}") from e
-        raise InputError(f"LinuxCNC's interpreter does not run the {whose}: {e}") from e
+        raise Unprovable(f"LinuxCNC's interpreter does not run the {whose}: {e}") from e
     finally:
         calls.close()
 

@@ -13,6 +13,7 @@ from thermocomp.cli.iso230 import iso230
 from thermocomp.cli.papers import papers
 from thermocomp.cli.position import position
 from thermocomp.cli.revise import revise
+from thermocomp.cli.shown import shown
 from thermocomp.cli.volumetric import volumetric
 from thermocomp.core.exceptions import ThermocompError
 
@@ -73,7 +74,8 @@ def main() -> None:
 
 
 def _unusable(message: str) -> int:
-    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(message)}", soft_wrap=True)
+    text = "\n".join(shown(line) for line in message.split("\n"))
+    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
     return 2
 
 

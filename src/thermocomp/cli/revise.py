@@ -1,15 +1,18 @@
 """``thermocomp revise``: an NC program is corrected by the drift it will cause, before it is run."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
 
-from thermocomp.cli import reviserun, revisetables
+from thermocomp.cli import reviseheader, reviserun, revisetables
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, Output, refuse_existing
 from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
+from thermocomp.cli.revisetravel import Travel
 from thermocomp.compensation.nc.drifting.stations import Station
+from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.reading.tokens import read_lines
 from thermocomp.compensation.nc.revising.revise import Revision
 from thermocomp.core.exceptions import InputError
@@ -66,18 +69,21 @@ def revise(
     Returns
     -------
     int
-        0 done, 2 the program or something else cannot be used.
+        0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
     ncprogram.opened(program).close()
     starting.check()
     found = drifting.stations()
     others, notes = drifting.others(found)
     drift = starting.drift(found, others)
-    setup = controller.setup()
-    kinematics, guesses = timing.kinematics()
-    method = way.made(setup.controller, drift.driven)
-    revision = Revision(setup, kinematics, drift, method, way.demand())
-    _check_interpreter(way, controller)
+    machine = timing.read()
+    setup = controller.setup(machine)
+    kinematics, guesses = timing.kinematics(machine)
+    method = way.made(setup, drift.driven)
+    models = _files(found, drifting.hashes())
+    header_lines = reviseheader.lines(models, by_position=drift.by_position, unproved=way.unproved)
+    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines)
+    _check_interpreter(way, setup)
     if way.expand and controller.block_delete is None:
         _refuse_optional(program)
     paths = reviserun.Paths.of(output, expanded=way.expand)
@@ -88,18 +94,19 @@ def revise(
         paths,
         revision,
         drift,
-        _files(found, drifting.hashes()),
+        models,
         starting.words(),
         f"drift counts {starting.counted()}",
         f"method {way.words()}",
         reviserun.moment(date),
-        way.interpreter,
-        controller.diameters(expand=way.expand),
-        way.folders(),
-        timing.travel(setup),
+        unproved=way.unproved,
+        diameters=controller.diameters(expand=way.expand),
+        subroutines=way.folders(),
+        travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
     )
     try:
-        done = reviserun.revise(job, hidden=json)
+        # a pipe gets its lines on stderr, whatever stdout is for
+        done = reviserun.revise(job, hidden=json and sys.stderr.isatty())
     except InputError as e:
         raise InputError(f"{program}: {e}") from e
     notes += guesses
@@ -107,7 +114,7 @@ def revise(
         print_json(revisetables.content(job, done, notes), _console)
     else:
         revisetables.show(job, done, notes, _console)
-    return 0
+    return 0 if done.written else 1
 
 
 def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
@@ -132,12 +139,12 @@ def _refuse_optional(program: Path) -> None:
                 )
 
 
-def _check_interpreter(way: Way, controller: Controller) -> None:
-    """Raise `InputError` before any work if the interpreter is asked for and cannot be had."""
-    wanted = "--expand" if way.expand else "--interpreter required" if way.interpreter == "required" else ""
-    if not wanted:
-        return
-    if controller.controller != "linuxcnc":
-        raise InputError(f"{wanted} is LinuxCNC's interpreter, which does not read Fanuc's programs")
-    if (reason := rs274.installed()) is not None:
-        raise InputError(f"{wanted}: {reason}")
+def _check_interpreter(way: Way, setup: Setup) -> None:
+    """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
+    if way.expand:
+        if setup.controller != "linuxcnc":
+            raise InputError("--expand is LinuxCNC's interpreter, which does not read Fanuc's programs")
+        if (reason := rs274.installed()) is not None:
+            raise InputError(f"--expand: {reason}")
+    if not way.unproved and (reason := reviserun.unprovable(setup)):
+        raise InputError(f"it cannot be proved: {reason}; {reviserun.ALL_THE_SAME}")

@@ -9,8 +9,16 @@ from typing import Annotated, Literal
 from cyclopts import Group, Parameter
 
 from thermocomp.cli.options import Flag, OptionalNames
-from thermocomp.cli.revisetravel import Travel
-from thermocomp.cli.revisevalues import m_code_of, origin_of, point_of, positive, startup_of, tool_of, value
+from thermocomp.cli.revisevalues import (
+    m_code_of,
+    origin_of,
+    point_of,
+    positive,
+    rotations_of,
+    startup_of,
+    tool_of,
+    value,
+)
 from thermocomp.compensation.nc.drifting import start
 from thermocomp.compensation.nc.drifting.drift import Drift
 from thermocomp.compensation.nc.drifting.inputs import SPEED, Signal, constants
@@ -24,6 +32,7 @@ from thermocomp.compensation.nc.revising.offset import Offset
 from thermocomp.compensation.nc.revising.text import DIGITS
 from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Machine
 from thermocomp.files import forecast as forecasts
 from thermocomp.files import jobstate, modelfile
 from thermocomp.files.machines import read_machine
@@ -184,7 +193,7 @@ class Way:
     ----------
     method : str
         coordinates: it is added to the words of X, Y and Z; offset: G52 shifts the work coordinates, where the tool is
-        up only.
+        up only; it wants --no-g92.
     every : str
         Renew the correction every so often, such as "10 min".
     tolerance : str
@@ -201,8 +210,8 @@ class Way:
         Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
     subroutines : list of Path
         With --expand: folders of subprograms; the program's own comes first anyway.
-    interpreter : str
-        Prove the result by LinuxCNC's interpreter: auto, where it is installed; off; required.
+    unproved : bool
+        Write the program though no interpreter has judged it; its header says so.
     """
 
     method: Literal["coordinates", "offset"] = "coordinates"
@@ -213,7 +222,7 @@ class Way:
     safe_z: str | None = None
     expand: Flag = False
     subroutines: OptionalPaths = None
-    interpreter: Literal["auto", "off", "required"] = "auto"
+    unproved: Flag = False
 
     def demand(self) -> Demand:
         """Return when the correction is renewed."""
@@ -221,13 +230,18 @@ class Way:
         tolerance = positive(self.tolerance, "displacement", "--tolerance", "1 um")
         return Demand(tolerance, every, positive(self.largest, "displacement", "--largest", "400 um"))
 
-    def made(self, controller: Literal["linuxcnc", "fanuc"], axes: Sequence[str]) -> Method:
+    def made(self, setup: Setup, axes: Sequence[str]) -> Method:
         """Return the method."""
-        digits, step = DIGITS[controller], positive(self.step, "displacement", "--step", "1 um")
+        digits, step = DIGITS[setup.controller], positive(self.step, "displacement", "--step", "1 um")
         safe = None if self.safe_z is None else value(self.safe_z, "position", "--safe-z", "5 mm")
         if self.method == "coordinates":
             # a helix is an option of older Fanucs
-            return Coordinates(digits, step, safe_z=safe, helix=controller == "linuxcnc")
+            return Coordinates(digits, step, safe_z=safe, helix=setup.controller == "linuxcnc")
+        if not setup.no_shift:
+            raise InputError(
+                "--method offset writes G52, which wipes a G92 or G52 that is in force when the program starts: make "
+                "sure that none is, and say --no-g92; or take --method coordinates"
+            )
         x, y, z = (name in axes for name in "XYZ")
         return Offset(digits, step, safe_z=safe, axes=(x, y, z))
 
@@ -271,6 +285,11 @@ class Controller:
         With --expand: diameters of tools, such as "1=10 mm", for which G41 and G42 are worked out.
     home : str
         Where G28 goes, such as "0 mm, 0 mm, 400 mm".
+    rotation : list of str
+        Rotations of work coordinate systems that are stored in the controller, such as "G54=12 deg"; none if there are
+        none. They turn a correction of X and Y.
+    no_g92 : bool
+        No G92 or G52 is in force when the program starts.
     integers : str
         What a length without a decimal point is: whole millimetres or inches; the least increment; or a reason to
         refuse the program. If not given, whole for linuxcnc, refuse for fanuc.
@@ -291,13 +310,15 @@ class Controller:
     tool: OptionalNames = None
     diameter: OptionalNames = None
     home: str | None = None
+    rotation: OptionalNames = None
+    no_g92: Flag = False
     integers: Literal["whole", "least", "refuse"] | None = None
     least: str = "1 um"
     block_delete: Literal["on", "off"] | None = None
     harmless: OptionalNames = None
 
-    def setup(self) -> Setup:
-        """Return it as the follower wants it."""
+    def setup(self, machine: Machine | None) -> Setup:
+        """Return it as the follower wants it, with what the machine file tells."""
         return Setup(
             controller=self.controller,
             inch=None if self.units is None else self.units == "inch",
@@ -306,6 +327,9 @@ class Controller:
             offsets=dict(origin_of(text) for text in self.origin or ()),
             tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
             home=None if self.home is None else point_of(self.home, f"--home {self.home!r}"),
+            rotations=rotations_of(self.rotation or ()),
+            no_shift=self.no_g92,
+            rotary={} if machine is None else dict(machine.structure.rotary),
             integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
             least=positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",
@@ -329,7 +353,7 @@ class Timing:
     Parameters
     ----------
     machine : Path
-        Machine file (.toml) with rapids and accelerations of the axes.
+        Machine file (.toml) with rapids and accelerations of the axes; its structure tells where rotary axes are.
     tool_change : str
         How long a tool change takes.
     stop : str
@@ -340,20 +364,17 @@ class Timing:
     tool_change: str = "8 s"
     stop: str = "60 s"
 
-    def travel(self, setup: Setup) -> Travel | None:
-        """Return what watches where the axes go, if the machine tells how far they can."""
-        if self.machine is None:
-            return None
-        return Travel(setup, {a.name: a.travel for a in read_machine(self.machine).axes})
+    def read(self) -> Machine | None:
+        """Return the machine, if there is a file of it."""
+        return None if self.machine is None else read_machine(self.machine)
 
-    def kinematics(self) -> tuple[Kinematics, list[str]]:
+    def kinematics(self, machine: Machine | None) -> tuple[Kinematics, list[str]]:
         """Return how fast the machine is, and what of it is a guess."""
         change = value(self.tool_change, "time", "--tool-change", "8 s")
         stop = value(self.stop, "time", "--stop", "60 s")
-        if self.machine is None:
+        if machine is None:
             guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
             return Kinematics(tool_change=change, stop=stop), [guess]
-        machine = read_machine(self.machine)
         axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
         notes = [
             f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"

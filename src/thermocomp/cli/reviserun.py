@@ -1,31 +1,36 @@
 """One run of ``thermocomp revise``: the files it reads and writes, all of them or none."""
 
-import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import date, datetime
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple, TextIO
 
 from thermocomp import __version__
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
+from thermocomp.cli import reviseheader
 from thermocomp.cli.progress import Share, by_share
 from thermocomp.cli.revisetravel import Travel
+from thermocomp.cli.shown import shown
 from thermocomp.compensation.nc.drifting.drift import Drift
+from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.reading.tokens import program_lines
 from thermocomp.compensation.nc.revising import diff, header
-from thermocomp.compensation.nc.revising.course import Course, Run
+from thermocomp.compensation.nc.revising.course import Bound, Course, Run
 from thermocomp.compensation.nc.revising.offset import ending
 from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
-from thermocomp.files.draft import draft
+from thermocomp.files.draft import scratch
+from thermocomp.shopfloor import rs274
 from thermocomp.shopfloor.expand import expand
 
+#: what a program that cannot be proved is refused with
+ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
+#: program and differences while their header says nothing yet
+PROGRAM, DIFF = "program", "diff"
 #: lines after which the bar moves
 TOLD = 500
 
@@ -71,7 +76,8 @@ class Job:
     start, zero, method : str
         For the header: which models, from what state, what the drift counts from, in what way.
     when : date
-    interpreter : {'auto', 'off', 'required'}
+    unproved : bool
+        It is written though no interpreter has judged it.
     diameters : dict of int to float, optional
         Of the tools, for the expansion [mm].
     subroutines : sequence of Path
@@ -89,7 +95,7 @@ class Job:
     zero: str
     method: str
     when: datetime
-    interpreter: str
+    unproved: bool = False
     diameters: Mapping[int, float] | None = None
     subroutines: Sequence[Path] = ()
     travel: Travel | None = None
@@ -100,47 +106,35 @@ class Job:
         return f"{self.start}, {self.zero}"
 
 
-class Bound(NamedTuple):
-    """How far the tool may be off in a cut, of one axis [um]."""
-
-    axis: str
-    low: float  #: of the drift, in the whole run
-    high: float
-    without: float  #: largest drift in a cut
-    left: float  #: what the correction leaves of it, between its updates
-    line: int  #: where
-    model: float  #: how wrong the models may be; nan: they were never judged
-
-    @property
-    def most(self) -> float:
-        """Return the bound; nan if there is none."""
-        return self.left + self.model
-
-
 class Done(NamedTuple):
     """What has come of it."""
 
     run: Run
     bounds: tuple[Bound, ...]
-    proof: Proof | None
-    unproved: str  #: why the interpreter has not judged it; empty if it has
+    written: bool  #: False: nothing was taken off, so there are no files
+    proof: Proof | None  #: None: the interpreter has not judged it
     seconds: float  #: for the revision
     proving: float  #: for the proof
 
 
+def unprovable(setup: Setup) -> str:
+    """Return why no program for a controller can be proved here; empty if they can."""
+    if setup.controller != "linuxcnc":
+        return "a Fanuc program is not LinuxCNC's language"
+    return rs274.installed() or ""
+
+
 def revise(job: Job, *, hidden: bool) -> Done:
-    """Revise a program and write all files; none if something is wrong.
+    """Revise a program and write all files; none if something is wrong, or if there is nothing to take off.
 
     Raises
     ------
     InputError
-        The program cannot be revised, or the interpreter disagrees.
+        The program cannot be revised or proved, or the interpreter disagrees.
     """
     paths = job.paths
-    with ExitStack() as stack:
-        # the program comes last: where it is, all is
-        drafts = {p: stack.enter_context(draft(p)) for p in paths.all()}
-        scratch = Path(stack.enter_context(TemporaryDirectory(prefix=".revise-", dir=paths.program.parent)))
+    with scratch(paths.program.parent) as folder:
+        drafts = {p: folder / f"{k}" for k, p in enumerate(paths.all())}
         source, lines = job.program, None
         if paths.expanded is not None:
             source = drafts[paths.expanded]
@@ -159,7 +153,7 @@ def revise(job: Job, *, hidden: bool) -> Done:
         begin = time.perf_counter()
         try:
             with by_share("revising", hidden=hidden) as tell:
-                blank = _write(job, source, scratch, drafts[paths.table], (ledger, course, *watching), tell)
+                blank = _write(job, source, folder, drafts[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
             if lines is not None and 0 < e.line <= len(lines):
                 raise ProgramError(lines[e.line - 1] or 1, f"(line {e.line} when expanded) {e.reason}") from e
@@ -167,21 +161,30 @@ def revise(job: Job, *, hidden: bool) -> Done:
         took = time.perf_counter() - begin
         run = course.run()
         bounds = _bounds(job, run)
-        filled = header.filled(_facts(job, bounds), ending(blank[0]))
-        ncprogram.fill(scratch / "program", drafts[paths.program], dict(zip(blank, filled, strict=True)))
+        if not job.revision.corrected:
+            return Done(run, bounds, written=False, proof=None, seconds=took, proving=0.0)
+        begin = time.perf_counter()
+        proof = None
+        if not job.unproved:
+            with by_share("proving", hidden=hidden) as tell:
+                proof = _proved(job, source, folder / PROGRAM, ledger, tell)
+        # what is proved has a header that says nothing yet: from here on nothing but its comments changes
+        filled = header.filled(
+            _facts(job, bounds, proof), ending(blank[0]), len(blank), upper=job.revision.setup.controller == "fanuc"
+        )
+        ncprogram.fill(folder / PROGRAM, drafts[paths.program], dict(zip(blank, filled, strict=True)))
         ncprogram.fill(
-            scratch / "diff", drafts[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
+            folder / DIFF, drafts[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
         )
         drafts[paths.job].write_text(jobstate.dumps(job.drift.state(), job.when), encoding="utf-8")
-        begin = time.perf_counter()
-        with by_share("proving", hidden=hidden) as tell:
-            proof, unproved = _proved(job, source, drafts[paths.program], ledger, tell)
         if paths.picture is not None:
             from thermocomp.report import revision as pictures
 
-            title = f"{job.program.name}, {job.begun}"
-            pictures.write(run, job.drift.axes, job.revision.tool_changes, title, drafts[paths.picture])
-        return Done(run, bounds, proof, unproved, took, time.perf_counter() - begin)
+            title = shown(f"{job.program.name}, {job.begun}")
+            pictures.write(run, bounds, job.revision.tool_changes, title, drafts[paths.picture])
+        for path in reversed(paths.all()):  # the program comes last: where it is, all is
+            drafts[path].replace(path)
+        return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 
 def _write(
@@ -211,14 +214,15 @@ def _write(
 
     with (
         ncprogram.opened(source) as texts,
-        ncprogram.created(folder / "program") as program,
-        ncprogram.created(folder / "diff") as written,
+        ncprogram.created(folder / PROGRAM) as program,
+        ncprogram.created(folder / DIFF) as written,
         table.open("w", encoding="utf-8", newline="\n") as rows,
     ):
-        names = (f"{what}_{'xyz'[k]}_um" for k in axes for what in ("drift", "correction"))
-        rows.write(",".join(("line", "revised_line", "start_s", "end_s", *names, "changed")) + "\n")
+        columns = (f"{what}_{'xyz'[k]}_um" for k in axes for what in ("drift", "correction"))
+        rows.write(",".join(("line", "revised_line", "start_s", "end_s", *columns, "changed")) + "\n")
         pairs = told(program_lines(texts), program, rows)
-        written.writelines(diff.unified(pairs, job.program.name, job.paths.program.name))
+        names = header.plain(job.program.name), header.plain(job.paths.program.name)
+        written.writelines(diff.unified(pairs, *names))
     return blank
 
 
@@ -247,35 +251,26 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
     )
 
 
-def _facts(job: Job, bounds: Sequence[Bound]) -> list[str]:
+def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
     """Return what the header says."""
-    facts = [
-        f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
+    setup, place = job.revision.setup, list[str]()
+    if job.drift.by_position:
+        place = reviseheader.told_place(setup, job.revision.elsewhere, job.drift.axes)
+    return [
+        f"thermocomp {__version__}, {job.when.date()}, for {setup.controller}",
         f"program {job.program.name}",
-        *_together([f"model {m}" for m in job.models], 2),
+        *reviseheader.told_models(job.models),
         f"start {job.start}",
         job.zero,
         job.method,
-        "bound "
-        + ", ".join(f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds),
+        reviseheader.told_bound(bounds),
+        *place,
+        *reviseheader.told_proof(proof),
     ]
-    # old controls end the program at a percent sign, even in a comment, and may have no lower case
-    facts = [f.replace("%", "_") for f in facts]
-    return [f.upper() for f in facts] if job.revision.setup.controller == "fanuc" else facts
 
 
-def _together(facts: list[str], most: int) -> list[str]:
-    """Return so many facts at most, the last ones on one line."""
-    return facts if len(facts) <= most else [*facts[: most - 1], ", ".join(facts[most - 1 :])]
-
-
-def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share) -> tuple[Proof | None, str]:
-    """Return what the interpreter says, or why it was not asked."""
-    required = job.interpreter == "required"
-    if job.interpreter == "off":
-        return None, "--interpreter off"
-    if job.revision.setup.controller != "linuxcnc":
-        return None, "a Fanuc program is not LinuxCNC's language"
+def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share) -> Proof:
+    """Return what the interpreter says."""
     lines = max(job.revision.lines, 1)
 
     def progress(line: int) -> None:
@@ -283,13 +278,11 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share
             tell(line / lines, f"line {line}")
 
     try:
-        return prove(original, revised, ledger, job.revision.setup, progress), ""
+        return prove(original, revised, ledger, job.revision.setup, progress)
     except ProgramError:
         raise
-    except InputError as e:
-        if required:
-            raise
-        return None, str(e)
+    except InputError as e:  # whatever it is that keeps the interpreter from judging
+        raise InputError(f"it cannot be proved: {e}; {ALL_THE_SAME}") from e
 
 
 def moment(text: str | None) -> datetime:

@@ -8,8 +8,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from thermocomp.cli.reviserun import Bound, Done, Job
+from thermocomp.assessment.precompensation import Proof
+from thermocomp.cli import reviseheader
+from thermocomp.cli.reviserun import Done, Job
+from thermocomp.cli.shown import shown
 from thermocomp.compensation.nc.drifting.inputs import SPEED
+from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.revising.course import Bound
 from thermocomp.compensation.nc.revising.offset import Offset
 
 #: lines from which on the time that one takes can be told
@@ -19,28 +24,36 @@ MANY = 1000
 def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
     """Print what was done to a program, and how far the tool may still be off."""
     revision = job.revision
+
+    def say(mark: str, text: str) -> None:
+        console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
+
     console.print(
-        f"[bold]{escape(str(job.program))}[/]: {_many(revision.lines, 'line')}, {revision.changed} of them changed; "
+        f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
+        f"{revision.changed if done.written else 'none'} of them changed; "
         f"runs {duration(revision.seconds)}; {_spindle(job)}; {_many(len(revision.tool_changes), 'tool change')}",
         soft_wrap=True,
     )
-    console.print(f"Start: {escape(job.begun)}; {escape(job.method)}", soft_wrap=True)
+    say("", f"Start: {job.begun}; {job.method}")
     console.print(_bounds(done.bounds))
     if done.proof is not None:
-        console.print(
-            f"[green]proved[/] LinuxCNC's interpreter ran both programs: {_many(done.proof.moves, 'move')}, each that "
-            f"of the original plus its correction, within {max(done.proof.largest, 0.001):.3f} um",
-            soft_wrap=True,
+        say(
+            "[green]proved[/]",
+            f"LinuxCNC's interpreter ran both programs {done.proof.sentence}: {_many(done.proof.moves, 'move')}, each "
+            f"that of the original plus its correction, within {max(done.proof.largest, 0.001):.3f} um",
         )
     for warning in warnings(job, done):
-        console.print(f"[yellow]but[/] {escape(warning)}", soft_wrap=True)
+        say("[yellow]but[/]", warning)
     for note in notes:
-        console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
+        say("[yellow]note[/]", note)
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
         took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
     console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
-    console.print(f"Written: {escape(', '.join(map(str, job.paths.all())))}", soft_wrap=True)
+    if done.written:
+        say("", f"Written: {', '.join(map(str, job.paths.all()))}")
+    else:
+        say("[bold yellow]nothing written:[/]", nothing(job, done))
 
 
 def warnings(job: Job, done: Done) -> list[str]:
@@ -64,43 +77,68 @@ def warnings(job: Job, done: Done) -> list[str]:
         f"in the cuts the correction could not follow the drift at once because of {why}: {gap:.1f} um at line {line}"
         for why, (gap, line) in revision.held.items()
     ]
-    found += _hardly_worth(job, done)
+    found += [
+        f"the model of {b.axis} may be wrong by {b.model:.1f} um, and the drift in the cuts is {b.without:.1f} um: "
+        "revising may not help"
+        for b in done.bounds
+        if done.written and b.model > b.without > 0
+    ]
     found += [] if job.travel is None else job.travel.warnings()
     if revision.idle:
         found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
-    if revision.method.leaves_mark:
-        found.append(
-            "G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then; and a G92 that is in force when the "
-            "program starts is lost"
-        )
+    if done.written and revision.method.leaves_mark:
+        found.append("G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then")
     for b in done.bounds:
         if math.isnan(b.model):
             found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append("the models know the spindle speed alone: a change of the room is in no bound")
-    if done.unproved:
-        found.append(f"not proved by LinuxCNC's interpreter: {done.unproved}")
-    if job.paths.picture is None:
+    if done.written and drift.by_position:
+        setup, axes = revision.setup, drift.axes
+        found.append(f"it is made for {reviseheader.made_for(setup)}: {reviseheader.cost(revision.elsewhere, axes)}")
+    if done.written and done.proof is None:
+        found.append(f"no interpreter has judged it (--unproved){_assumed(revision.setup)}")
+    if done.written and job.paths.picture is None:
         found.append("no picture was drawn: matplotlib is not installed (pip install 'thermocomp[study]')")
     return found
 
 
-def _hardly_worth(job: Job, done: Done) -> list[str]:
-    """Return why the revised program may be no better than the original."""
+def nothing(job: Job, done: Done) -> str:
+    """Return why nothing was taken off a program, and what to do."""
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
-    if not done.run.carried.any():
-        if most <= revision.demand.tolerance:
-            return []
-        why = ", ".join(revision.held)
-        if isinstance(revision.method, Offset):
-            why = "no safe point was found: give --safe-z, or take --method coordinates"
-        return [f"nothing was taken off, and the drift in the cuts is {most:.1f} um" + (f": {why}" if why else "")]
-    return [
-        f"the model of {b.axis} may be wrong by {b.model:.1f} um, and the drift in the cuts is {b.without:.1f} um: "
-        "revising may not help"
-        for b in done.bounds
-        if b.model > b.without > 0
+    said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
+    method, tolerance = revision.method, revision.demand.tolerance
+    if most <= tolerance:
+        return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"
+    if not isinstance(method, Offset):
+        why = ", ".join(revision.held) or "the time between renewals"
+        return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"
+    if method.leaves_mark:
+        return (
+            f"{said}, but it was less than {tolerance:g} um wherever the offset could be updated; give "
+            f"{'a' if method.safe_z is None else 'a lower'} --safe-z, so that there are more such places, or take "
+            "--method coordinates"
+        )
+    if method.safe_z is None:
+        return f"{said}, but there is no safe point: give --safe-z, or take --method coordinates"
+    return (
+        f"{said}, but no rapid in G90 begins at or above Z {method.safe_z:g} mm of the work coordinates after one: "
+        "give a lower --safe-z, or take --method coordinates"
+    )
+
+
+def _assumed(setup: Setup) -> str:
+    """Return what was taken for granted of the controller, because nobody has stated or tried it."""
+    found = [
+        text
+        for text, missing in (
+            ("no stored rotation (--rotation)", not setup.rotations),
+            ("no G92 or G52 in force at the start (--no-g92)", not setup.no_shift),
+            ("the codes that are in force at the start (--startup)", not setup.startup),
+        )
+        if missing
     ]
+    return f"; assumed: {', '.join(found)}" if found else ""
 
 
 def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
@@ -108,7 +146,12 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
     revision, paths = job.revision, job.paths
     return {
         "program": str(job.program),
-        "files": {name: None if path is None else str(path) for name, path in zip(paths._fields, paths, strict=True)},
+        "written": done.written,
+        "nothing": None if done.written else nothing(job, done),
+        "files": {
+            name: None if path is None or not done.written else str(path)
+            for name, path in zip(paths._fields, paths, strict=True)
+        },
         "lines": revision.lines,
         "changed": revision.changed,
         "run_time_s": revision.seconds,
@@ -130,12 +173,25 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
             }
             for b in done.bounds
         ],
-        "proof": None if done.proof is None else {"moves": done.proof.moves, "largest_um": done.proof.largest},
+        "proof": None if done.proof is None else _proof(done.proof),
+        "other_offset_um": dict(zip("xyz", revision.elsewhere.most, strict=True)) if job.drift.by_position else None,
         "warnings": warnings(job, done),
         "notes": list(notes),
         "us_per_line": 1e6 * done.seconds / max(revision.lines, 1),
         "revising_s": done.seconds,
         "proving_s": done.proving,
+    }
+
+
+def _proof(proof: Proof) -> dict[str, Any]:
+    return {
+        "moves": proof.moves,
+        "largest_um": proof.largest,
+        "states": proof.states,
+        "slower_percent": proof.slower,
+        "held": list(proof.held),
+        "drawn": list(proof.drawn),
+        "sentence": proof.sentence,
     }
 
 

@@ -1,6 +1,7 @@
 """What the texts of the options of ``thermocomp revise`` mean."""
 
 import re
+from collections.abc import Sequence
 
 from thermocomp.compensation.nc.following import startup
 from thermocomp.compensation.nc.following.block import Point
@@ -8,6 +9,7 @@ from thermocomp.compensation.nc.reading.tokens import Controller
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import measured as with_unit
 
+_ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
@@ -39,16 +41,36 @@ def positive(text: str, quantity: str, option: str, example: str) -> float:
 def origin_of(text: str) -> tuple[int, Point]:
     """Return number and origin [mm] of a work coordinate system."""
     name, _, place = text.partition("=")
+    said = f"--origin {text!r}"
+    return _system(name, said, "G54=100 mm, 50 mm, 0 mm"), point_of(place, said)
+
+
+def rotations_of(texts: Sequence[str]) -> dict[int, float]:
+    """Return the stored rotations of work coordinate systems [deg]."""
+    if [text.strip().lower() for text in texts] == ["none"]:
+        return dict.fromkeys(range(1, 10), 0.0)
+    found = {}
+    for text in texts:
+        name, _, angle = text.partition("=")
+        said, example = f"--rotation {text!r}", "G54=12 deg"
+        system, turned = _system(name, said, example), _ANGLE.fullmatch(angle.strip())
+        if turned is None:
+            raise InputError(f'{said}: write an angle in degrees, such as "{example}", or none alone')
+        found[system] = float(turned[1])
+    return found
+
+
+def _system(name: str, said: str, example: str) -> int:
+    """Return the number of a work coordinate system."""
     found = _SYSTEM.fullmatch(name.strip())
     if found is None or (found[2] and found[3] and found[2] != "1"):
-        raise InputError(f'--origin {text!r}: want a work coordinate system, such as "G54=100 mm, 50 mm, 0 mm"')
+        raise InputError(f'{said}: want a work coordinate system, such as "{example}"')
     base, decimal, extra = int(found[1]), found[2], found[3]
-    point = point_of(place, f"--origin {text!r}")
     if extra:  # G54.1 P3
-        return 100 + int(extra), point
+        return 100 + int(extra)
     if decimal and base != 9:
-        raise InputError(f"--origin {text!r}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
-    return (6 + int(decimal) if decimal else base - 3), point
+        raise InputError(f"{said}: there are G54 to G59, G59.1 to G59.3, and G54.1 P1 and on")
+    return 6 + int(decimal) if decimal else base - 3
 
 
 def point_of(text: str, said: str) -> Point:

@@ -1,11 +1,16 @@
 """Structure codes: which axes carry the workpiece and which the tool."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 
 from thermocomp.core.exceptions import SettingError
 
+Side = Literal["head", "table"]
+
 _LINEAR = "XYZ"
+_ROTARY = "ABC"
 # a B with a prime or a number is an axis, not the bed
 _LONG = re.compile(r"W(?P<workpiece>.*?)B(?!['\d])(?P<tool>.*?)(?P<spindle>C\d?|\(C\d?\))?T")
 _SHORT = re.compile(r"([ABCU-Z]*)(F?)([ABCU-Z]*)")
@@ -24,15 +29,20 @@ class Structure:
         Axes between workpiece and bed, the nearest to the workpiece first.
     tool : tuple of str
         Axes between bed and tool, the nearest to the bed first.
+    rotary : dict of str to {'head', 'table'}
+        Rotary axes A, B, C: on the side of the tool, which they turn, or of the workpiece.
     """
 
     workpiece: tuple[str, ...]
     tool: tuple[str, ...]
+    rotary: dict[str, Side] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
         for name in self.axes:
             if name not in _LINEAR:
-                raise SettingError(f"axis {name}: only the linear axes X, Y and Z can be in a structure")
+                raise SettingError(
+                    f"axis {name}: only the linear axes X, Y and Z and the rotary axes A, B and C can be in a structure"
+                )
             if self.axes.count(name) > 1:
                 raise SettingError(f"axis {name} is there twice")
         if not self.axes:
@@ -46,8 +56,9 @@ class Structure:
         ----------
         code : str
             As of ISO 10791, ``w X' b Z Y (C1) t``: from the workpiece over the bed to the tool, axes that carry the
-            workpiece with a prime; or short, ``XFZY``: the letters before F carry the workpiece, those behind it the
-            tool; without F all carry the tool. Blanks and small letters do not matter.
+            workpiece with a prime, rotary ones too (``w C' A' X' b Y Z (C1) t``); or short, ``XFZY``: the letters
+            before F carry the workpiece, those behind it the tool; without F all carry the tool. Blanks and small
+            letters do not matter. A C as the last axis of the tool is the spindle, with or without parentheses.
 
         Returns
         -------
@@ -56,34 +67,33 @@ class Structure:
         Raises
         ------
         SettingError
-            It is neither, has an axis twice, a rotary axis, a prime in the wrong place, or a spindle that turns the
-            workpiece.
+            It is neither, has an axis twice, another one than X Y Z A B C, a prime in the wrong place, or a spindle
+            that turns the workpiece.
         """
         text = "".join(code.split()).replace("’", "'").replace("′", "'").upper()
         short = _SHORT.fullmatch(text)
         if short and text:
             before, _, after = short.groups()
-            return cls(tuple(before), tuple(after)) if "F" in text else cls((), tuple(before + after))
+            return _made(before, after) if "F" in text else _made("", before + after)
         found = _LONG.fullmatch(text)
         if not found:
             raise SettingError(
                 f"{code!r} is no structure code; write it from the workpiece over the bed to the tool, such as "
                 '"w X\' b Z Y (C1) t", or short, such as "XFZY"'
             )
-        return cls(
-            _axes(found["workpiece"], code, primed=True),
-            _axes(found["tool"], code, primed=False),
-        )
+        return _made(_axes(found["workpiece"], code, primed=True), _axes(found["tool"], code, primed=False))
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """All axes, from the workpiece to the tool."""
+        """All linear axes, from the workpiece to the tool."""
         return (*self.workpiece, *self.tool)
 
     @property
     def code(self) -> str:
-        """The code of ISO 10791."""
-        return " ".join(["w", *(f"{a}'" for a in self.workpiece), "b", *self.tool, "(C1)", "t"])
+        """The code of ISO 10791; rotary axes stand nearest to workpiece and tool, wherever they were."""
+        table = [f"{a}'" for a, side in self.rotary.items() if side == "table"]
+        head = [a for a, side in self.rotary.items() if side == "head"]
+        return " ".join(["w", *table, *(f"{a}'" for a in self.workpiece), "b", *self.tool, *head, "(C1)", "t"])
 
     def beyond(self, axis: str) -> tuple[str, ...]:
         """Return the axes between an axis and the tool: those that move the tool against what the axis guides.
@@ -95,6 +105,18 @@ class Structure:
         return self.axes[self.axes.index(axis) + 1 :]
 
 
+def _made(workpiece: Sequence[str], tool: Sequence[str]) -> Structure:
+    """Return the structure of all axes of both sides."""
+    turning: list[tuple[str, Side]] = [(a, "table") for a in workpiece if a in _ROTARY]
+    turning += [(a, "head") for a in tool if a in _ROTARY]
+    rotary = dict(turning)
+    if len(rotary) < len(turning):
+        twice = next(a for a in rotary if [b for b, _ in turning].count(a) > 1)
+        raise SettingError(f"axis {twice} is there twice")
+    first, second = (tuple(a for a in side if a not in _ROTARY) for side in (workpiece, tool))
+    return Structure(first, second, rotary)
+
+
 def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
     """Return the letters of one side, with or without a prime as the side wants it."""
     side, found = ("workpiece" if primed else "tool"), []
@@ -103,7 +125,7 @@ def _axes(text: str, code: str, *, primed: bool) -> tuple[str, ...]:
             raise SettingError(f"{word} in {code!r}: a spindle on the workpiece's side is not supported")
         match = _AXIS.fullmatch(word)
         if not match:
-            raise SettingError(f"{word!r} in {code!r} is no axis: want X, Y or Z")
+            raise SettingError(f"{word!r} in {code!r} is no axis: want X, Y, Z, A, B or C")
         if primed and not match[2]:
             raise SettingError(f"{word!r} in {code!r} stands on the {side}'s side and needs a prime: {word}'")
         if match[2] and not primed:

@@ -90,6 +90,8 @@ def _machine(content: dict[str, Any], source: Path) -> Machine:
     structure: Structure = given["structure"]
     tables = given.pop("axes", {})
     for name in tables:
+        if name in structure.rotary:
+            raise SettingError(f"{name} is a rotary axis: it has no table, the structure tells all", ("axes", name))
         if name not in structure.axes:
             raise SettingError(f"there is no axis {name!r} in the structure {structure.code!r}", ("axes", name))
     for name in structure.axes:

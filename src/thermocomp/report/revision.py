@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.revising.course import Run
+from thermocomp.compensation.nc.revising.course import Bound, Run
 from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL, drawing
 
 FloatArray = NDArray[np.float64]
@@ -23,14 +23,14 @@ LONG = 2 * 3600.0
 _SMALL = 1.0
 
 
-def draw(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: str) -> Figure:
+def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> Figure:
     """Show the drift of each axis, what the program takes off, and what is left in the cuts; the spindle speed below.
 
     Parameters
     ----------
     run : Run
-    axes : sequence of str
-        Those that have a model, such as ``["Z"]``.
+    bounds : sequence of Bound
+        Of the axes that have a model.
     tool_changes : sequence of float
         When [s].
     title : str
@@ -42,11 +42,11 @@ def draw(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: st
     unit, name = (3600.0, "h") if run.time[-1] > LONG else (60.0, "min")
     time = run.time / unit
     with drawing("revision"):
-        n = len(axes)
+        n = len(bounds)
         figure = Figure(figsize=(9.6, 1.5 + 2.1 * n + 1.1), layout="constrained")
         *panels, below = figure.subplots(n + 1, 1, sharex=True, height_ratios=[2.0] * n + [1.0], squeeze=False)[:, 0]
-        for axis, ax in zip(axes, panels, strict=True):
-            _drift(ax, axis, time, run)
+        for bound, ax in zip(bounds, panels, strict=True):
+            _drift(ax, bound, time, run)
         ends = np.concatenate([[0.0], time])
         below.plot(np.repeat(ends, 2)[1:-1], np.repeat(run.speed[:, 1], 2), color=MEASURED)
         below.set_ylabel("1/min")
@@ -65,21 +65,21 @@ def draw(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: st
         return figure
 
 
-def write(run: Run, axes: Sequence[str], tool_changes: Sequence[float], title: str, path: Path) -> None:
+def write(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str, path: Path) -> None:
     """Write the picture as PNG.
 
     Parameters
     ----------
-    run, axes, tool_changes, title
+    run, bounds, tool_changes, title
         See `draw`.
     path : Path
         An existing file is replaced.
     """
-    draw(run, axes, tool_changes, title).savefig(path, format="png", dpi=150, metadata={"Software": None})
+    draw(run, bounds, tool_changes, title).savefig(path, format="png", dpi=150, metadata={"Software": None})
 
 
-def _drift(ax: Axes, axis: str, time: FloatArray, run: Run) -> None:
-    k = "XYZ".index(axis)
+def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
+    k = "XYZ".index(bound.axis)
     drift, carried, left = run.deviation[:, :, k], run.carried[:, :, k], run.left[:, :, k]
     ax.axhline(0, color="#aaa", lw=0.8)
     ax.plot(*_within(time, drift), color=MEASURED, lw=1.6, label="drift")
@@ -88,11 +88,17 @@ def _drift(ax: Axes, axis: str, time: FloatArray, run: Run) -> None:
     ax.plot(*_cuts(time, left), color=RESIDUAL, lw=1.4, label="left in the cuts")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -_SMALL), max(high, _SMALL))
-    ax.set_ylabel(f"{axis} [um]")
-    far = float(np.abs(drift).max())
-    cut = np.isfinite(left)
-    rest = f"at most {np.abs(left[cut]).max():.1f} um of it is left in the cuts" if cut.any() else "nothing is cut"
-    ax.set_title(f"{axis}: the tool drifts by up to {far:.1f} um, {rest}")
+    ax.set_ylabel(f"{bound.axis} [um]")
+    ax.set_title(f"{bound.axis}: {_said(bound, cut=bool(np.isfinite(left).any()))}")
+
+
+def _said(bound: Bound, *, cut: bool) -> str:
+    """Return what the table says: drift, what is left of it, and the bound, which has the model's error in it."""
+    far = max(abs(bound.low), abs(bound.high))
+    if not cut:
+        return f"the tool drifts by up to {far:.1f} um; nothing is cut"
+    wrong = "the model was never judged: no bound" if math.isnan(bound.model) else f"bound {bound.most:.1f} um"
+    return f"the tool drifts by up to {far:.1f} um; in the cuts at most {bound.left:.1f} um is left; {wrong}"
 
 
 def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

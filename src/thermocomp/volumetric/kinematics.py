@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.components import COMPONENTS
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 
 FloatArray = NDArray[np.float64]
@@ -29,9 +30,20 @@ class Kinematics:
     ----------
     machine : Machine
         Its structure, axes and reference points; its components play no part.
+
+    Raises
+    ------
+    InputError
+        It has rotary axes: their errors and levers are not among the 32 components.
     """
 
     def __init__(self, machine: Machine) -> None:
+        if machine.structure.rotary:
+            raise InputError(
+                f"{machine.name}: rotary axis {', '.join(machine.structure.rotary)} in the structure "
+                f"{machine.structure.code!r}: only machines of the linear axes X, Y and Z are computed; take "
+                "the rotary axes out of the structure if they stand still"
+            )
         self.machine = machine
         self.structure = machine.structure
         self.axes = {a.name: a for a in machine.axes}

@@ -30,10 +30,24 @@ def test_drilling_goes_back_to_where_it_came_from_or_to_r() -> None:
     assert ways(blocks[2]) == [("rapid", 2, 0, 5), ("rapid", 2, 0, 2), ("feed", 2, 0, -1), ("rapid", 2, 0, 2)]
 
 
-def test_back_to_the_first_level_after_r_is_refused() -> None:
-    """LinuxCNC 2.9 goes from R to the next hole and to the first level at once, or not, as numbers are rounded."""
-    with pytest.raises(ProgramError, match="G98 after a hole that ended at R"):
-        run("F100 G0 Z5 G98\nG81 X1 Z-1 R2\nG99 X2\nG98 X3\n")
+def test_back_to_the_first_level_after_r() -> None:
+    """From R LinuxCNC goes to the next hole and to the first level at once; from a hair above R it stays there."""
+    blocks = run("F100 G0 Z5 G98\nG81 X1 Z-1 R2\nG99 X2\nG98 X3\n")
+    assert ways(blocks[3]) == [("rapid", 3, 0, 5), ("rapid", 3, 0, 2), ("feed", 3, 0, -1), ("rapid", 3, 0, 5)]
+    assert blocks[3].known == (True, False, True)
+    with pytest.raises(ProgramError, match="almost the same R"):
+        run("F100 G0 Z5 G98\nG81 X1 Z-1 R2.00002\nG99 X2\nG98 X3 R2\n")
+
+
+@pytest.mark.parametrize("codes", ["G99", "G98", ""])
+def test_where_a_cycle_ends_is_certain_if_the_level_is_or_by_g99(codes: str) -> None:
+    unknown = f"F100 {codes}\nG81 X1 Y1 Z-1 R2\nX2\n"
+    assert [b.known[2] for b in run(f"{unknown}G80\n")[1:]] == [codes == "G99"] * 3
+    above = run(f"F100 {codes}\nG0 Z5\nG81 X1 Y1 Z-1 R2\n")[-1]
+    assert above.known[2] is (codes != "")
+    below = run(f"F100 {codes}\nG0 Z1\nG81 X1 Y1 Z-1 R2\n")[-1]
+    assert below.known[2]
+    assert not run(f"F100 {codes}\nG0 Z5\nG91 G81 X1 Y1 Z-1 R2\nM0\n")[-1].known[2]
 
 
 def test_the_tool_goes_up_to_r_first() -> None:

@@ -2,55 +2,62 @@
 
 import math
 import random
-from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from thermocomp.compensation.nc.following.block import Block, Kind, Modal, Move
+from thermocomp.compensation.nc.following.block import Block, Modal, Move
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.revising.course import Course
+from thermocomp.compensation.nc.revising.demand import Left
 from thermocomp.compensation.nc.revising.revise import Revised
 
 Vector = tuple[float, float, float]
 
 
 def row(
-    end: float, drift: Vector, carried: Vector = (0.0, 0.0, 0.0), *, rapid: bool = False, kind: Kind = "line"
+    end: float,
+    drift: Vector,
+    carried: Vector = (0.0, 0.0, 0.0),
+    before: tuple[Vector, Vector] | None = None,
+    *,
+    rapid: bool = False,
 ) -> Revised:
+    """A cut, or a rapid, from what was before it to a drift and a correction [um]."""
     move = Move(rapid, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    block = Block(Line(1, "X1\n"), Modal(), kind, moves=[move], speed=-3000.0)
-    return Revised(1, "X1\n", ("X1\n",), block, 0.0, end, drift, carried, carried)
+    block = Block(Line(1, "X1\n"), Modal(), "line", moves=[move], speed=-3000.0)
+    cut = None if rapid else Left().take(1, [before or (drift, carried), (drift, carried)])
+    return Revised(1, "X1\n", ("X1\n",), block, 0.0, end, drift, carried, carried, cut)
 
 
 def test_rows_as_they_are_while_they_are_few() -> None:
     course = Course()
-    course.take(row(1.0, (0.0, 1.0, 2.0)))
-    course.take(row(2.0, (0.0, 2.0, 4.0), (0.0, -1.0, -2.0)))
-    course.take(row(3.0, (0.0, 2.0, 4.0), (0.0, -1.0, -2.0)))  # only time has passed
-    course.take(row(4.0, (0.0, 2.0, 6.0), (0.0, -1.0, -2.0), rapid=True))
+    first, second = ((0.0, 1.0, 2.0), (0.0, 0.0, 0.0)), ((0.0, 2.0, 4.0), (0.0, -1.0, -2.0))
+    course.take(row(1.0, *first))
+    course.take(row(2.0, *second, before=first))
+    course.take(row(3.0, *second))
+    course.take(row(4.0, *second))  # only time has passed
+    course.take(row(5.0, (0.0, 2.0, 6.0), (0.0, -1.0, -2.0), rapid=True))
     run = course.run()
-    assert run.time.tolist() == [1.0, 3.0, 4.0]
-    assert run.deviation[:, 0].tolist() == run.deviation[:, 1].tolist() == [[0, 1, 2], [0, 2, 4], [0, 2, 6]]
-    assert run.carried[:, 0, 2].tolist() == [0.0, -2.0, -2.0]
-    assert run.speed.tolist() == [[3000.0, 3000.0]] * 3
+    assert run.time.tolist() == [1.0, 2.0, 4.0, 5.0]
+    assert run.deviation[:, 0].tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 4], [0, 2, 6]]  # what is met inside counts
+    assert run.deviation[:, 1].tolist() == [[0, 1, 2], [0, 2, 4], [0, 2, 4], [0, 2, 6]]
+    assert run.carried[:, 0, 2].tolist() == [0.0, -2.0, -2.0, -2.0]
+    assert run.speed.tolist() == [[3000.0, 3000.0]] * 4
     # both ends of a cut count; a rapid is none
-    assert run.left[0, :, 2].tolist() == [2.0, 2.0]
-    assert run.left[1, :, 2].tolist() == [2.0, 2.0]
-    assert np.isnan(run.left[2]).all()
+    assert run.left[:3, :, 1].tolist() == [[1.0, 1.0]] * 3
+    assert run.left[:3, :, 2].tolist() == [[2.0, 2.0]] * 3
+    assert np.isnan(run.left[3]).all()
 
 
-@pytest.mark.parametrize("kind", ["machine", "home"])
-def test_moves_in_machine_coordinates_leave_nothing(kind: Kind) -> None:
-    course = Course()
-    course.take(row(1.0, (0.0, 0.0, 5.0), kind=kind))
-    course.take(replace_block(row(2.0, (0.0, 0.0, 5.0))))
-    assert np.isnan(course.run().left).all()
-
-
-def replace_block(revised: Revised) -> Revised:
-    assert revised.block is not None
-    return revised._replace(block=replace(revised.block, moves=[]))
+def test_the_picture_has_the_residual_that_is_told() -> None:
+    chance = random.Random(4)
+    course, told = Course(most=50), Left()
+    for k in range(999):
+        samples = [((0.0, 0.0, chance.gauss(0, 3)), (0.0, 0.0, -1.0)) for _ in range(chance.choice((2, 9)))]
+        cut = told.take(k, samples)
+        course.take(row(float(k), *samples[-1])._replace(cut=cut))
+    assert np.nanmax(np.abs(course.run().left[:, :, 2])) == told.most[2]
+    assert np.abs(course.run().deviation[:, :, 2]).max() == told.without[2]
 
 
 def test_no_extreme_is_lost() -> None:

@@ -1,6 +1,7 @@
 """What is left of the drift is told truly; marks, jumps and words where nobody knows the place are avoided."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def test_an_origin_that_is_unknown_is_asked_for(tmp_path: Path) -> None:
     with pytest.raises(ProgramError, match=r"line 4: .*where G54 begins is unknown: --origin"):
         tried(tmp_path, "G1 Z-1\n", Bent())
     setup = Setup(inch=False, speed=3000.0, offsets={1: (0.0, 0.0, 0.0)})
-    with pytest.raises(ProgramError, match=r"line 5: .*the length of tool 2 is unknown: --tool"):
+    with pytest.raises(ProgramError, match=r"line 7: .*the length of tool 2 is unknown: --tool"):
         tried(tmp_path, "T2 M6\nG43 H2\nG0 X0 Y0 Z5\nG1 Z-1\n", Bent(), setup=setup)
     assert tried(tmp_path, "G10 L2 P1 X0 Y0 Z0\nG0 X300 Y0 Z5\nG1 Z-1\n", Bent()).run.changed
 
@@ -114,7 +115,7 @@ def test_full_circles_have_a_way(tmp_path: Path) -> None:
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 def test_no_word_is_added_behind_a_tool_change(way: str, tmp_path: Path) -> None:
     """The change may take any axis anywhere: to its own height, to G30."""
-    tools = Setup(inch=False, speed=3000.0, tools={1: 120.0, 2: 140.0}, offsets={1: (0.0, 0.0, 0.0)})
+    tools = replace(STATED, tools={1: 120.0, 2: 140.0}, offsets={1: (0.0, 0.0, 0.0)})
     text = "T1 M6\nG43 H1\nG0 X0 Y0 Z50\nG4 P600\nT2 M6\nG43 H2\nG0 X100\nG0 Y50\nG0 Z5\nG55\nX20 Y20\n"
     for setup in (STATED, tools):
         trial = tried(tmp_path, text, Growing(), way, setup)

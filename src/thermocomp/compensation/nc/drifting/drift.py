@@ -223,6 +223,7 @@ class Drift:
             return lambda _: everywhere
         frozen = copy.copy(self)
         frozen._ladders = tuple(copy.copy(ladder) for ladder in self._ladders)
+        frozen.beyond = {}  # asked for anywhere, not only where the program goes
         return frozen.deviation
 
     @property

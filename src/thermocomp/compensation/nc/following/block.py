@@ -39,6 +39,12 @@ class Modal:
         Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
     rotation : float
         Of the program's coordinates about Z, stored or by G68 [deg].
+    rotation_told : bool
+        Program or setup say it; else one that is stored in the controller may be in force.
+    origin_told : bool
+        Program or setup say where the work coordinate system begins.
+    untold_tool : int or None
+        Tool whose length is in force, and neither program nor setup say it; -1: of a tool that is not known either.
     turned : bool
         G68 is in force.
     retract : {98, 99}
@@ -62,6 +68,9 @@ class Modal:
     diameter: bool = False
     system: int = 1
     rotation: float = 0.0
+    rotation_told: bool = False
+    origin_told: bool = False
+    untold_tool: int | None = None
     turned: bool = False
     retract: int = 98
     retract_stated: bool = False
@@ -130,7 +139,7 @@ class Block:
         Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
     known : tuple of bool
         Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
-        `end` would not move it. False at the start of the program, after G53, G28, G30 and M6, after a
+        `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a
         change of the coordinate system or of the tool length that the file does not tell, and after an optional line
         that moved it.
     moves : list of Move
@@ -142,8 +151,10 @@ class Block:
         Dwell [s].
     tool_change : int or None
         Number of the tool that M6 puts in; -1 unknown.
+    turned : dict of str to float
+        Rotary axes that are not at 0, and where they are [deg]; nan: they have got another zero.
     stops : bool
-        M0, M1, M60: the operator decides how long.
+        M0, M1, M60: the operator decides how long, and may move the axes.
     ends : bool
         M2, M30 or the closing ``%``: nothing after it is run.
     sticky : dict of str to float
@@ -164,6 +175,7 @@ class Block:
     speed: float = 0.0
     pause: float = 0.0
     tool_change: int | None = None
+    turned: dict[str, float] = field(default_factory=dict)
     stops: bool = False
     ends: bool = False
     sticky: dict[str, float] = field(default_factory=dict)
@@ -221,3 +233,10 @@ class Setup:
     least: float = 0.001
     skip_optional: bool = False
     harmless: frozenset[int] = frozenset()
+
+
+def system_name(system: int) -> str:
+    """Return the code of a work coordinate system, such as ``G54``."""
+    if system > 100:
+        return f"G54.1 P{system - 100}"
+    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"

@@ -9,7 +9,7 @@ from typing import Final
 
 from thermocomp.compensation.nc.following import fanuc, motion, placing, setting
 from thermocomp.compensation.nc.following.block import Block, Setup
-from thermocomp.compensation.nc.following.codes import CYCLES, TAKES_AXES
+from thermocomp.compensation.nc.following.codes import CYCLES, STOPS, TAKES_AXES
 from thermocomp.compensation.nc.following.orders import Orders, Reader
 from thermocomp.compensation.nc.following.state import State
 from thermocomp.compensation.nc.reading.expressions import Parameters
@@ -175,14 +175,17 @@ class Follower:
         self._after(groups, block, code, before.motion)
         if state.lathe and not all(move.rapid for move in block.moves):
             raise setting.lathe(orders, f"{state.lathe} before, and no M6")
-        block.end = state.place
-        block.known = state.known
-        block.feed = state.feed
-        block.speed = block.speed or state.speed
         stop = groups.get("stop")
         if stop is not None:
-            block.stops = block.stops or stop in ("M0", "M1", "M60")
-            block.ends = self._ended = stop in ("M2", "M30")
+            block.ends = self._ended = stop not in STOPS
+        if stop in STOPS:  # the operator may move the axes
+            block.stops = True
+            state.known, state.level_known = (False, False, False), False
+        block.end = state.place
+        block.known = state.known
+        block.turned = state.turned
+        block.feed = state.feed
+        block.speed = block.speed or state.speed
         return block
 
     def _after(self, groups: dict[str, str], block: Block, code: str, before: str) -> None:

@@ -13,6 +13,8 @@ _NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come befo
 
 #: levels nearer than that are the same [mm]
 _SAME_LEVEL = 1e-4
+#: and nearer than that they are equal but for the arithmetic [mm]
+_ROUNDING = 1e-9
 
 
 def straight(state: State, orders: Orders, block: Block) -> None:
@@ -232,7 +234,7 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     elif state.level_frame != frame:
         raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
-        _refuse_from_r(start[across], state.level, state.sticky["R"] * scale, orders)
+        _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, orders)
     block.kind, block.sticky = "cycle", state.sticky
     if state.fanuc and not fanuc.drills(state, orders):
         return
@@ -264,11 +266,8 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     known = state.known
     if modal.absolute:
         known = mark(known, {i: 0.0 for i in range(3) if "XYZ"[i] in named}, to=True)
-    # back at R, or at the level where the cycle began
-    at_r = modal.absolute and (modal.retract == 99 or state.sticky["R"] > state.level / scale)
     state.place, state.machine = start, at
-    certain = modal.retract_stated or not modal.absolute or state.sticky["R"] >= state.level / scale
-    state.known = mark(known, {across: 0.0}, to=certain and (at_r or state.level_known))
+    state.known = mark(known, {across: 0.0}, to=_ends_certainly(state))
 
 
 def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:
@@ -280,11 +279,20 @@ def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:
         block.speed = state.spindle if code == "G84" else -state.spindle
 
 
-def _refuse_from_r(start: float, level: float, plane: float, orders: Orders) -> None:
-    if abs(start - plane) < _SAME_LEVEL < abs(level - plane):
+def _ends_certainly(state: State) -> bool:
+    """Whether the level at which a cycle ends is known: R by G99, or that at which it began, or both are the same."""
+    modal = state.modal
+    if modal.retract_stated and modal.retract == 99 and modal.absolute:
+        return True
+    rises = state.sticky["R"] * state.scale - (state.level or 0.0 if modal.absolute else 0.0)
+    return state.level_known and (modal.retract_stated or rises >= 0.0)
+
+
+def _refuse_near_r(start: float, level: float, plane: float, orders: Orders) -> None:
+    if _ROUNDING < abs(start - plane) < _SAME_LEVEL < abs(level - plane):
         raise orders.error(
-            "G98 after a hole that ended at R (G99): whether LinuxCNC goes up before the next hole depends on "
-            "rounding; write G80 between them"
+            "G98 after a hole that ended at almost the same R: whether LinuxCNC goes up before the next hole depends "
+            "on rounding; write the same R, or G80 between them"
         )
 
 

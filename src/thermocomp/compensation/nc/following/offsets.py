@@ -51,6 +51,7 @@ class Offsets:
         self.origins: dict[int, Point] = dict(setup.offsets)
         self.rotations: dict[int, float] = dict(setup.rotations)
         self._certain_origins: dict[int, Known] = {}
+        self._told_origins = set(setup.offsets)
         self.shift: Point = _ZERO
         self._kept: Point = _ZERO
         self._certain_shift: Known = _NEVER
@@ -85,6 +86,16 @@ class Offsets:
         """Per axis, whether program coordinates tell machine coordinates."""
         origin = self._certain_origins.get(self.system, _NEVER)
         return both(origin, both(self._certain_shift, self.certain_tool))
+
+    @property
+    def origin_told(self) -> bool:
+        """Whether program or setup say where the system in force begins."""
+        return self.system in self._told_origins
+
+    @property
+    def rotation_told(self) -> bool:
+        """Whether program or setup say how the system in force is turned."""
+        return self.system in self.rotations
 
     def state(self) -> tuple[object, ...]:
         """Return all that tells whether something has changed."""
@@ -144,6 +155,8 @@ class Offsets:
             certain = self._certain_origins.get(system, _NEVER)
             self._certain_origins[system] = mark(certain, values, to=True)
         self.origins[system] = put(old, values)
+        if values:
+            self._told_origins.add(system)
         if rotation is not None:
             self.rotations[system] = rotation
         self._update()

@@ -1,6 +1,7 @@
 """Codes that change offsets: work coordinate systems, G10, G52, G92, tool lengths. The tool stays where it is."""
 
 from thermocomp.compensation.nc.following.block import Block, Known, Point
+from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.following.offsets import EXTERNAL, mark
 from thermocomp.compensation.nc.following.orders import Orders
 from thermocomp.compensation.nc.following.state import State
@@ -21,7 +22,7 @@ def select_system(state: State, orders: Orders) -> None:
     else:
         system = _SYSTEMS[code]
     state.renamed(state.offsets.select(system))
-    state.changed(system=system, rotation=state.offsets.rotation)
+    state.placed()
 
 
 def tool_length(state: State, orders: Orders) -> None:
@@ -36,18 +37,24 @@ def tool_length(state: State, orders: Orders) -> None:
     state.length_inch = None if code == "G49" else state.modal.inch
     if code == "G43.1":
         offset, certain = _put_words(state, orders), _LENGTH_CERTAIN
+        untold = None if "Z" in orders.values else state.untold_tool
     elif code == "G49":
-        offset, certain = (0.0, 0.0, 0.0), _LENGTH_CERTAIN
+        offset, certain, untold = (0.0, 0.0, 0.0), _LENGTH_CERTAIN, None
     else:
         number = _length_number(state, orders, code)
         sure = number in state.lengths or (number == 0 and state.fanuc)
         length = state.lengths.get(number, state.doubtful.get(number, 0.0))
         offset, certain = (0.0, 0.0, length), (True, True, sure)
+        told = sure or (number in state.setup.tools and state.doubtful.get(number) == state.setup.tools[number])
+        untold = None if told else number
         if code == "G43.2":
+            untold = untold if state.untold_tool is None else state.untold_tool
             a, b, c = offsets.tool
             offset = (a, b, c + offset[2])
             certain = (certain[0], certain[1], certain[2] and offsets.certain_tool[2])
     state.renamed(offsets.set_tool(offset, certain))
+    state.untold_tool = untold
+    state.placed()
 
 
 def _put_words(state: State, orders: Orders) -> Point:
@@ -74,13 +81,14 @@ def local(state: State, orders: Orders, block: Block) -> None:
     offsets = state.offsets
     values = state.axis_values(orders)
     if code in ("G92", "G52"):
-        if not values and not orders.values.keys() & {"A", "B", "C"}:
+        if not values and not ROTARY & orders.values.keys():
             raise orders.error(f"{code} without axis words; name the axes")
         if state.fanuc and any(offsets.shift) and code != state.shifted_by:
             raise orders.error("G52 and G92 together are not supported; cancel one before the other")
         state.shifted_by = code
         block.kind = "set"
-    for letter in {"A", "B", "C"} & orders.values.keys():
+    for letter in ROTARY & orders.values.keys():
+        state.rezeroed.add(letter)
         if code == "G92":
             state.rotary[letter] = orders.values[letter]
     if code == "G92":
@@ -110,6 +118,7 @@ def g10(state: State, orders: Orders, block: Block) -> None:
 
 
 def _origin(state: State, orders: Orders, block: Block, kind: int, number: int) -> None:
+    state.rezeroed |= ROTARY & orders.values.keys()
     offsets = state.offsets
     values = state.axis_values(orders)
     if state.fanuc:
@@ -132,10 +141,8 @@ def _origin(state: State, orders: Orders, block: Block, kind: int, number: int) 
     offsets.set_origin(system, values, rotation, add=state.fanuc and not state.modal.absolute)
     if system in (offsets.system, EXTERNAL):
         state.renamed(mark(_LENGTH_CERTAIN, values, to=False))
-        if rotation is not None:
-            state.known = (False, False, state.known[2])
-            state.changed(rotation=offsets.rotation)
-        elif offsets.rotation and (0 in values or 1 in values):
+        state.placed()
+        if rotation is not None or (offsets.rotation and (0 in values or 1 in values)):
             state.known = (False, False, state.known[2])
 
 

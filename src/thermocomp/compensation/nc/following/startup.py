@@ -42,7 +42,6 @@ def modal(setup: Setup) -> Modal:
     blend = lengths.get("P", 0.0)
     return Modal(
         inch=bool(setup.inch),
-        rotation=setup.rotations.get(1, 0.0),
         # where nothing is stated LinuxCNC's interpreter begins with G99, Fanuc with G98
         retract=int(retract[0][1:]) if retract else 98 if setup.controller == "fanuc" else 99,
         retract_stated=bool(retract),

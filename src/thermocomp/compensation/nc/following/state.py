@@ -13,6 +13,7 @@ from thermocomp.compensation.nc.following.orders import Orders
 
 MM: Final = 25.4  # per inch
 _TRUE: Known = (True, True, True)
+_NONE: Final[dict[str, float]] = {}
 
 
 class State:
@@ -35,6 +36,7 @@ class State:
         self.machine: Point = (0.0, 0.0, 0.0)
         self.known: Known = (False, False, False)
         self.rotary: dict[str, float] = dict.fromkeys(ROTARY, 0.0)
+        self.rezeroed: set[str] = set()  # rotary axes that have got another zero
         self.feed = 0.0
         self.feed_word = 0.0
         self.spindle: float | None = setup.speed or None
@@ -48,12 +50,15 @@ class State:
         self.doubtful: dict[int, float] = dict(setup.tools)
         self.shifted_by = ""
         self.length_number: int | None = None
+        self.untold_tool: int | None = None
         self.length_inch: bool | None = None
         self.sticky: dict[str, float] = {}
         self.last_dwell = 0.0
         self.level: float | None = None
         self.level_known = False
         self.level_frame = (17, False, False)
+
+        self.placed()
 
     @property
     def speed(self) -> float:
@@ -78,6 +83,17 @@ class State:
         if known is None:
             known = self._variants[motion] = replace(self.modal, motion=motion)
         self.modal = known
+
+    def placed(self) -> None:
+        """Take over what is known of the coordinates in force."""
+        offsets = self.offsets
+        self.changed(
+            system=offsets.system,
+            rotation=offsets.rotation,
+            rotation_told=self.fanuc or offsets.rotation_told,
+            origin_told=offsets.origin_told,
+            untold_tool=self.untold_tool,
+        )
 
     def axis_values(self, orders: Orders) -> dict[int, float]:
         """Return the line's X Y Z by axis [mm]; X as a radius."""
@@ -110,6 +126,14 @@ class State:
         y += values.get("Y", 0.0) * scale
         z += values.get("Z", 0.0) * scale
         return (x, y, z), self.known
+
+    @property
+    def turned(self) -> dict[str, float]:
+        """Rotary axes that are not at 0 [deg]; nan: they have got another zero."""
+        if not (self.rezeroed or any(self.rotary.values())):
+            return _NONE
+        at = self.rotary | dict.fromkeys(self.rezeroed, math.nan)
+        return {letter: angle for letter, angle in at.items() if angle % 360.0}
 
     def turn(self, orders: Orders) -> float:
         """Move the rotary axes; return how far they go [deg]."""

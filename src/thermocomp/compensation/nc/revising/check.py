@@ -57,7 +57,8 @@ class Check:
             raise _fault(block, change, f"makes {len(moves)} moves instead of {len(block.moves)}")
         for k, (was, now) in enumerate(zip(block.moves, moves, strict=True)):
             inside = block.kind in ("cycle", "home") and k < len(moves) - 1
-            others = (change.before, change.inner) if inside else ()
+            others = [change.before, change.inner] if inside else []
+            others += [change.other] if change.other is not None else []
             for axis, (a, b, wanted) in enumerate(zip(was.end, now.end, change.after, strict=True)):
                 found = (b - a) * 1e3
                 if abs(found - wanted) <= ROUNDING or any(abs(found - o[axis]) <= ROUNDING for o in others):

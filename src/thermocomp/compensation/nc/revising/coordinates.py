@@ -16,14 +16,18 @@ import math
 from dataclasses import dataclass, field
 
 from thermocomp.compensation.nc.following.block import PLANES, Block
+from thermocomp.compensation.nc.following.codes import CYCLES
 from thermocomp.compensation.nc.revising.contact import CLEAR, Contact
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, Method, refuse_probing
+from thermocomp.compensation.nc.revising.method import AXES, STILL, Method
 from thermocomp.compensation.nc.revising.text import number, shifted, written
+from thermocomp.compensation.nc.revising.way import length
 from thermocomp.core.exceptions import ProgramError
 
 #: motions that take a word they did not have
 PLAIN = ("G0", "G1")
+#: by how much the time of a cut may change: relatively, and in any case [s]
+SLOWER, LATER = 0.015, 0.004
 
 
 @dataclass
@@ -38,20 +42,18 @@ class Coordinates(Method):
 
     helix: bool = True
     contact: Contact = field(init=False)
-    _known: tuple[bool, bool, bool] = field(default=(False, False, False), init=False)
     #: what depth and retract plane of the cycle in force got
     _cycle: float = field(default=0.0, init=False)
-    #: level at which a series of cycles began [mm], and what it carries [um]
+    #: level at which a series of cycles began [mm; nan: not known], and what it carries [um]
     _series: tuple[float, float] | None = field(default=None, init=False)
+    #: axis and retract plane [mm] of the last cycle, as long as the tool may still stand there
+    _plane: tuple[int, float] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.contact = Contact(self.step, self.safe_z)
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
-        refuse_probing(block)
         self.contact.begin(block)
-        if block.tool_change is not None:  # the change may have moved any axis
-            self.doubtful = [not fixed for fixed in self.fixed]
         before = self.carried
         kind = block.kind
         if self.names_place(block):
@@ -70,10 +72,11 @@ class Coordinates(Method):
                 text = self._drill(block, frame, old, demand)
             else:
                 text = self._homewards(block, frame, old)
-        if block.moves and kind != "cycle":
+        if kind != "cycle" and (block.moves or block.modal.motion not in CYCLES):
             self._series = None
+        if kind not in ("none", "set", "cycle") and self._plane and AXES[self._plane[0]] in block.words:
+            self._plane = None
         self.contact.end(block, [a != b for a, b in zip(self.carried, before, strict=True)])
-        self._known = block.known
         return (text,)
 
     def held_by(self, block: Block) -> str:
@@ -93,21 +96,20 @@ class Coordinates(Method):
         if goal != old or frame.turned:
             goal = frame.words(self._limited(block, frame, demand))
         holds = self._holds(block, frame)
+        if len(holds) < 3 and goal != old and self._hurries(block, frame, goal, holds):
+            holds = (0, 1, 2)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
-        if block.line.optional:
-            self._optional(named)
         for i in named:
             letter = AXES[i]
             if modal.absolute:
                 if i not in holds and not (block.line.optional and not self.fixed[i]):
                     new[i] = goal[i]
                 shifts[letter] = new[i]
-                self.fixed[i] = False
-                self.doubtful[i] = block.line.optional and new[i] != old[i]
+                self._placed(block, i, self.carried[i], moved=new[i] != old[i])
             elif i not in holds and not self.fixed[i] and not self.doubtful[i]:
                 new[i] = goal[i]
                 shifts[letter] = round(new[i] - old[i], frame.digits)
-        if self._takes_words(block, named):
+        if len(holds) < 3 and self._takes_words(block, named):
             self._add(block, frame, goal, holds, new, added)
         if modal.arc_absolute and block.kind == "arc":
             for i, letter in enumerate("IJK"):
@@ -130,7 +132,7 @@ class Coordinates(Method):
                 continue
             if not block.modal.absolute:
                 added[letter] = goal[i] - new[i]
-            elif self._known[i] and block.known[i]:
+            elif self.before[i] and block.known[i]:
                 added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
             else:
                 continue
@@ -149,7 +151,9 @@ class Coordinates(Method):
             if i == axis:
                 continue
             if block.modal.absolute:
-                new[i] = shifts[AXES[i]] = goal[i]
+                if not self.before[i] or abs(block.end[i] - block.start[i]) > STILL:
+                    new[i] = goal[i]
+                shifts[AXES[i]] = new[i]
                 self.fixed[i] = self.doubtful[i] = False
             elif repeats == 1 and not self.fixed[i] and not self.doubtful[i]:
                 new[i] = goal[i]
@@ -179,15 +183,17 @@ class Coordinates(Method):
     ) -> None:
         """Shift depth and retract plane of a cycle, together or not at all."""
         words = (AXES[axis], "R")
+        certain = self.before[axis]
         if self._series is None:
-            self._series = block.start[axis], self.carried[axis]
+            self._series = block.start[axis] if certain else math.nan, self.carried[axis]
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
-        near = any(abs(z - plane) < CLEAR for z in (block.start[axis], level))
-        unsaid = not block.modal.retract_stated
-        if not (self.fixed[axis] or self.doubtful[axis]) and (near or unsaid):
-            # which level is the higher one must not change, nor what the axis carries at either
+        # which level is the higher one must not change
+        if certain and any(abs(z - plane) < CLEAR for z in (block.start[axis], level)):
             goal = frame.words(self.carried)[axis]
+        elif not certain and self._plane and abs(plane - self._plane[1]) < CLEAR:
+            goal = self._cycle
+        self._plane = axis, plane
         if block.modal.motion in ("G73", "G83"):
             goal = _same_pecks(block, words[0], goal, frame.digits)
         if goal != self._cycle or all(word in block.words for word in words):
@@ -198,12 +204,13 @@ class Coordinates(Method):
         within[axis] = goal
         self.inner = frame.shift((within[0], within[1], within[2]))
         back = list(self.carried)
-        if abs(block.end[axis] - plane) < CLEAR:
-            back[axis] = self.inner[axis]
-            self.fixed[axis], self.doubtful[axis] = False, unsaid and carried != self.inner[axis]
-        else:
-            back[axis] = carried
+        at_r = abs(block.end[axis] - plane) < CLEAR
+        back[axis], other = (self.inner[axis], carried) if at_r else (carried, self.inner[axis])
         self.carried = (back[0], back[1], back[2])
+        if at_r or not block.known[axis]:
+            self.fixed[axis] = self.doubtful[axis] = False
+        if not block.known[axis] and other != back[axis]:
+            self.doubt(axis, other)
 
     def _homewards(self, block: Block, frame: Frame, old: Vector) -> str:
         shifts = {AXES[i]: old[i] for i in self.named(block)} if block.modal.absolute else {}
@@ -224,15 +231,37 @@ class Coordinates(Method):
 
     # -- what may change ---------------------------------------------------------------------------------------------
 
-    def _optional(self, named: list[int]) -> None:
-        for i in named:
-            if self.doubtful[i]:
-                self.fixed[i] = True
+    def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
+        """Take in that an axis goes to a place in absolute coordinates, if the line is run."""
+        self.fixed[axis] = False
+        if not block.line.optional:
+            self.doubtful[axis] = False
+        elif moved:
+            self.doubt(axis, carried)
+
+    def _hurries(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...]) -> bool:
+        """Return whether a change of the correction would alter the time of a cut by more than is allowed."""
+        if len(block.moves) != 1 or block.moves[0].rapid or not block.moves[0].feed:
+            return False
+        move = block.moves[0]
+        moved = frame.shift(goal)
+        gaps = [
+            0.0 if i in holds or self.fixed[i] or self.doubtful[i] else (moved[i] - self.carried[i]) * 1e-3
+            for i in range(3)
+        ]
+        way = length(move)
+        if move.arc is None:
+            longer = math.hypot(*(b - a + g for a, b, g in zip(move.start, move.end, gaps, strict=True)))
+        else:
+            across = PLANES[move.arc.plane][2]
+            rise = move.end[across] - move.start[across]
+            longer = math.sqrt(max(way * way - rise * rise, 0.0) + (rise + gaps[across]) ** 2)
+        return abs(longer - way) > max(SLOWER * way, move.feed / 60.0 * LATER)
 
     def _holds(self, block: Block, frame: Frame) -> tuple[int, ...]:
         """Return the axes that have to keep what they carry in this block."""
         modal = block.modal
-        if block.kind == "curve" or modal.motion == "G33.1":
+        if block.kind == "curve" or modal.motion == "G33.1" or self.stands(block):
             return (0, 1, 2)
         if modal.cutter:
             return tuple(i for i in range(3) if not (self.fixed[i] and i == PLANES[modal.plane][2]))
@@ -256,7 +285,7 @@ class Coordinates(Method):
         out = []
         for i in range(3):
             gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
-            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self._known[i] or self.contact.touching):
+            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self.before[i] or self.contact.touching):
                 out.append(demand[i])
             else:
                 # where a least increment is coarser than the step, nothing smaller can be written

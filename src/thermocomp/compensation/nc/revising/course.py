@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.compensation.nc.revising.demand import Cut
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.revise import Revised
 
@@ -25,6 +26,23 @@ class Run(NamedTuple):
     speed: FloatArray  #: (n, 2), of the spindle [1/min]
 
 
+class Bound(NamedTuple):
+    """How far the tool may be off in a cut, of one axis [um]."""
+
+    axis: str
+    low: float  #: of the drift, in the whole run
+    high: float
+    without: float  #: largest drift in a cut
+    left: float  #: what the correction leaves of it, between its updates
+    line: int  #: where
+    model: float  #: how wrong the models may be; nan: they were never judged
+
+    @property
+    def most(self) -> float:
+        """Return the bound; nan if there is none."""
+        return self.left + self.model
+
+
 @dataclass
 class Course:
     """Collects a run.
@@ -39,7 +57,7 @@ class Course:
     _times: list[float] = field(default_factory=list, init=False)
     _low: list[tuple[float, ...]] = field(default_factory=list, init=False)
     _high: list[tuple[float, ...]] = field(default_factory=list, init=False)
-    _last: tuple[Vector, Vector, float, bool] | None = field(default=None, init=False)
+    _last: tuple[Vector, Vector, float, Cut | None] | None = field(default=None, init=False)
     _rows: int = field(default=0, init=False)  # in the last stretch
     _stride: int = field(default=1, init=False)  # rows of a stretch
 
@@ -48,21 +66,17 @@ class Course:
         block = revised.block
         if block is None:
             return
-        cuts = any(not m.rapid for m in block.moves) and block.kind not in ("machine", "home")
-        speed = abs(block.speed)
-        row = revised.deviation, revised.carried, speed, cuts
+        speed, cut = abs(block.speed), revised.cut
+        row = revised.deviation, revised.carried, speed, cut
         if row == self._last:  # nothing moves but time
             self._times[-1] = revised.end
             return
-        before = self._last or row
         self._last = row
-        low = high = (*row[0], *row[1], speed, *_NOT_CUTTING)
-        if cuts:  # at both ends, as in `thermocomp.compensation.nc.revising.demand.Left`
-            pairs = [(before[0], before[1]), (row[0], row[1])]
-            if block.kind == "cycle":  # the hole counts, not the level where it ends
-                pairs = [(deviation, revised.inner) for deviation, _ in pairs]
-            ends = [[d + c for d, c in zip(*pair, strict=True)] for pair in pairs]
-            low, high = (*low[:7], *map(min, *ends)), (*high[:7], *map(max, *ends))
+        if cut is None:
+            low = high = (*revised.deviation, *revised.carried, speed, *_NOT_CUTTING)
+        else:
+            low = (*cut.drift[0], *revised.carried, speed, *cut.left[0])
+            high = (*cut.drift[1], *revised.carried, speed, *cut.left[1])
         if self._rows and self._rows < self._stride:
             self._times[-1] = revised.end
             self._low[-1] = tuple(map(_least, self._low[-1], low))

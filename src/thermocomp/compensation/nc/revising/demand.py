@@ -1,9 +1,10 @@
 """When the correction in a program is renewed, and what it leaves of the drift."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from operator import add
+from typing import NamedTuple, Protocol
 
 from thermocomp.compensation.nc.following.block import Point
 from thermocomp.compensation.nc.revising.frame import Vector
@@ -105,6 +106,13 @@ def opposed(deviation: Vector) -> Vector:
     return x, y, z
 
 
+class Cut(NamedTuple):
+    """What was met in a block in which the tool cuts, at its ends and inside: lowest and highest of each axis [um]."""
+
+    drift: tuple[Vector, Vector]
+    left: tuple[Vector, Vector]  #: what the correction leaves of it
+
+
 @dataclass
 class Left:
     """What a correction leaves of the drift that it was computed from, in the cuts.
@@ -123,19 +131,35 @@ class Left:
     line: list[int] = field(default_factory=lambda: [0] * 3)
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
-    def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> None:
+    def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> Cut:
         """Take a cut in.
 
         Parameters
         ----------
         line : int
         samples : iterable of (tuple of float, tuple of float)
-            Deviation and correction carried [um], here and there on the way.
+            Deviation and correction carried [um], at both ends and here and there on the way.
+
+        Returns
+        -------
+        Cut
+            All that is told of this cut comes from here.
         """
-        most, without = self.most, self.without
+        drifts, lefts = [], []
         for deviation, carried in samples:
-            for i, (drift, correction) in enumerate(zip(deviation, carried, strict=True)):
-                left = abs(drift + correction)
-                if left > most[i]:
-                    most[i], self.line[i] = left, line
-                without[i] = max(without[i], abs(drift))
+            drifts.append(deviation)
+            lefts.append(tuple(map(add, deviation, carried)))
+        cut = Cut(_range(drifts), _range(lefts))
+        most, without = self.most, self.without
+        for i in range(3):
+            left = max(-cut.left[0][i], cut.left[1][i])
+            if left > most[i]:
+                most[i], self.line[i] = left, line
+            without[i] = max(without[i], -cut.drift[0][i], cut.drift[1][i])
+        return cut
+
+
+def _range(vectors: Sequence[tuple[float, ...]]) -> tuple[Vector, Vector]:
+    a, b, c = map(min, *vectors)
+    x, y, z = map(max, *vectors)
+    return (a, b, c), (x, y, z)

@@ -4,12 +4,15 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.following.block import Block, Modal
+from thermocomp.compensation.nc.following.block import Block, Known, Modal
+from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
 from thermocomp.compensation.nc.revising.text import LONGEST, Digits, parted
 from thermocomp.core.exceptions import ProgramError
 
 AXES = "XYZ"
+#: shorter ways are none: F counts degrees then, if rotary axes turn [mm]
+STILL = 1e-7
 
 
 class Change(NamedTuple):
@@ -19,6 +22,7 @@ class Change(NamedTuple):
     before: Vector  #: correction that the axes carried when it began [um, machine axes]
     after: Vector  #: correction that they carry at its end
     inner: Vector  #: and on the way, in a cycle that ends where it began
+    other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
 
 
 @dataclass
@@ -41,8 +45,13 @@ class Method(ABC):
     carried: Vector = field(default=(0.0, 0.0, 0.0), init=False)
     #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
     fixed: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
-    #: axes of which nobody knows what they carry: an optional line or a tool change may have moved them
+    #: axes of which nobody knows what they carry: an optional line, a tool change, a stop or a cycle whose end is not
+    #: certain may have moved them
     doubtful: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
+    #: what doubtful axes may carry instead [um]
+    other: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0], init=False)
+    #: axes whose place was known before the block
+    before: Known = field(default=(False, False, False), init=False)
     #: what the axes carry within a cycle [um]
     inner: Vector | None = field(default=None, init=False)
     _modal: Modal | None = field(default=None, init=False)
@@ -67,10 +76,19 @@ class Method(ABC):
             The block cannot be shifted safely.
         """
         before, self.inner = self.carried, None
+        refuse_probing(block)
+        if block.tool_change is not None or block.stops:  # the changer, or the operator, may have moved any axis
+            for i in range(3):
+                self.doubt(i, self.carried[i])
         texts = self._revise(block, demand)
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
             texts = (*texts[:-1], *parted(texts[-1]))
-        return Change(texts, before, self.carried, self.inner or self.carried)
+        self.before = block.known
+        other = None
+        if any(self.doubtful):
+            x, y, z = (o if d else c for o, d, c in zip(self.other, self.doubtful, self.carried, strict=True))
+            other = None if (x, y, z) == self.carried else (x, y, z)
+        return Change(texts, before, self.carried, self.inner or self.carried, other)
 
     @property
     def leaves_mark(self) -> bool:
@@ -88,6 +106,32 @@ class Method(ABC):
 
     @abstractmethod
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...
+
+    def doubt(self, axis: int, other: float) -> None:
+        """Take in that an axis may carry something else [um]; one that stands in machine coordinates does not."""
+        if not self.fixed[axis]:
+            if not self.doubtful[axis]:
+                self.other[axis] = other
+            self.doubtful[axis] = True
+
+    def stands(self, block: Block) -> bool:
+        """Return whether a block moves no linear axis: it must not do so afterwards either.
+
+        Raises
+        ------
+        ProgramError
+            It turns rotary axes in feed, and nobody knows whether it moves linear axes too, which decides what F means.
+        """
+        if block.kind != "line":
+            return False
+        unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
+        if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
+            raise ProgramError(
+                block.line.number,
+                f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
+                f"counts degrees: position {' '.join(unknown)} by a rapid before",
+            )
+        return not unknown and all(abs(b - a) <= STILL for a, b in zip(block.start, block.end, strict=True))
 
     def frame(self, block: Block) -> Frame:
         """Return how corrections stand in the words of a block."""

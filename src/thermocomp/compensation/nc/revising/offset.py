@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, Method, refuse_probing
+from thermocomp.compensation.nc.revising.method import AXES, Method
 from thermocomp.compensation.nc.revising.text import number
 from thermocomp.core.exceptions import ProgramError
 
@@ -48,7 +48,6 @@ class Offset(Method):
         return self._begun and any(self._shift)
 
     def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
-        refuse_probing(block)
         self._refuse_rivals(block)
         frame = self.frame(block)
         before: tuple[str, ...] = ()
@@ -80,6 +79,7 @@ class Offset(Method):
             and not modal.turned
             and not block.line.optional
             and bool(self.named(block))
+            and not self.stands(block)
         )
 
     def _look_up(self, block: Block) -> None:
@@ -121,13 +121,15 @@ class Offset(Method):
             self._refuse_mixed(block, self.named(block), "names a place")
         if kind in ("none", "set") or not block.modal.absolute or not block.moves:
             return
+        if self.stands(block):
+            self._refuse_mixed(block, self.named(block), "does not move X, Y and Z")
         after = list(self.carried)
         for i in self.named(block):
             if block.line.optional and self.carried[i] != self._shift[i]:
                 raise ProgramError(
                     block.line.number, "an optional line behind an update of the offset: decide with --block-delete"
                 )
-            after[i], self.fixed[i] = self._shift[i], False
+            after[i], self.fixed[i], self.doubtful[i] = self._shift[i], False, False
         if kind in ("arc", "curve", "cycle"):
             plane = PLANES[block.modal.plane]
             self._refuse_mixed(block, [i for i in plane[:2] if kind != "cycle"], "an arc")

@@ -8,7 +8,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from operator import sub
+from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Point, Setup
@@ -16,9 +16,10 @@ from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.reading.recognise import recognise
 from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising import header
+from thermocomp.compensation.nc.revising import header, known
 from thermocomp.compensation.nc.revising.check import Check
-from thermocomp.compensation.nc.revising.demand import Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.demand import Cut, Demand, Drifting, Left
+from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Method
 from thermocomp.compensation.nc.revising.offset import ending
@@ -46,6 +47,8 @@ class Revised(NamedTuple):
     deviation: Vector  #: drift at its end, at its place [um, machine axes]
     carried: Vector  #: correction that the axes carry at its end [um, machine axes]
     inner: Vector  #: and on the way, in a cycle that ends where it began
+    cut: Cut | None = None  #: what was met in it, if the tool cuts
+    other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
 
 
 @dataclass
@@ -60,11 +63,17 @@ class Revision:
         At its start state.
     method : Method
     demand : Demand
+    header_lines : int
+        Lines of the header.
 
     Attributes
     ----------
     left : Left
         What the correction leaves of the drift in the cuts.
+    elsewhere : Elsewhere
+        What another work offset would cost, where the drift depends on the place.
+    corrected : bool
+        A correction was in force at some time.
     lines, changed : int
         Lines read, and how many of them are not as they were.
     seconds : float
@@ -74,7 +83,7 @@ class Revision:
     slowest, fastest : float
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
-        What kept a correction from following the drift in a cut, by how much at most [um], and in which line.
+        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
     idle : int
         Lines behind the end of the program that have words: nothing is corrected there.
     """
@@ -84,7 +93,10 @@ class Revision:
     drift: Drifting
     method: Method
     demand: Demand
+    header_lines: int = header.LINES
     left: Left = field(default_factory=Left, init=False)
+    elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
+    corrected: bool = field(default=False, init=False)
     lines: int = field(default=0, init=False)
     changed: int = field(default=0, init=False)
     seconds: float = field(default=0.0, init=False)
@@ -94,6 +106,7 @@ class Revision:
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
+    _why: str = field(default="", init=False)  # what has held the correction in the cut before
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
@@ -120,7 +133,7 @@ class Revision:
         recognise(first)
         lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
         check = Check(self.setup)
-        steered, known = _Spindle(self.setup), _Places(self.setup)
+        steered = known.Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
         headed = ended = False
@@ -130,8 +143,7 @@ class Revision:
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
                 headed = True
-            if self.drift.by_position:
-                known.check(block)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
             samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
             self.seconds = end
@@ -145,15 +157,33 @@ class Revision:
             change = self.method.revise(block, demand)
             check.check(block, change)
             carried = change.after
+            known.refuse_untold_rotation(block, carried)
+            cut = None
             if cutting:
                 samples.append((1.0, deviation))
                 ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
-                self.left.take(line.number, _beside(samples, *ends))
-                self._note_held(block, demand, ends[1])
+                cut = self.left.take(line.number, _beside(samples, *ends))
+                self._note_held(block, demand, samples[0][1], ends, cut)
+                if self.drift.by_position:
+                    self.elsewhere.take(end, point, self.drift)
+            else:
+                self._why = ""
             self.idle += ended and bool(line.words)
             ended |= block.ends
             yield self._told(
-                Revised(line.number, line.text, change.texts, block, start, end, deviation, carried, change.inner)
+                Revised(
+                    line.number,
+                    line.text,
+                    change.texts,
+                    block,
+                    start,
+                    end,
+                    deviation,
+                    carried,
+                    change.inner,
+                    cut,
+                    change.other,
+                )
             )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
@@ -167,11 +197,14 @@ class Revision:
             yield line
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
-        return Revised(0, "", header.blank(ending(text)), None, 0.0, 0.0, deviation, carried, carried)
+        return Revised(
+            0, "", header.blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+        )
 
     def _told(self, revised: Revised) -> Revised:
         self.lines += 1
         self.changed += revised.texts != (revised.text,)
+        self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
         return revised
 
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
@@ -214,13 +247,23 @@ class Revision:
                 samples.append((k / pieces, self.drift.deviation(place)))
         return samples
 
-    def _note_held(self, block: Block, demand: Vector, carried: Vector) -> None:
-        gap = max(map(abs, map(sub, demand, carried)))
-        if gap <= self.demand.tolerance:
+    def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
+        """Note what keeps the correction from following in a cut that began at a drift."""
+        tolerance = self.demand.tolerance
+        gap = max(*map(abs, cut.left[0]), *map(abs, cut.left[1]))
+        if gap <= tolerance:
+            self._why = ""
             return
-        why = self.method.held_by(block)
-        if gap > self.held.get(why, (0.0, 0))[0]:
-            self.held[why] = gap, block.line.number
+        if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
+            self._why = self.method.held_by(block)
+        elif self.demand.every is not None:
+            self._why = "the time between renewals"
+        elif gap > max(map(abs, map(add, drift, ends[0]))):
+            self._why = "the length of the line, along which the drift is uneven"
+        else:
+            self._why = self._why or "the moves before the cut, which could not take it up"
+        if gap > self.held.get(self._why, (0.0, 0))[0]:
+            self.held[self._why] = gap, block.line.number
 
     def _refuse_open(self) -> None:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
@@ -228,70 +271,6 @@ class Revision:
             raise ProgramError(
                 self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
             )
-
-
-@dataclass
-class _Spindle:
-    """Spindle speed, also of a program that finds the spindle running."""
-
-    setup: Setup
-    _told: bool = False
-
-    def speed(self, block: Block) -> float:
-        """Return the speed in a block [1/min].
-
-        Raises
-        ------
-        ProgramError
-            The program cuts, and nobody knows how fast the spindle turns.
-        """
-        if not self._told:
-            self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
-            if not self._told and self.setup.speed:
-                return self.setup.speed
-            if not self._told and any(not m.rapid for m in block.moves):
-                raise ProgramError(
-                    block.line.number,
-                    "the program cuts, but has not said how fast the spindle turns (S, M3): its drift is unknown; "
-                    "state the speed it finds with --speed",
-                )
-        return block.speed
-
-
-@dataclass
-class _Places:
-    """Whether it is known where the tool is, for a drift that depends on it."""
-
-    setup: Setup
-    _said: set[int] = field(default_factory=set)
-    _tool: int = 0
-
-    def check(self, block: Block) -> None:
-        """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
-        if block.tool_change is not None:
-            self._tool = block.tool_change
-        if "G10" in block.codes and block.values.get("L") == 2:
-            self._said.add(int(block.values.get("P", 0)) or block.modal.system)
-        if "G43" in block.codes:
-            tool = int(block.values.get("H", self._tool))
-            if tool and tool not in self.setup.tools:
-                raise ProgramError(
-                    block.line.number,
-                    f"the drift depends on the place, and the length of tool {tool} is unknown: --tool '{tool}=120 mm'",
-                )
-        system = block.modal.system
-        if any(not m.rapid for m in block.moves) and system not in self.setup.offsets and system not in self._said:
-            raise ProgramError(
-                block.line.number,
-                f"the drift depends on the place, and where {_name(system)} begins is unknown: "
-                f"--origin '{_name(system)}=0 mm, 0 mm, 0 mm'",
-            )
-
-
-def _name(system: int) -> str:
-    if system > 100:
-        return f"G54.1 P{system - 100}"
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
 
 
 def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
