@@ -120,9 +120,10 @@ def revise(
     every: float | None = None,
     setup: Setup = STATED,
     step: float = 1.0,
+    split: bool = True,
 ) -> Trial:
     """Revise a program; `ProgramError` if it is refused."""
-    run = Revision(setup, Kinematics(), drift, method(way, step), Demand(1.0, every))
+    run = Revision(setup, Kinematics(), drift, method(way, step), Demand(1.0, every), split=split)
     ledger, rows = Ledger(), []
     with original.open(encoding="latin-1", newline="") as file:
         for row in run.revise(file):

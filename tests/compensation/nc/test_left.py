@@ -38,11 +38,17 @@ class Bent(Growing):
 
 
 def tried(
-    folder: Path, text: str, drift: Growing, way: str = "coordinates", setup: Setup = STATED, every: float | None = None
+    folder: Path,
+    text: str,
+    drift: Growing,
+    way: str = "coordinates",
+    setup: Setup = STATED,
+    every: float | None = None,
+    split: bool = False,
 ) -> Trial:
     path = folder / "program.ngc"
     path.write_text(f"{BEGIN}{text}M2\n")
-    return revise(path, folder, drift, way, every=every, setup=setup)
+    return revise(path, folder, drift, way, every=every, setup=setup, split=split)
 
 
 def test_the_bow_of_a_long_cut_is_in_what_is_left(tmp_path: Path) -> None:

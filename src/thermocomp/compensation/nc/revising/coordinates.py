@@ -79,6 +79,11 @@ class Coordinates(Method):
         self.contact.end(block, [a != b for a, b in zip(self.carried, before, strict=True)])
         return (text,)
 
+    @property
+    def splits(self) -> bool:
+        """Whether a cut that is split can follow the drift more nearly: where the places inside it can be written."""
+        return self.digits.mm >= 4
+
     def held_by(self, block: Block) -> str:
         """Return what keeps the correction from following the drift in a block."""
         if block.modal.cutter:

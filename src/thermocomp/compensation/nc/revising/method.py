@@ -91,6 +91,11 @@ class Method(ABC):
         return Change(texts, before, self.carried, self.inner or self.carried, other)
 
     @property
+    def splits(self) -> bool:
+        """Whether a cut that is split can follow the drift more nearly."""
+        return False
+
+    @property
     def leaves_mark(self) -> bool:
         """Whether something may stay in the controller if the program is aborted."""
         return False

@@ -21,8 +21,9 @@ from thermocomp.compensation.nc.revising.check import Check
 from thermocomp.compensation.nc.revising.demand import Cut, Demand, Drifting, Left
 from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
 from thermocomp.compensation.nc.revising.frame import Vector
-from thermocomp.compensation.nc.revising.method import Method
+from thermocomp.compensation.nc.revising.method import Change, Method
 from thermocomp.compensation.nc.revising.offset import ending
+from thermocomp.compensation.nc.revising.split import Sample, axes_to_split, bow, may_split, pieces, shares
 from thermocomp.compensation.nc.revising.way import at, length
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
 from thermocomp.core.exceptions import InputError, ProgramError
@@ -49,6 +50,7 @@ class Revised(NamedTuple):
     inner: Vector  #: and on the way, in a cycle that ends where it began
     cut: Cut | None = None  #: what was met in it, if the tool cuts
     other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
+    bow: float = 0.0  #: by how much corrections inside it go beyond those at its ends, where it is split [um]
 
 
 @dataclass
@@ -65,6 +67,8 @@ class Revision:
     demand : Demand
     header_lines : int
         Lines of the header.
+    split : bool
+        A long cut is split where one change of the correction would leave more than the method's step in its middle.
 
     Attributes
     ----------
@@ -94,6 +98,7 @@ class Revision:
     method: Method
     demand: Demand
     header_lines: int = header.LINES
+    split: bool = True
     left: Left = field(default_factory=Left, init=False)
     elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
     corrected: bool = field(default=False, init=False)
@@ -149,21 +154,20 @@ class Revision:
             self.seconds = end
             if block.tool_change is not None:
                 self.tool_changes.append(start)
-            before = carried
             if block.moves:
                 point = block.moves[-1].end
             deviation = self.drift.deviation(point)
             demand = self._demanded(line.number, end, point)
-            change = self.method.revise(block, demand)
-            check.check(block, change)
+            samples.append(Sample(1.0, deviation, demand))
+            change, knots = self._changed(block, samples, check)
             carried = change.after
             known.refuse_untold_rotation(block, carried)
             cut = None
             if cutting:
-                samples.append((1.0, deviation))
-                ends = (change.inner, change.inner) if block.kind == "cycle" else (before, carried)
-                cut = self.left.take(line.number, _beside(samples, *ends))
-                self._note_held(block, demand, samples[0][1], ends, cut)
+                if block.kind == "cycle":
+                    knots = [(0.0, change.inner), (1.0, change.inner)]
+                cut = self.left.take(line.number, _beside(samples, knots))
+                self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
                 if self.drift.by_position:
                     self.elsewhere.take(end, point, self.drift)
             else:
@@ -183,6 +187,7 @@ class Revision:
                     change.inner,
                     cut,
                     change.other,
+                    bow([carried for _, carried in knots]),
                 )
             )
         if not headed:
@@ -207,6 +212,26 @@ class Revision:
         self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
         return revised
 
+    def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
+        """Return what becomes of a block, and what the axes carry where on its way."""
+        method = self.method
+        parts, known_before, begun = [1.0], method.before, method.carried
+        if len(samples) > 2 and samples[1].demand is not None:
+            axes = axes_to_split(block, known_before)
+            parts = shares(samples, begun, axes, method.step, length(block.moves[0]))
+        blocks = [block] if len(parts) == 1 else pieces(block, parts, known_before, self.setup.controller)
+        demands = {s.share: s.demand for s in samples}
+        changes = []
+        for piece, share in zip(blocks, parts, strict=True):
+            change = method.revise(piece, demands[share] or begun)
+            check.check(piece, change)
+            changes.append(change)
+        knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
+        if len(changes) == 1:
+            return changes[0], knots
+        texts = tuple(text for c in changes for text in c.texts)
+        return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other), knots
+
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
         try:
             return self.demand.at(end, self.drift, point)
@@ -222,10 +247,8 @@ class Revision:
             return any(not m.rapid for m in block.moves)
         return self._touching
 
-    def _advance(
-        self, block: Block, dt: float, speed: float, point: Point, cutting: bool
-    ) -> list[tuple[float, Vector]]:
-        """Let the time of a block pass; return share of the way and deviation where a cut is looked at."""
+    def _advance(self, block: Block, dt: float, speed: float, point: Point, cutting: bool) -> list[Sample]:
+        """Let the time of a block pass; return where a cut is looked at, but for its end."""
         if dt > 0 and speed:
             self.slowest = min(self.slowest, abs(speed))
             self.fastest = max(self.fastest, abs(speed))
@@ -234,17 +257,20 @@ class Revision:
                 self.drift.advance(dt, speed)
             return []
         move = block.moves[0] if len(block.moves) == 1 else None
-        pieces = math.ceil(dt / OFTEN)
+        count = math.ceil(dt / OFTEN)
         if move is not None and self.drift.by_position:
-            pieces = max(pieces, math.ceil(length(move) / DENSE))
-        pieces = min(max(pieces, 1), MOST_PIECES)
-        samples = [(0.0, self.drift.deviation(point))]
-        for k in range(1, pieces + 1):
+            count = max(count, math.ceil(length(move) / DENSE))
+        count = min(max(count, 1), MOST_PIECES)
+        samples = [Sample(0.0, self.drift.deviation(point), None)]
+        asked = count > 1 and self.split and self.method.splits and may_split(block, self.method.before)
+        for k in range(1, count + 1):
             if dt > 0:
-                self.drift.advance(dt / pieces, speed)
-            if k < pieces:
-                place = point if move is None else at(move, k / pieces)
-                samples.append((k / pieces, self.drift.deviation(place)))
+                self.drift.advance(dt / count, speed)
+            if k < count:
+                place = point if move is None else at(move, k / count)
+                time = self.seconds + dt * k / count
+                demand = self._demanded(block.line.number, time, place) if asked else None
+                samples.append(Sample(k / count, self.drift.deviation(place), demand))
         return samples
 
     def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
@@ -273,12 +299,16 @@ class Revision:
             )
 
 
-def _beside(samples: list[tuple[float, Vector]], before: Vector, after: Vector) -> Iterator[tuple[Vector, Vector]]:
-    """Yield deviation and the correction that is in force there: it changes evenly along a block."""
-    if before == after:
-        for _, deviation in samples:
-            yield deviation, after
-        return
-    for share, deviation in samples:
-        x, y, z = (b + share * (a - b) for b, a in zip(before, after, strict=True))
-        yield deviation, (x, y, z)
+def _beside(samples: list[Sample], knots: list[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
+    """Yield deviation and the correction that is in force there: it changes evenly from knot to knot."""
+    k = 1
+    for sample in samples:
+        while sample.share > knots[k][0]:
+            k += 1
+        (first, before), (last, after) = knots[k - 1 : k + 1]
+        if before == after:
+            yield sample.deviation, after
+            continue
+        part = (sample.share - first) / (last - first)
+        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
+        yield sample.deviation, (x, y, z)
