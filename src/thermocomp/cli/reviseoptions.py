@@ -207,7 +207,8 @@ class Way:
         At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
         after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
     expand : bool
-        Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
+        Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
+        in the same file by an unroller of our own.
     subroutines : list of Path
         With --expand: folders of subprograms; the program's own comes first anyway.
     unproved : bool

@@ -40,7 +40,8 @@ def places(text: str) -> list[Place]:
 def theirs(oracle: Oracle, text: str) -> list[Place]:
     ran = oracle.run(text)
     assert not ran.error, ran
-    found, at = [], (0.0, 0.0, 0.0)
+    found: list[Place] = []
+    at = (0.0, 0.0, 0.0)
     for _, kind, values in ran.out:
         x, y, z = values[:3] if kind in ("rapid", "feed", "arc") else at
         if kind == "arc" or math.dist(at, (x, y, z)) > 1e-9:

@@ -31,6 +31,8 @@ class Offset(Method):
     _up: bool = field(default=True, init=False)
     _begun: bool = field(default=False, init=False)
     _cycling: bool = field(default=False, init=False)
+    #: what the axes carried at the level where the cycles began
+    _level: Vector = field(default=(0.0, 0.0, 0.0), init=False)
     _shift: Vector = field(default=(0.0, 0.0, 0.0), init=False)
 
     def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
@@ -59,6 +61,8 @@ class Offset(Method):
                     block.line.number, "the program ends under cutter radius compensation; write G40 before"
                 )
             before = self._update(block, frame, (0.0, 0.0, 0.0))
+        if block.kind == "cycle" and not self._cycling:
+            self._level = self.carried
         self._carry(block, frame)
         self._look_up(block)
         return (*before, block.line.text)
@@ -148,7 +152,7 @@ class Offset(Method):
         if abs(block.end[drill] - plane) < 1e-6:
             self.fixed[drill] = False
             return self._shift[drill]
-        return self.carried[drill]
+        return self._level[drill]
 
     # -- refusals ----------------------------------------------------------------------------------------------------
 
