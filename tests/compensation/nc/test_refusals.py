@@ -203,6 +203,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G0 Z5.\nG98 G81 X1. Z-1. R6. F100", "R is 1 mm above the level"),
         ("G0 Z5.\nG91 G81 X1. Z-1. R2. F100", "R is 2 mm above the level"),
         ("G2 X1. Y0. R5. F100\nG81 X1. Z-3. R-2.\nG80 Z5.", "neither G0 nor G1"),
+        ("G92.1 X0", "G92.1 without X, Y and Z"),
         ("G0 G52 X1.", "both would use the axis words"),
         ("G18 G68 X0 Z0 R30.", "G68 in G18"),
         ("G68 X0 R30.", "G68 without Y"),
