@@ -11,7 +11,9 @@ from rich.console import Console
 def print_json(content: Any, console: Console) -> None:
     """Print what a program shall read."""
     # JSON has no nan and no infinity: what is not known is null
-    console.file.write(json.dumps(_nulled(content), indent=2, ensure_ascii=False) + "\n")
+    text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
+    # a name of a file that is no text: what stands for its bytes is written as JSON escapes it
+    console.file.write(text.encode("utf-8", "backslashreplace").decode("utf-8") + "\n")
 
 
 def _nulled(value: Any) -> Any:

@@ -1,5 +1,7 @@
-"""Bars that show how far long work is; they go to stderr and leave nothing behind."""
+"""How far long work is, told on stderr: a bar on a terminal, which leaves nothing behind; else a line now and then."""
 
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -14,6 +16,11 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
+
+from thermocomp.cli.shown import shown
+
+#: without a terminal a line is told so often; work that takes less time tells none [s]
+OFTEN = 10.0
 
 _console = Console(stderr=True)
 
@@ -32,28 +39,50 @@ class Share(Protocol):
 
 @contextmanager
 def by_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
-    """Show a bar of so many steps; without one if `hidden`."""
+    """Show how many of so many steps are done; nothing if `hidden`."""
     with _bar(MofNCompleteColumn(), hidden) as bar:
         task = bar.add_task("working", total=total)
+        line, done = _Lines(hidden), 0
 
         def tell(text: str, /, steps: int = 1) -> None:
+            nonlocal done
+            done += steps
             bar.update(task, description=text, advance=steps)
+            line.tell(text, f"{done} of {total}")
 
         yield tell
 
 
 @contextmanager
 def by_share(name: str, *, hidden: bool) -> Iterator[Share]:
-    """Show a bar with the percentage that is done; without one if `hidden`."""
+    """Show the percentage that is done; nothing if `hidden`."""
     with _bar(TaskProgressColumn(), hidden) as bar:
         task = bar.add_task(name, total=1.0)
+        line = _Lines(hidden)
 
         def tell(share: float, text: str = "", /) -> None:
-            bar.update(task, completed=share, description=f"{name}: {text}" if text else name)
+            said = f"{name}: {text}" if text else name
+            bar.update(task, completed=share, description=said)
+            line.tell(said, f"{min(share, 1.0):.0%}")
 
         yield tell
 
 
+class _Lines:
+    """Tells of long work on lines of their own, where there is no terminal to draw a bar on."""
+
+    def __init__(self, hidden: bool) -> None:
+        self._silent = hidden or _console.file.isatty()
+        self._begun = self._told = time.monotonic()
+
+    def tell(self, text: str, done: str) -> None:
+        """Tell what is worked on and how much is done, if it is time to."""
+        now = time.monotonic()
+        if not self._silent and now - self._told >= OFTEN:
+            self._told = now
+            print(f"{shown(text)}: {done} after {now - self._begun:.0f} s", file=sys.stderr, flush=True)
+
+
 def _bar(done: ProgressColumn, hidden: bool) -> Progress:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), done, TimeElapsedColumn())
-    return Progress(*columns, console=_console, transient=True, disable=hidden)
+    return Progress(*columns, console=_console, transient=True, disable=hidden or not _console.file.isatty())

@@ -31,6 +31,8 @@ from thermocomp.shopfloor import rs274
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
 #: program and differences while their header says nothing yet
 PROGRAM, DIFF = "program", "diff"
+#: of longer programs it is found out first whether they are refused: revising them takes a while [bytes]
+LONG = 2_000_000
 #: lines after which the bar moves
 TOLD = 500
 
@@ -143,6 +145,8 @@ def revise(job: Job, *, hidden: bool) -> Done:
         watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()
         try:
+            if source.stat().st_size > LONG:
+                _rehearse(job, source, hidden=hidden)
             with by_share("revising", hidden=hidden) as tell:
                 blank = _write(job, source, folder, drafts[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
@@ -176,6 +180,16 @@ def revise(job: Job, *, hidden: bool) -> Done:
         for path in reversed(paths.all()):  # the program comes last: where it is, all is
             drafts[path].replace(path)
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
+
+
+def _rehearse(job: Job, source: Path, *, hidden: bool) -> None:
+    size = source.stat().st_size
+    with by_share("checking", hidden=hidden) as tell, ncprogram.opened(source) as texts:
+        read = 0
+        for block in job.revision.rehearse(program_lines(texts)):
+            read += len(block.line.text)
+            if block.line.number % TOLD == 0:
+                tell(read / size, f"line {block.line.number}")
 
 
 def _write(

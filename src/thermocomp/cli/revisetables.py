@@ -16,6 +16,7 @@ from thermocomp.compensation.nc.drifting.inputs import SPEED
 from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.revising.course import Bound
 from thermocomp.compensation.nc.revising.offset import Offset
+from thermocomp.compensation.nc.revising.revise import TELLING
 
 #: lines from which on the time that one takes can be told
 MANY = 1000
@@ -44,7 +45,7 @@ def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
         )
     for warning in warnings(job, done):
         say("[yellow]but[/]", warning)
-    for note in notes:
+    for note in (*notes, *_place(job, done)):
         say("[yellow]note[/]", note)
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
@@ -93,9 +94,6 @@ def warnings(job: Job, done: Done) -> list[str]:
             found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append("the models know the spindle speed alone: a change of the room is in no bound")
-    if done.written and drift.by_position:
-        setup, axes = revision.setup, drift.axes
-        found.append(f"it is made for {reviseheader.made_for(setup)}: {reviseheader.cost(revision.elsewhere, axes)}")
     if done.written and done.proof is None:
         found.append(f"no interpreter has judged it (--unproved){_assumed(revision.setup)}")
     if done.written and job.paths.picture is None:
@@ -103,12 +101,21 @@ def warnings(job: Job, done: Done) -> list[str]:
     return found
 
 
+def _place(job: Job, done: Done) -> list[str]:
+    """Return for which origins a program was made, where the drift depends on the place."""
+    if not (done.written and job.drift.by_position):
+        return []
+    revision = job.revision
+    cost = reviseheader.cost(revision.elsewhere, job.drift.axes)
+    return [f"it is made for {reviseheader.made_for(revision.setup)}; {cost}"]
+
+
 def nothing(job: Job, done: Done) -> str:
     """Return why nothing was taken off a program, and what to do."""
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
     said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
     method, tolerance = revision.method, revision.demand.tolerance
-    if most <= tolerance:
+    if most <= TELLING * tolerance:
         return f"{said}, and it is taken off from {tolerance:g} um on; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
         why = ", ".join(revision.held) or "the time between renewals"
@@ -176,7 +183,7 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
         "proof": None if done.proof is None else _proof(done.proof),
         "other_offset_um": dict(zip("xyz", revision.elsewhere.most, strict=True)) if job.drift.by_position else None,
         "warnings": warnings(job, done),
-        "notes": list(notes),
+        "notes": [*notes, *_place(job, done)],
         "us_per_line": 1e6 * done.seconds / max(revision.lines, 1),
         "revising_s": done.seconds,
         "proving_s": done.proving,

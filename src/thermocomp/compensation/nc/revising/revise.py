@@ -4,6 +4,7 @@ Everything streams: lines are read, followed, timed, corrected and read again on
 whole (`Revision`) grows with it.
 """
 
+import copy
 import itertools
 import math
 from collections.abc import Iterable, Iterator
@@ -12,6 +13,7 @@ from operator import add, sub
 from typing import NamedTuple
 
 from thermocomp.compensation.nc.following.block import Block, Point, Setup
+from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.reading.line import Line
 from thermocomp.compensation.nc.reading.recognise import recognise
@@ -34,6 +36,9 @@ FIRST = 200
 OFTEN = 20.0
 DENSE = 20.0
 MOST_PIECES = 1000
+#: the drift goes on within a line: so much more than the tolerance may be left before anything is said to hold it
+TELLING = 1.1
+_PLAIN = frozenset(("G0", "G1"))
 
 
 class Revised(NamedTuple):
@@ -113,6 +118,44 @@ class Revision:
     _touching: bool = field(default=False, init=False)
     _why: str = field(default="", init=False)  # what has held the correction in the cut before
 
+    def rehearse(self, texts: Iterable[str]) -> Iterator[Block]:
+        """Go through a program and correct nothing: what will be refused whatever the drift is refused now, and soon.
+
+        Parameters
+        ----------
+        texts : iterable of str
+            Its lines, with their endings.
+
+        Yields
+        ------
+        Block
+            One for every line.
+
+        Raises
+        ------
+        ProgramError
+            A line cannot be read, followed or shifted safely.
+        """
+        method, steered = copy.deepcopy(self.method), known.Spindle(self.setup)
+        nothing: Vector = (0.0, 0.0, 0.0)
+        modal, seen = None, set[tuple[str, ...]]()
+        for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
+            steered.speed(block)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
+            # lines with the words and in the state of one before tell a method that corrects nothing nothing new
+            words = tuple(block.words)
+            plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional
+            if not plain or block.modal is not modal:
+                modal = block.modal
+                seen.clear()
+            elif words in seen:
+                yield block
+                continue
+            if plain and ROTARY.isdisjoint(words):  # of those the place counts too
+                seen.add(words)
+            method.revise(block, nothing)
+            yield block
+
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
         """Revise a program.
 
@@ -133,10 +176,7 @@ class Revision:
         InputError
             It is not an ISO program.
         """
-        rest = iter(texts)
-        first = list(itertools.islice(rest, FIRST))
-        recognise(first)
-        lines = self._guarded(read_lines(itertools.chain(first, rest), self.setup.controller))
+        lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
         check = Check(self.setup)
         steered = known.Spindle(self.setup)
         point: Point = (0.0, 0.0, 0.0)
@@ -276,8 +316,8 @@ class Revision:
     def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
         """Note what keeps the correction from following in a cut that began at a drift."""
         tolerance = self.demand.tolerance
-        gap = max(*map(abs, cut.left[0]), *map(abs, cut.left[1]))
-        if gap <= tolerance:
+        gap = max(*cut.left[1], -min(cut.left[0]))
+        if gap <= TELLING * tolerance:
             self._why = ""
             return
         if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
@@ -297,6 +337,14 @@ class Revision:
             raise ProgramError(
                 self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
             )
+
+
+def _recognised(texts: Iterable[str]) -> Iterator[str]:
+    """Pass lines on, if they are of a control that is known."""
+    rest = iter(texts)
+    first = list(itertools.islice(rest, FIRST))
+    recognise(first)
+    return itertools.chain(first, rest)
 
 
 def _beside(samples: list[Sample], knots: list[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
