@@ -190,7 +190,7 @@ class Translator:
 
     def _check(self, block: Block, codes: set[str]) -> None:
         known = {*_SAME, *_SAME_M, *_LEFT_OUT, *_MOTION, *(f"M{n}" for n in self._setup.harmless)}
-        known |= {*_ONCE, "G20", "G21", "G41", "G42", "G43", "G49", "G54.1", "G68", "G69"}
+        known |= {*_ONCE, "G20", "G21", "G41", "G42", "G43", "G49", "G54.1", "G68", "G69", "G154"}
         if strange := sorted(codes - known):
             raise _cannot(block, f"{strange[0]} has no counterpart in LinuxCNC")
         if block.kind == "probe":
@@ -216,7 +216,7 @@ class Translator:
         return [f"G43 H{self._length}"] if self._length else ["G49"]
 
     def _system(self, block: Block, codes: set[str]) -> list[str]:
-        if "G54.1" not in codes:
+        if not {"G54.1", "G154"} & codes:
             return []
         system = block.modal.system
         if system not in self.systems:
