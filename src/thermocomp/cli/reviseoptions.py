@@ -210,7 +210,8 @@ class Way:
         Split a long cut where one straight change of the correction would leave more than a step in its middle (method
         coordinates, linuxcnc).
     expand : bool
-        Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
+        Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
+        in the same file by an unroller of our own.
     subroutines : list of Path
         With --expand: folders of subprograms; the program's own comes first anyway.
     unproved : bool
