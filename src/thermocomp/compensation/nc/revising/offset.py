@@ -78,6 +78,7 @@ class Offset(Method):
                 or (block.kind == "cycle" and modal.retract_stated and not self._cycling and not self._near(block))
             )
             and modal.absolute
+            and bool(block.moves)
             and not modal.cutter
             and not modal.turned
             and not block.line.optional
@@ -100,7 +101,7 @@ class Offset(Method):
             high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
             level = block.end[2] == block.start[2]
             self._up = rapid and ((high and not block.line.optional) or (self._up and level))
-        if block.moves:
+        if block.moves or block.kind == "cycle":  # K0 stores its words, for the level where the tool is now
             self._cycling = block.kind == "cycle"
 
     # -- what --------------------------------------------------------------------------------------------------------
@@ -130,7 +131,7 @@ class Offset(Method):
             self._refuse_mixed(block, self.named(block), "names a place")
         if kind != "cycle" and (block.moves or block.modal.motion not in CYCLES):
             self._level = None
-        if kind in ("none", "set") or not block.modal.absolute:
+        if kind in ("none", "set") or not block.modal.absolute or not block.moves:
             return
         if self.stands(block):
             self._refuse_mixed(block, self.named(block), "does not move X, Y and Z")
