@@ -129,7 +129,7 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
     return found
 
 
-def sweep(seeds: range, processes: int = 1) -> Iterator[Outcome]:
+def sweep(seeds: Sequence[int], processes: int = 1) -> Iterator[Outcome]:
     """Yield what becomes of the programs of some seeds, in their order."""
     pieces = [seeds[k : k + PIECE] for k in range(0, len(seeds), PIECE)]
     if processes == 1:
@@ -141,7 +141,7 @@ def sweep(seeds: range, processes: int = 1) -> Iterator[Outcome]:
             yield from found
 
 
-def _piece(seeds: range) -> list[Outcome]:
+def _piece(seeds: Sequence[int]) -> list[Outcome]:
     with tempfile.TemporaryDirectory(prefix="sweep-") as folder:
         return [found for seed in seeds for found in tried(seed, Path(folder))]
 
