@@ -82,7 +82,7 @@ def revise(
     method = way.made(setup, drift.driven)
     models = _files(found, drifting.hashes())
     header_lines = reviseheader.lines(models, by_position=drift.by_position, unproved=way.unproved)
-    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines)
+    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, way.split)
     _check_interpreter(way, setup)
     if way.expand and controller.block_delete is None:
         _refuse_optional(program)

@@ -210,6 +210,9 @@ class Way:
         Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
     subroutines : list of Path
         With --expand: folders of subprograms; the program's own comes first anyway.
+    split : bool
+        With coordinates: long cuts are split where one change of the correction would leave more than a step in their
+        middle.
     unproved : bool
         Write the program though no interpreter has judged it; its header says so.
     """
@@ -222,6 +225,7 @@ class Way:
     safe_z: str | None = None
     expand: Flag = False
     subroutines: OptionalPaths = None
+    split: bool = True
     unproved: Flag = False
 
     def demand(self) -> Demand:
