@@ -8,6 +8,8 @@ of the program stay untouched.
 from dataclasses import dataclass, field
 
 from thermocomp.compensation.nc.following.block import PLANES, Block
+from thermocomp.compensation.nc.following.codes import CYCLES
+from thermocomp.compensation.nc.revising.contact import CLEAR
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
 from thermocomp.compensation.nc.revising.method import AXES, Method
 from thermocomp.compensation.nc.revising.text import number
@@ -32,6 +34,8 @@ class Offset(Method):
     _begun: bool = field(default=False, init=False)
     _cycling: bool = field(default=False, init=False)
     _shift: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+    #: what the level carries at which a series of cycles began [um]
+    _level: float | None = field(default=None, init=False)
 
     def held_by(self, block: Block) -> str:  # noqa: ARG002 - whatever it does
         """Return what keeps the correction from following the drift in a block."""
@@ -71,7 +75,7 @@ class Offset(Method):
             self._up
             and (
                 (block.kind == "line" and modal.motion == "G0")
-                or (block.kind == "cycle" and modal.retract_stated and not self._cycling)
+                or (block.kind == "cycle" and modal.retract_stated and not self._cycling and not self._near(block))
             )
             and modal.absolute
             and not modal.cutter
@@ -80,6 +84,12 @@ class Offset(Method):
             and bool(self.named(block))
             and not self.stands(block)
         )
+
+    def _near(self, block: Block) -> bool:
+        """Return whether a cycle begins at its R: which one is higher must not change."""
+        drill = PLANES[block.modal.plane][2]
+        plane = block.sticky["R"] / (self.frame(block).scale[drill] * 1e3)
+        return self.before[drill] and abs(block.start[drill] - plane) < CLEAR
 
     def _look_up(self, block: Block) -> None:
         """Notice whether the tool is up after a block."""
@@ -118,6 +128,8 @@ class Offset(Method):
             return
         if self.names_place(block):
             self._refuse_mixed(block, self.named(block), "names a place")
+        if kind != "cycle" and (block.moves or block.modal.motion not in CYCLES):
+            self._level = None
         if kind in ("none", "set") or not block.modal.absolute:
             return
         if self.stands(block):
@@ -135,19 +147,21 @@ class Offset(Method):
             if kind == "cycle":
                 drill = plane[2]
                 self.inner = self._shift
-                if not block.modal.retract_stated and self.carried[drill] != self._shift[drill]:
-                    raise ProgramError(
-                        block.line.number, "where the cycle ends is not said: write G98 or G99 at its beginning"
-                    )
                 after[drill] = self._drilled(block, frame, drill)
         self.carried = (after[0], after[1], after[2])
 
     def _drilled(self, block: Block, frame: Frame, drill: int) -> float:
+        if self._level is None:
+            self._level = self.carried[drill]
         plane = block.sticky["R"] / (frame.scale[drill] * 1e3)
-        if abs(block.end[drill] - plane) < 1e-6:
-            self.fixed[drill] = False
-            return self._shift[drill]
-        return self.carried[drill]
+        ends = self._shift[drill], self._level
+        at_r = abs(block.end[drill] - plane) < 1e-6
+        certain = block.known[drill]
+        if at_r or not certain:
+            self.fixed[drill] = self.doubtful[drill] = False
+        if not certain and ends[0] != ends[1]:
+            self.doubt(drill, ends[at_r])
+        return ends[not at_r]
 
     # -- refusals ----------------------------------------------------------------------------------------------------
 
