@@ -23,6 +23,7 @@ class Change(NamedTuple):
     after: Vector  #: correction that they carry at its end
     inner: Vector  #: and on the way, in a cycle that ends where it began
     other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
+    placed: bool = True  #: it is known where the axes stood that it names
 
 
 @dataclass
@@ -83,12 +84,13 @@ class Method(ABC):
         texts = self._revise(block, demand)
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
             texts = (*texts[:-1], *parted(texts[-1]))
+        placed = all(self.before) or all(self.before[i] for i in self.named(block))
         self.before = block.known
         other = None
         if any(self.doubtful):
             x, y, z = (o if d else c for o, d, c in zip(self.other, self.doubtful, self.carried, strict=True))
             other = None if (x, y, z) == self.carried else (x, y, z)
-        return Change(texts, before, self.carried, self.inner or self.carried, other)
+        return Change(texts, before, self.carried, self.inner or self.carried, other, placed)
 
     @property
     def splits(self) -> bool:

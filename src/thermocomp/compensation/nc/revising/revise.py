@@ -55,6 +55,7 @@ class Revised(NamedTuple):
     inner: Vector  #: and on the way, in a cycle that ends where it began
     cut: Cut | None = None  #: what was met in it, if the tool cuts
     other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
+    placed: bool = True  #: it is known where the axes stood that it names: if they do not move, they may not
     bow: float = 0.0  #: by how much corrections inside it go beyond those at its ends, where it is split [um]
 
 
@@ -227,6 +228,7 @@ class Revision:
                     change.inner,
                     cut,
                     change.other,
+                    change.placed,
                     bow([carried for _, carried in knots]),
                 )
             )
@@ -270,7 +272,7 @@ class Revision:
         if len(changes) == 1:
             return changes[0], knots
         texts = tuple(text for c in changes for text in c.texts)
-        return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other), knots
+        return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other, changes[0].placed), knots
 
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
         try:
