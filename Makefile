@@ -4,11 +4,12 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 BENCH ?= .venv-bench
 
-.PHONY: help demo test check bench docs clean
+.PHONY: help demo test test-long check bench docs clean
 
 help:
 	@echo "make demo    the main job on the virtual machine: record, fit, judge on unseen cycles, report"
 	@echo "make test    all tests (installs what they need)"
+	@echo "make test-long   the tests that take minutes: 2,000 random NC programs among them"
 	@echo "make check   format, lint, types, architecture"
 	@echo "make bench   speed and accuracy beside the peers"
 	@echo "make docs    the documentation, into docs/_build/html"
@@ -20,6 +21,10 @@ demo: $(VENV)/.study
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium linuxcnc-uspace
 	$(BIN)/python -m pytest --cov --cov-report=term
+
+test-long: $(VENV)/.dev
+	scripts/system_packages.sh linuxcnc-uspace
+	$(BIN)/python -m pytest -m long
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check

@@ -11,6 +11,7 @@ import linuxcnc  # type: ignore[import-not-found]
 
 END = time.monotonic() + float(sys.argv[1])
 SETTLED = "G21 G17 G90 G94 G64 G80 G40 G49 G54 G53 G0 X0 Y0 Z0"
+TURNED = " A0"
 
 
 def main() -> None:
@@ -39,7 +40,7 @@ def main() -> None:
     command.state(linuxcnc.STATE_ON)
     wait("on", lambda: status.task_state == linuxcnc.STATE_ON)
     command.home(-1)
-    wait("homing", lambda: all(status.homed[:3]))
+    wait("homing", lambda: all(status.homed[: status.joints]))
     command.teleop_enable(1)
     command.wait_complete()
     with open("samples.txt", "w", encoding="ascii") as out:  # noqa: PTH123
@@ -48,7 +49,7 @@ def main() -> None:
             for number, program in enumerate(sys.argv[2:], 1):
                 command.mode(linuxcnc.MODE_MDI)
                 command.wait_complete()
-                command.mdi(SETTLED)
+                command.mdi(SETTLED + (TURNED if status.joints > 3 else ""))
                 command.wait_complete()
                 wait("settling", idle)
                 command.mode(linuxcnc.MODE_AUTO)

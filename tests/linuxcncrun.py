@@ -16,6 +16,8 @@ import pytest
 #: speeds [mm/s] and accelerations [mm/s2] of X, Y and Z
 SPEEDS = (100.0, 80.0, 60.0)
 ACCELERATIONS = (1000.0, 800.0, 500.0)
+#: the same of A [deg/s, deg/s2]
+TURNING, TURNING_UP = 100.0, 1000.0
 #: of the servo thread [s]
 PERIOD = 0.001
 
@@ -41,38 +43,35 @@ TOOL_TABLE = test.tbl
 [HAL]
 HALFILE = test.hal
 [TRAJ]
-COORDINATES = X Y Z
+COORDINATES = {spaced}
 LINEAR_UNITS = mm
 ANGULAR_UNITS = degree
 MAX_LINEAR_VELOCITY = 500
 [KINS]
-KINEMATICS = trivkins coordinates=XYZ
-JOINTS = 3
+KINEMATICS = trivkins coordinates={axes}
+JOINTS = {count}
 """
 AXIS = """[AXIS_{name}]
-MIN_LIMIT = -500
-MAX_LIMIT = 500
+MIN_LIMIT = -{limit}
+MAX_LIMIT = {limit}
 MAX_VELOCITY = {speed}
 MAX_ACCELERATION = {acceleration}
 [JOINT_{number}]
-TYPE = LINEAR
+TYPE = {kind}
 HOME_SEQUENCE = 0
-MIN_LIMIT = -500
-MAX_LIMIT = 500
+MIN_LIMIT = -{limit}
+MAX_LIMIT = {limit}
 MAX_VELOCITY = {speed}
 MAX_ACCELERATION = {acceleration}
 FERROR = 5
 MIN_FERROR = 5
 """
-HAL = """loadrt trivkins coordinates=XYZ
-loadrt motmod servo_period_nsec=1000000 num_joints=3
+HAL = """loadrt trivkins coordinates={axes}
+loadrt motmod servo_period_nsec=1000000 num_joints={count}
 loadrt sampler depth=16000 cfg=ssb
 addf motion-command-handler servo-thread
 addf motion-controller servo-thread
 addf sampler.0 servo-thread
-net x joint.0.motor-pos-cmd => joint.0.motor-pos-fb
-net y joint.1.motor-pos-cmd => joint.1.motor-pos-fb
-net z joint.2.motor-pos-cmd => joint.2.motor-pos-fb
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net change iocontrol.0.tool-change => iocontrol.0.tool-changed
@@ -81,6 +80,7 @@ net program => sampler.0.pin.0
 net line motion.program-line => sampler.0.pin.1
 net still motion.in-position => sampler.0.pin.2
 """
+LOOP = "net drive-{number} joint.{number}.motor-pos-cmd => joint.{number}.motor-pos-fb\n"
 
 
 class Run(NamedTuple):
@@ -90,8 +90,8 @@ class Run(NamedTuple):
     began: dict[int, float]  #: by number of the line: when its motion began first [s]
 
 
-def run(programs: Mapping[str, str], seconds: float) -> dict[str, Run]:
-    """Run programs one after the other, each from X0 Y0 Z0.
+def run(programs: Mapping[str, str], seconds: float, rotary: bool = False) -> dict[str, Run]:
+    """Run programs one after the other, each from X0 Y0 Z0 and A0.
 
     Time is counted in periods of the servo thread, in which the planner computes. On a busy computer these come late,
     and a clock on the wall would tell more.
@@ -102,6 +102,8 @@ def run(programs: Mapping[str, str], seconds: float) -> dict[str, Run]:
         Texts by name; they begin and end with a move.
     seconds : float
         What they may take on the wall [s].
+    rotary : bool
+        The machine has an axis A.
 
     Returns
     -------
@@ -113,18 +115,30 @@ def run(programs: Mapping[str, str], seconds: float) -> dict[str, Run]:
     try:
         with (Path(tempfile.gettempdir()) / f"linuxcnc-test-{os.getuid()}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)  # there can be only one on a computer
-            return _run(programs, seconds, folder)
+            return _run(programs, seconds, folder, rotary)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _run(programs: Mapping[str, str], seconds: float, folder: Path) -> dict[str, Run]:
-    ini = INI + "".join(
-        AXIS.format(name=name, number=k, speed=SPEEDS[k], acceleration=ACCELERATIONS[k]) for k, name in enumerate("XYZ")
+def _run(programs: Mapping[str, str], seconds: float, folder: Path, rotary: bool) -> dict[str, Run]:
+    axes = "XYZA" if rotary else "XYZ"
+    named = {"axes": axes, "spaced": " ".join(axes), "count": len(axes)}
+    speeds, ups = (*SPEEDS, TURNING), (*ACCELERATIONS, TURNING_UP)
+    ini = INI.format(**named) + "".join(
+        AXIS.format(
+            name=name,
+            number=k,
+            speed=speeds[k],
+            acceleration=ups[k],
+            kind="ANGULAR" if name == "A" else "LINEAR",
+            limit=9999 if name == "A" else 500,
+        )
+        for k, name in enumerate(axes)
     )
+    hal = HAL.format(**named) + "".join(LOOP.format(number=k) for k in range(len(axes)))
     for name, text in (
         ("test.ini", ini),
-        ("test.hal", HAL),
+        ("test.hal", hal),
         ("test.var", ""),
         ("test.tbl", "T1 P1 D6 Z0\nT2 P2 D6 Z0\n"),
     ):

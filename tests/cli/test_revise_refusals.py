@@ -112,7 +112,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--rotation", "G54=12"], "--rotation 'G54=12': write an angle in degrees, such as"),
         (judged(lags("z_um")), ["--rotation", "none", "G54=1 deg"], "--rotation 'none': want a work coordinate system"),
         (judged(lags("z_um")), ["--rotation", "G60=1 deg"], "--rotation 'G60=1 deg': want a work coordinate system"),
-        (judged(lags("z_um")), ["--controller", "fanuc", "--expand"], "does not read Fanuc's programs"),
+        (judged(lags("z_um")), ["--controller", "fanuc", "--expand", "--diameter", "1=8 mm"], "are for LinuxCNC"),
         (judged(lags("z_um")), ["--machine", "gone.toml"], "gone.toml"),
     ],
 )

@@ -159,6 +159,24 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert all(len(w.partition(".")[2]) <= 3 for w in words)
 
 
+def test_a_fanuc_program_is_written_out(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program = (
+        "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z0. F30.\nM98 P100 L2\n/X0.\n"
+        "G90 G0 Z50.\nM30\nO100\nG91 Z-1.\nG90 X{}.\nM99\n%\n"
+    )
+    Path("part.nc").write_text(program.format(100), encoding="ascii")
+    assert revise("--controller", "fanuc", program="part.nc", out="out.nc") == 2
+    assert "line 8: M98 (subprogram call): subprograms are not followed; --expand writes it" in said(capsys)
+    assert revise("--controller", "fanuc", "--expand", program="part.nc", out="out.nc") == 0
+    plain = Path("out.nc.expanded").read_text("ascii").splitlines()
+    assert plain[6:13] == ["G1 Z0. F30.", "G91 Z-1.", "G90 X100.", "G91 Z-1.", "G90 X100.", "/X0.", "G90 G0 Z50."]
+    assert "M98" not in Path("out.nc").read_text("ascii")
+    assert Path("out.nc").read_text("ascii").count("\nG91 Z-1.") == 2
+    Path("part.nc").write_text(program.format("#500"), encoding="ascii")
+    assert revise("--controller", "fanuc", "--expand", "--overwrite", program="part.nc", out="out.nc") == 2
+    assert "line 14: the value of X: " in said(capsys)
+
+
 def test_a_model_without_memory_follows_the_speed(job_folder: Path) -> None:
     model = judged(static("z_um"))
     assert isinstance(model, Polynomial)

@@ -83,8 +83,8 @@ def revise(
     models = _files(found, drifting.hashes())
     header_lines = reviseheader.lines(models, by_position=drift.by_position, unproved=way.unproved)
     revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, way.split)
-    _check_interpreter(way, setup)
-    if way.expand and controller.block_delete is None:
+    _check_interpreter(way, setup, diameters=controller.diameter is not None)
+    if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
         _refuse_optional(program)
     paths = reviserun.Paths.of(output, expanded=way.expand)
     given = (timing.machine, starting.carried, drifting.forecast)
@@ -139,12 +139,13 @@ def _refuse_optional(program: Path) -> None:
                 )
 
 
-def _check_interpreter(way: Way, setup: Setup) -> None:
+def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
     """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
-    if way.expand:
-        if setup.controller != "linuxcnc":
-            raise InputError("--expand is LinuxCNC's interpreter, which does not read Fanuc's programs")
-        if (reason := rs274.installed()) is not None:
-            raise InputError(f"--expand: {reason}")
+    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.installed()) is not None:
+        raise InputError(f"--expand: {reason}")
+    if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
+        raise InputError(
+            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
+        )
     if not way.unproved and (reason := reviserun.unprovable(setup)):
         raise InputError(f"it cannot be proved: {reason}; {reviserun.ALL_THE_SAME}")

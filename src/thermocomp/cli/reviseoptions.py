@@ -206,13 +206,14 @@ class Way:
     safe_z : str
         At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
         after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
+    split : bool
+        Split a long cut where one straight change of the correction would leave more than a step in its middle (method
+        coordinates, linuxcnc).
     expand : bool
-        Let LinuxCNC's interpreter turn loops, parameters and subprograms into plain lines first.
+        Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
+        in the same file by an unroller of our own.
     subroutines : list of Path
         With --expand: folders of subprograms; the program's own comes first anyway.
-    split : bool
-        With coordinates: long cuts are split where one change of the correction would leave more than a step in their
-        middle.
     unproved : bool
         Write the program though no interpreter has judged it; its header says so.
     """
@@ -223,9 +224,9 @@ class Way:
     step: str = "1 um"
     largest: str = "400 um"
     safe_z: str | None = None
+    split: bool = True
     expand: Flag = False
     subroutines: OptionalPaths = None
-    split: bool = True
     unproved: Flag = False
 
     def demand(self) -> Demand:

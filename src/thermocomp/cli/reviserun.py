@@ -12,6 +12,7 @@ from thermocomp import __version__
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
 from thermocomp.cli import reviseheader
 from thermocomp.cli.progress import Share, by_share
+from thermocomp.cli.reviseexpand import written_out
 from thermocomp.cli.revisetravel import Travel
 from thermocomp.cli.shown import shown
 from thermocomp.compensation.nc.drifting.drift import Drift
@@ -25,7 +26,6 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import scratch
 from thermocomp.shopfloor import rs274
-from thermocomp.shopfloor.expand import expand
 
 #: what a program that cannot be proved is refused with
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
@@ -140,16 +140,7 @@ def revise(job: Job, *, hidden: bool) -> Done:
         source, lines = job.program, None
         if paths.expanded is not None:
             source = drafts[paths.expanded]
-            setup = job.revision.setup
-            lines = expand(
-                job.program,
-                source,
-                inch=setup.inch,
-                startup=setup.startup or None,
-                diameters=job.diameters,
-                block_delete=setup.skip_optional,
-                subroutines=job.subroutines,
-            ).sources
+            lines = written_out(job.program, source, job.revision.setup, job.diameters, job.subroutines)
         ledger, course = Ledger(), Course()
         watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()

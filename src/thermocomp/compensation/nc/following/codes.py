@@ -116,6 +116,7 @@ _LINUXCNC_G: Final = (
 _NO_SCALING = "scaling is not supported; write the coordinates out"
 _NO_MIRROR = "mirroring is not supported; write the coordinates out"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
+_NO_POCKET = "cycles of the control that mill or place holes are not followed; write the moves out in the CAM system"
 _WRITTEN = "--expand writes it into the program"
 _NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
 
@@ -151,7 +152,9 @@ _FANUC_G: Final = (
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
     Code("G103", "look ahead", "limits how far the control looks ahead"),
+    Code("G154", "system", "one of the additional work coordinate systems of a Haas"),
     Code("G187", "high speed", "smoothness"),
+    *(Code(f"G{n}", "motion", "pocket or bolt holes of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
 )
 
 _CALL = "subprograms are not followed; write the moves into the program"
@@ -234,7 +237,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
         "J": _ARCS,
         "K": _ARCS | CYCLES,
         "L": CYCLES | {"G10"},
-        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G103", "G187"},
+        "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G103", "G154", "G187"},
         "Q": frozenset({"G5.1", "G73", "G83", "G74", "G84"}),
         "R": CYCLES | _ARCS | {"G5.1", "G10", "G68"},
     },

@@ -62,6 +62,8 @@ class Cycle:
     level : float
         Where the tool was across the plane when the cycle began, which G98 goes back to.
     repeats : int
+    direct : bool
+        From R to the next hole it goes at R, also in G98 (Fanuc).
     """
 
     code: str
@@ -74,6 +76,7 @@ class Cycle:
     sticky: dict[str, float]
     level: float
     repeats: int = 1
+    direct: bool = False
 
     def steps(self) -> Iterator[Step]:
         """Yield the moves; their number does not change if the whole cycle is shifted a little.
@@ -98,7 +101,7 @@ class Cycle:
             level = now = r
         yield Step(True, self._at(a, b, now))
         back = r if self.to_r else level
-        height = now if now > r else back
+        height = now if now > r or self.direct else back
         da, db = self.named.get("XYZ"[first]), self.named.get("XYZ"[second])
         for _ in range(self.repeats):
             if self.absolute:

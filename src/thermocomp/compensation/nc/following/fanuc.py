@@ -59,6 +59,10 @@ def check_codes(state: State, orders: Orders, code: str) -> None:
                 f"{groups['distance']} while {modal.motion} is in force: whether R and Z of the cycle change their "
                 "meaning depends on the control; write G80 before"
             )
+    if groups.get("once") == "G92.1" and not orders.values.keys() >= {"X", "Y", "Z"}:
+        raise orders.error(
+            "G92.1 without X, Y and Z: what is taken back of the others depends on the control; name all"
+        )
     rotation = groups.get("rotation")
     if modal.turned and rotation != "G69":
         wrong = sorted((_NOT_TURNED & groups.keys()) | ({groups.get("once", "")} & _ONCE_NOT_TURNED))

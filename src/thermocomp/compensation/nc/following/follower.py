@@ -220,7 +220,7 @@ class Follower:
             if told is not None:
                 return told
         takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
-        if once == "G4" and self.state.fanuc:
+        if once in ("G4", "G92.1") and self.state.fanuc:
             takes = True
         if takes:
             self._beside(orders, told, "G68" if turns else once or "G43.1")

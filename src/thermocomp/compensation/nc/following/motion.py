@@ -251,6 +251,7 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         state.sticky,
         state.level / scale,
         repeats,
+        state.fanuc,
     )
     _turn_for_a_tap(state, orders, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))

@@ -14,10 +14,10 @@ _LENGTH_CERTAIN: Known = (True, True, True)
 def select_system(state: State, orders: Orders) -> None:
     """G54 to G59.3, and Fanuc's G54.1 P."""
     code = orders.groups["system"]
-    if code == "G54.1":
+    if code in ("G54.1", "G154"):
         number = orders.whole("P", least=1)
         if number is None:
-            raise orders.error("G54.1 needs P, the number of the coordinate system")
+            raise orders.error(f"{code} needs P, the number of the coordinate system")
         system = 100 + number
     else:
         system = _SYSTEMS[code]

@@ -26,6 +26,9 @@ _NAME = re.compile(r"<([^<>]*)>")
 _FUNCTION = re.compile(r"[a-z]+(?=\[)")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 
+#: numbers of a Fanuc nearer than this part of theirs may be the same to it
+_ROUNDED = 1e-8
+
 Key = int | str  # number or name of a parameter
 Binary = Callable[[float, float], float]
 
@@ -53,6 +56,26 @@ def _tangent(a: float) -> float:
     if abs(math.cos(_angle(a))) < 1e-9:
         raise ValueError(f"TAN of {a:g} degrees")
     return math.tan(_angle(a))
+
+
+def _sure(what: Binary) -> Binary:
+    """Return a comparison that refuses what two controls may see in two ways, as their numbers are rounded."""
+
+    def compared(a: float, b: float) -> float:
+        if a != b and abs(a - b) <= _ROUNDED * max(abs(a), abs(b)):
+            raise ValueError(f"{a:.12g} and {b:.12g} are the same but for rounding; compare with half a step between")
+        return float(what(a, b))
+
+    return compared
+
+
+def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
+    def cut(a: float) -> float:
+        if a != round(a) and abs(a - round(a)) <= _ROUNDED * max(abs(a), 1.0):
+            raise ValueError(f"FIX or FUP of {a:.12g}, which is whole but for rounding")
+        return what(a)
+
+    return cut
 
 
 def _bits(what: Callable[[int, int], int]) -> Binary:
@@ -83,9 +106,7 @@ _LINUXCNC: dict[str, tuple[int, Binary]] = {
     "**": (5, math.pow),
 }
 _FANUC: dict[str, tuple[int, Binary]] = {
-    **{name: (2, _LINUXCNC[name][1]) for name in ("gt", "ge", "lt", "le")},
-    "eq": (2, operator.eq),
-    "ne": (2, operator.ne),
+    **{name: (2, _sure(getattr(operator, name))) for name in ("gt", "ge", "lt", "le", "eq", "ne")},
     "+": (3, operator.add),
     "-": (3, operator.sub),
     "or": (3, _bits(operator.or_)),
@@ -113,8 +134,8 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 }
 # where Fanuc differs: FIX cuts off, FUP goes away from zero
 _FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "fix": math.trunc,
-    "fup": lambda a: math.copysign(math.ceil(abs(a)), a),
+    "fix": _sure_whole(math.trunc),
+    "fup": _sure_whole(lambda a: math.copysign(math.ceil(abs(a)), a)),
 }
 _REFUSED_BY_FANUC = {
     "round": "ROUND in a word rounds to the control's least increment, which the program does not tell",

@@ -57,6 +57,8 @@ class Offset(Method):
         before: tuple[str, ...] = ()
         if self._safe(block):
             before = self._update(block, frame, demand)
+        elif self._begun and self.stands(block):
+            before = self._stay(block, frame)
         elif block.ends and self._begun:
             if block.modal.cutter:
                 raise ProgramError(
@@ -78,6 +80,7 @@ class Offset(Method):
                 or (block.kind == "cycle" and modal.retract_stated and not self._cycling and not self._near(block))
             )
             and modal.absolute
+            and bool(block.moves)
             and not modal.cutter
             and not modal.turned
             and not block.line.optional
@@ -100,8 +103,16 @@ class Offset(Method):
             high = self.safe_z is not None and block.known[2] and block.end[2] >= self.safe_z - 1e-9
             level = block.end[2] == block.start[2]
             self._up = rapid and ((high and not block.line.optional) or (self._up and level))
-        if block.moves:
+        if block.moves or block.kind == "cycle":  # K0 stores its words, for the level where the tool is now
             self._cycling = block.kind == "cycle"
+
+    def _stay(self, block: Block, frame: Frame) -> tuple[str, ...]:
+        """Put back the offset of axes that a block names where they stand: it would move them."""
+        named = self.named(block) if block.modal.absolute else []
+        x, y, z = (self.carried[i] if i in named else self._shift[i] for i in range(3))
+        if (x, y, z) == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
+            return ()
+        return self._update(block, frame, (x, y, z))
 
     # -- what --------------------------------------------------------------------------------------------------------
 
@@ -130,7 +141,7 @@ class Offset(Method):
             self._refuse_mixed(block, self.named(block), "names a place")
         if kind != "cycle" and (block.moves or block.modal.motion not in CYCLES):
             self._level = None
-        if kind in ("none", "set") or not block.modal.absolute:
+        if kind in ("none", "set") or not block.modal.absolute or not block.moves:
             return
         if self.stands(block):
             self._refuse_mixed(block, self.named(block), "does not move X, Y and Z")

@@ -45,7 +45,8 @@ def may_split(block: Block, before: Known) -> bool:
         Axes whose place was known before it.
     """
     modal, words = block.modal, block.words
-    if len(block.moves) != 1 or block.kind not in ("line", "arc") or block.line.optional:
+    ends = block.line.text.endswith(("\r", "\n"))  # not the last line of a file
+    if len(block.moves) != 1 or block.kind not in ("line", "arc") or block.line.optional or not ends:
         return False
     move = block.moves[0]
     if move.rapid or modal.motion not in ("G1", "G2", "G3") or not _BESIDE.issuperset(block.codes):
@@ -123,7 +124,6 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
     place, start = block.start, move.start
     x, y, z = (b or letter in block.words for letter, b in zip(AXES, before, strict=True))
     words, drop = _words(block), "R" if move.arc else ""
-    own = block.line.text[len(block.line.text.rstrip("\r\n")) :]
     for k, share in enumerate(parts):
         last = k == len(parts) - 1
         end = move.end if last else at(move, share)
@@ -131,8 +131,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
         values = {AXES[i]: goal[i] / unit for i in words}
         if move.arc is not None:
             values |= _centre(move, place, shift, modal.arc_absolute, unit)
-        text = (_bare(values) if k else _written(block, values, drop)).rstrip("\r\n")
-        text += own if last else ending(own)
+        text = _bare(values) + ending(block.line.text) if k else _written(block, values, drop)
         line = read_line(text, block.line.number, controller)
         yield replace(
             block,

@@ -1,0 +1,53 @@
+"""``thermocomp revise --expand``: the program is written out in plain lines before it is revised."""
+
+from array import array
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.reading.tokens import program_lines
+from thermocomp.compensation.nc.unrolling.unroll import unroll
+from thermocomp.files import ncprogram
+from thermocomp.shopfloor.expand import expand
+
+
+def written_out(
+    program: Path, out: Path, setup: Setup, diameters: Mapping[int, float] | None, subroutines: Sequence[Path]
+) -> "array[int]":
+    """Write a program out: LinuxCNC's by its interpreter, a Fanuc's by an unroller of our own.
+
+    Parameters
+    ----------
+    program, out : Path
+    setup : Setup
+    diameters : dict of int to float, optional
+        Of the tools [mm], for LinuxCNC.
+    subroutines : sequence of Path
+        Folders of subprograms, for LinuxCNC.
+
+    Returns
+    -------
+    array of int
+        For each line of `out`, from the first: the line of the program it comes from; 0: of none.
+
+    Raises
+    ------
+    InputError
+        It cannot be written out.
+    """
+    if setup.controller == "linuxcnc":
+        return expand(
+            program,
+            out,
+            inch=setup.inch,
+            startup=setup.startup or None,
+            diameters=diameters,
+            block_delete=setup.skip_optional,
+            subroutines=subroutines,
+        ).sources
+    sources = array("I")
+    with ncprogram.opened(program) as texts, ncprogram.created(out) as file:
+        for text, line in unroll(program_lines(texts), setup):
+            file.write(text)
+            sources.append(line)
+    return sources
