@@ -57,6 +57,8 @@ class Offset(Method):
         before: tuple[str, ...] = ()
         if self._safe(block):
             before = self._update(block, frame, demand)
+        elif self._begun and self.stands(block):
+            before = self._stay(block, frame)
         elif block.ends and self._begun:
             if block.modal.cutter:
                 raise ProgramError(
@@ -103,6 +105,14 @@ class Offset(Method):
             self._up = rapid and ((high and not block.line.optional) or (self._up and level))
         if block.moves or block.kind == "cycle":  # K0 stores its words, for the level where the tool is now
             self._cycling = block.kind == "cycle"
+
+    def _stay(self, block: Block, frame: Frame) -> tuple[str, ...]:
+        """Put back the offset of axes that a block names where they stand: it would move them."""
+        named = self.named(block) if block.modal.absolute else []
+        x, y, z = (self.carried[i] if i in named else self._shift[i] for i in range(3))
+        if (x, y, z) == self._shift or block.modal.cutter or block.modal.turned or block.line.optional:
+            return ()
+        return self._update(block, frame, (x, y, z))
 
     # -- what --------------------------------------------------------------------------------------------------------
 
