@@ -11,13 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ProgramError
-from thermocomp.shopfloor import rs274
+from thermocomp.shopfloor import rs274, rs274process
 from thermocomp.shopfloor.rs274 import Canonical, Frame, Stored, read
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 
 Run = Callable[..., list[Canonical]]
 MOVES = ("rapid", "feed", "arc", "probe", "tap")
+#: a child that tells what it is told to
+TELLS = f"""
+import json, os, struct, sys
+sys.path.append({str(rs274process.CHILD.parent)!r})
+from _rs274_child import CODES, KINDS, RAPID, RECORD
+def tell(*rows):
+    print(json.dumps(KINDS), flush=True)
+    os.write(1, struct.pack("<II", len(rows), 2) + b"".join(rows) + b"[]")
+"""
 
 
 @pytest.fixture
@@ -187,8 +196,9 @@ def test_an_endless_loop_ends(run: Run) -> None:
 
 def test_a_crash_is_an_error(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     child = tmp_path / "crash.py"
-    child.write_text("import os\nprint('rapid 7 1 2 3', flush=True)\nos.kill(os.getpid(), 11)\n", encoding="ascii")
-    monkeypatch.setattr(rs274, "CHILD", child)
+    told = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10)"
+    child.write_text(f"{TELLS}tell({told})\nos.kill(os.getpid(), 11)\n", encoding="ascii")
+    monkeypatch.setattr(rs274process, "CHILD", child)
     with pytest.raises(ProgramError, match="line 7: the interpreter died of signal 11"):
         run("M2\n")
     child.write_text("raise RuntimeError('of a version that is not known')\n", encoding="ascii")
@@ -216,14 +226,15 @@ def test_the_child_dies_with_the_reader(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_why_it_cannot_be_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert rs274.installed() is None
-    monkeypatch.setattr(rs274, "PYTHON", tmp_path / "python3")
+    monkeypatch.setattr(rs274process, "PYTHON", tmp_path / "python3")
     assert "install the Debian package linuxcnc-uspace" in str(rs274.installed.__wrapped__())
     (tmp_path / "python3").symlink_to("/usr/bin/false")
     assert "cannot import gcode" in str(rs274.installed.__wrapped__())
-    monkeypatch.setattr(rs274, "PYTHON", Path("/usr/bin/python3"))
+    monkeypatch.setattr(rs274process, "PYTHON", Path("/usr/bin/python3"))
     child = tmp_path / "mute.py"
-    child.write_text("print('rapid 7 1 2 3')\nprint('done 0')\n", encoding="ascii")
-    monkeypatch.setattr(rs274, "CHILD", child)
+    rows = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10), RECORD.pack(CODES['done'], 0, 0, *(0.0,) * 10)"
+    child.write_text(f"{TELLS}tell({rows})\n", encoding="ascii")
+    monkeypatch.setattr(rs274process, "CHILD", child)
     assert "does not tell of end, m3, m5, speed" in str(rs274.installed.__wrapped__())
 
 
