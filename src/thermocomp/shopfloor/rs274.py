@@ -10,7 +10,9 @@ import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from thermocomp.core.exceptions import ProgramError, ThermocompError
 from thermocomp.shopfloor import rs274process
@@ -24,6 +26,7 @@ PACKAGE = "linuxcnc-uspace"
 PLANE_AXES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 Place = tuple[float, float, float, float, float, float, float, float, float]
+Places = np.ndarray[Any, np.dtype[np.float64]]
 ORIGIN: Place = (0.0,) * 9
 
 
@@ -108,6 +111,15 @@ class Frame:
         x, y, *more = (a + b for a, b in zip(p, self.shift, strict=True))
         turned = (x * self._cos - y * self._sin, x * self._sin + y * self._cos, *more)
         return _nine(a + b for a, b in zip(turned, self._fixed, strict=True))
+
+    def machines(self, places: Places) -> Places:
+        """Machine coordinates of program coordinates, a row each."""
+        turned = places + self.shift
+        if self.rotation:
+            x, y = turned[:, 0].copy(), turned[:, 1].copy()
+            turned[:, 0], turned[:, 1] = x * self._cos - y * self._sin, x * self._sin + y * self._cos
+        turned += self._fixed
+        return turned
 
     def program(self, p: Place) -> Place:
         """Program coordinates of machine coordinates."""
