@@ -233,7 +233,8 @@ def test_why_it_cannot_be_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     monkeypatch.setattr(rs274process, "PYTHON", Path("/usr/bin/python3"))
     child = tmp_path / "mute.py"
     rows = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10), RECORD.pack(CODES['done'], 0, 0, *(0.0,) * 10)"
-    child.write_text(f"{TELLS}tell({rows})\n", encoding="ascii")
+    end = "os.write(1, struct.pack('<II', 0, 3) + b'[0]')"
+    child.write_text(f"{TELLS}tell({rows})\n{end}\n", encoding="ascii")
     monkeypatch.setattr(rs274process, "CHILD", child)
     assert "does not tell of end, m3, m5, speed" in str(rs274.installed.__wrapped__())
 

@@ -9,7 +9,7 @@ from thermocomp.assessment.calls import MOVES, STILL, Calls, Side
 from thermocomp.assessment.ledger import Floats, Integers, Ledger, Shifts
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.shopfloor.rs274 import PLANE_AXES
-from thermocomp.shopfloor.rs274process import Job, Run
+from thermocomp.shopfloor.rs274process import Run
 
 #: largest difference that is rounding [um]
 ROUNDING = 0.1
@@ -38,12 +38,13 @@ class _Check(NamedTuple):
     say: Callable[[int], str]
 
 
-def compare(original: Job, revised: Job, ledger: Ledger, progress: Callable[[int], object]) -> Found:
-    """Run both programs, side by side, and compare them.
+def compare(first: Run, second: Run, ledger: Ledger, progress: Callable[[int], object]) -> Found:
+    """Run the next job of both programs, side by side, and compare what they do.
 
     Parameters
     ----------
-    original, revised : Job
+    first, second : Run
+        Of the original, and of the revised program.
     ledger : Ledger
         What the lines of the original should be shifted by.
     progress : callable
@@ -64,31 +65,30 @@ def compare(original: Job, revised: Job, ledger: Ledger, progress: Callable[[int
     def drop(lines: Integers) -> Mask:
         return ledger.of(lines).inverse
 
-    with Run(original) as first, Run(revised) as second:
-        sides = Side(first, lambda lines: lines, drop), Side(second, ledger.originals, drop)
-        was, now = _run(sides[0]), sides[1].chunks()
-        comparison = _Comparison(*sides, ledger)
-        a: Calls | None = None
-        b: _Joined | None = None
-        while True:
-            a = next(was, None) if a is None else a
-            try:
-                b = _joined(next(now, None), sides[1]) if b is None else b
-            except ProgramError as e:
-                for _ in was:  # a program that is refused itself says nothing of its revision
-                    pass
-                line = int(ledger.originals(np.array([e.line]))[0])
-                raise ProgramError(line, f"it does not run the revised program: {e.reason}") from e
-            if a is None or b is None:
-                break
-            count = min(len(a), len(b.calls))
-            comparison.compare(a.take(slice(0, count)), b.part(0, count))
-            progress(int(a.line[count - 1]))
-            a = a.take(slice(count, None)) if len(a) > count else None
-            b = b.part(count, len(b.calls)) if len(b.calls) > count else None
-        if (rest := a or (b and b.calls)) is not None:
-            side, whose = (sides[0], "original") if a is not None else (sides[1], "revised program")
-            raise ProgramError(int(rest.line[0]), f"it makes a '{side.name(rest.kind[0])}' in the {whose} only")
+    sides = Side(first, lambda lines: lines, drop), Side(second, ledger.originals, drop)
+    was, now = _run(sides[0]), sides[1].chunks()
+    comparison = _Comparison(*sides, ledger)
+    a: Calls | None = None
+    b: _Joined | None = None
+    while True:
+        a = next(was, None) if a is None else a
+        try:
+            b = _joined(next(now, None), sides[1]) if b is None else b
+        except ProgramError as e:
+            for _ in was:  # a program that is refused itself says nothing of its revision
+                pass
+            line = int(ledger.originals(np.array([e.line]))[0])
+            raise ProgramError(line, f"it does not run the revised program: {e.reason}") from e
+        if a is None or b is None:
+            break
+        count = min(len(a), len(b.calls))
+        comparison.compare(a.take(slice(0, count)), b.part(0, count))
+        progress(int(a.line[count - 1]))
+        a = a.take(slice(count, None)) if len(a) > count else None
+        b = b.part(count, len(b.calls)) if len(b.calls) > count else None
+    if (rest := a or (b and b.calls)) is not None:
+        side, whose = (sides[0], "original") if a is not None else (sides[1], "revised program")
+        raise ProgramError(int(rest.line[0]), f"it makes a '{side.name(rest.kind[0])}' in the {whose} only")
     return Found(comparison.moves, comparison.largest, comparison.slower * 100.0)
 
 

@@ -3,7 +3,7 @@
 It is run in eight stored controllers: what is stated is the same in all of them, what is not is drawn.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,16 +45,26 @@ class _Proving(NamedTuple):
     ledger: Ledger
     setup: Setup
 
-    def run(self, number: int, drawn: set[str], progress: Callable[[int], object] = lambda _: None) -> Found:
-        """Compare them in one state."""
-        state = states.state(self.setup, number, drawn)
-        pair = (state.job(Job(path)) for path in (self.original, self.revised))
-        return compare(*pair, self.ledger, progress)
+    def run(
+        self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
+    ) -> Iterator[Found]:
+        """Compare them in states, one after the other."""
+        jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
+        with (
+            Run(*[state.job(Job(self.original)) for state in jobs]) as first,
+            Run(*[state.job(Job(self.revised)) for state in jobs]) as second,
+        ):
+            for number, _ in wanted:
+
+                def told(line: int, number: int = number) -> None:
+                    progress((line + number * self.ledger.lines) // states.STATES)
+
+                yield compare(first, second, self.ledger, told)
 
     def fails(self, number: int, drawn: set[str]) -> bool:
         """Return whether they fail in a state as they have failed before."""
         try:
-            self.run(number, drawn)
+            list(self.run([(number, drawn)]))
         except (ProgramError, RefusedError):
             return True
         return False
@@ -111,25 +121,19 @@ def prove(
     proving = _Proving(original, revised, ledger, setup)
     drawn = set(states.free(setup))
     found: list[Found] = []
-    spared: dict[str, int] = {}
-    for number in range(states.STATES):
-
-        def told(line: int, number: int = number) -> None:
-            progress((line + number * ledger.lines) // states.STATES)
-
-        mine = set(drawn) if number else set()
+    wanted = [(number, set(drawn)) for number in range(states.STATES)]
+    while len(found) < len(wanted):
+        state = wanted[len(found)]
         try:
-            found.append(proving.run(number, mine, told))
+            for more in proving.run(wanted[len(found) :], progress):
+                found.append(more)
+                state = wanted[min(len(found), len(wanted) - 1)]
         except ProgramError as e:
-            raise _fault(proving, number, mine, e) from e
+            raise _fault(proving, *state, e) from e
         except RefusedError as e:
-            spare = _spared(proving, number, mine, e)
-            spared[spare] = spared.get(spare, 0) + 1
-            try:
-                found.append(proving.run(number, mine - {spare}, told))
-            except ProgramError as wrong:
-                raise _fault(proving, number, mine - {spare}, wrong) from wrong
-    words = [f"{name} (not in {spared[name]} of them, where it does not run)" if name in spared else name
+            state[1].remove(_spared(proving, *state, e))
+    spared = {name: sum(name not in mine for _, mine in wanted) for name in drawn}
+    words = [f"{name} (not in {spared[name]} of them, where it does not run)" if spared[name] else name
              for name in states.REMEDIES if name in drawn]
     return Proof(
         min(f.moves for f in found),

@@ -103,7 +103,8 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> State:
         changes["home28"] = (*(setup.home or other.home28[:3]), *other.home28[3:])
         changes["home30"] = other.home30
     if "parameters" in what:
-        changes["parameters"] = other.parameters
+        # not all five thousand: reading them would take as long as a short program
+        changes["parameters"] = {number: other.parameters[number] for number in range(31, 131)}
     if "start" in what and other.start is not None:
         x, y, z, *more = other.start
         changes |= {

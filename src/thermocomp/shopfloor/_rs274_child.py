@@ -1,10 +1,12 @@
 """Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
 
 A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
-thermocomp but the file `_rs274_hooks.py` beside it. `thermocomp.shopfloor.rs274process` starts it with one argument
-(JSON) and reads what it writes: a line with the names of the kinds (JSON), then blocks of two numbers (records, bytes
-of JSON), as many records, and a JSON list of what is no row of numbers: the first number of such a record is its place
-in the list. A move stands in program coordinates [inch, deg]; before an arc a record tells of its centre.
+thermocomp but the file `_rs274_hooks.py` beside it. `thermocomp.shopfloor.rs274process` starts it with the folders of
+jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with the names
+of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of what is no
+row of numbers: the first number of such a record is its place in the list. Behind each job stands a block without
+records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record tells of
+its centre.
 
 The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
 the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
@@ -19,6 +21,7 @@ import re
 import resource
 import struct
 import sys
+import traceback
 from collections.abc import Callable
 from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
@@ -105,10 +108,7 @@ class RefusedError(Exception):
 class Canon:
     """Receives the canonical calls of the interpreter."""
 
-    def __init__(self, job: dict[str, Any], out: BinaryIO) -> None:
-        self.parameter_file = job["parameters"]
-        self.delete = bool(job["block_delete"])
-        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
+    def __init__(self, out: BinaryIO) -> None:
         self.out = out
         self.records: list[bytes] = []
         self.more: list[Any] = []
@@ -119,7 +119,6 @@ class Canon:
         self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
         self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
         self.angle = 0.0
-        self.spindle: int = job["spindle"]
         self.plane = 1
         self.feed = 0.0  # [mm/min]
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
@@ -132,8 +131,15 @@ class Canon:
         self.name = self.linked._ZN6Interp9file_nameEPcm
         self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
         self.buffer = ctypes.create_string_buffer(512)
-        self.program = os.path.realpath(job["program"].encode())
         self.alone = True  # no other file has been opened
+
+    def begin(self, job: dict[str, Any]) -> None:
+        """Take what the program is run in."""
+        self.parameter_file = job["parameters"]
+        self.delete = bool(job["block_delete"])
+        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
+        self.spindle: int = job["spindle"]
+        self.program = os.path.realpath(job["program"].encode())
 
     def connect(self, module: str) -> None:
         """Turn the functions the module leaves empty to this object."""
@@ -429,40 +435,64 @@ class Canon:
         return self.delete
 
 
-def main() -> None:
-    """Run the job of the first argument."""
-    job = json.loads(sys.argv[1])
+def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
+    """Run a job."""
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: it does not outlive the process that reads its end
     resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
+    os.environ["HOME"] = job["home"]
+    os.environ["INI_FILE_NAME"] = job["ini"]
+    # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
+    tools = ctypes.CDLL("libtooldata.so.0")
+    tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
+    tools._Z13tooldata_initb(B(False))
+    tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
+    ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
+    canon.begin(job)
+    result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
+    failure = canon.hooks.failure
+    if isinstance(failure, RefusedError):
+        canon.line, reason = failure.args
+        canon.extra("error", reason)
+    elif failure is not None:
+        raise failure
+    elif result > gcode.MIN_ERROR:
+        canon.text("error", gcode.strerror(result))
+    else:
+        canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+        with open(job["opened"], "wb") as file:  # noqa: PTH123
+            file.write(b"\0".join(canon.files))
+        canon.record("done")
+    canon.flush()
+
+
+def main() -> None:
+    """Run the jobs of the folders that are named, each from the same fresh state of the interpreter's module."""
     with os.fdopen(os.dup(1), "wb", buffering=1 << 18) as out:
         os.dup2(2, 1)  # (PRINT, ...) of a program goes to standard output
-        os.environ["HOME"] = job["home"]
-        os.environ["INI_FILE_NAME"] = job["ini"]
+        os.environ["HOME"] = os.getcwd()  # noqa: PTH109
         import gcode  # type: ignore[import-not-found,unused-ignore]
 
-        # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
-        tools = ctypes.CDLL("libtooldata.so.0")
-        tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
-        tools._Z13tooldata_initb(B(False))
-        tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
-        out.write(json.dumps(KINDS).encode() + b"\n")
-        canon = Canon(job, out)
+        canon = Canon(out)
         canon.connect("gcode.cpython")
-        ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
-        result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
-        failure = canon.hooks.failure
-        if isinstance(failure, RefusedError):
-            canon.line, reason = failure.args
-            canon.extra("error", reason)
-        elif failure is not None:
-            raise failure
-        elif result > gcode.MIN_ERROR:
-            canon.text("error", gcode.strerror(result))
-        else:
-            canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
-            with open(job["opened"], "wb") as file:  # noqa: PTH123
-                file.write(b"\0".join(canon.files))
-            canon.record("done")
-        canon.flush()
+        out.write(json.dumps(KINDS).encode() + b"\n")
+        out.flush()
+        for folder in sys.argv[1:]:
+            child = os.fork()
+            if not child:
+                code = 1
+                try:
+                    with open(f"{folder}/job", encoding="utf-8") as file:  # noqa: PTH123
+                        job = json.load(file)
+                    run(job, canon, gcode)
+                    code = 0
+                except BaseException:  # noqa: BLE001
+                    traceback.print_exc()
+                finally:
+                    sys.stderr.flush()
+                    os._exit(code)
+            end = json.dumps([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])]).encode()
+            out.write(struct.pack("<II", 0, len(end)) + end)
+            out.flush()
 
 
 if __name__ == "__main__":

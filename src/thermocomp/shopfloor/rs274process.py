@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -72,7 +72,12 @@ class Job:
 
 
 class Run:
-    """One run of the interpreter; it starts with the object, and ends with the block.
+    """Runs of the interpreter, one after the other; it starts with the object, and ends with the block.
+
+    Parameters
+    ----------
+    *jobs : Job
+        All of the same program.
 
     Attributes
     ----------
@@ -80,19 +85,25 @@ class Run:
         Of the kinds of calls.
     """
 
-    def __init__(self, job: Job) -> None:
-        path = job.path.absolute()
+    def __init__(self, *jobs: Job) -> None:
+        path, subroutines = jobs[0].path.absolute(), jobs[0].subroutines
         if not path.is_file():
             raise InputError(f"{path} is not a file")
-        if len(job.subroutines) > MOST_FOLDERS:
-            raise InputError(f"{len(job.subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
-        self.job, self.path = job, path
+        if len(subroutines) > MOST_FOLDERS:
+            raise InputError(f"{len(subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
+        self.jobs, self.path, self._number = jobs, path, -1
         self._home = tempfile.TemporaryDirectory(prefix="rs274-")
         self.folder = Path(self._home.name)
-        given = _lay_out(self.folder, path, job)
+        copy = self.folder / "program.ngc"
+        with path.open("rb") as program, copy.open("wb") as written:
+            while part := program.read(_PIPE):
+                written.write(part.translate(_ASCII))
+        folders = [self.folder / str(number) for number in range(len(jobs))]
+        for folder, job in zip(folders, jobs, strict=True):
+            _lay_out(folder, copy, [path.parent, *subroutines], job)
         with (self.folder / "errors").open("wb") as errors:
             self.process = subprocess.Popen(
-                [PYTHON, ISOLATED, CHILD, json.dumps(given)],
+                [PYTHON, ISOLATED, CHILD, *folders],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=errors,
@@ -110,7 +121,7 @@ class Run:
         self._home.cleanup()
 
     def blocks(self) -> Iterator[Block]:
-        """Yield what the interpreter tells; the last record is ``done``.
+        """Yield what the interpreter tells of the next job; the last record is ``done``.
 
         Raises
         ------
@@ -121,40 +132,45 @@ class Run:
         """
         pipe = self.process.stdout
         assert pipe is not None
-        line, file, done = 0, "", -1
-        if first := pipe.readline():
+        self._number += 1
+        if not self.codes:
+            if not (first := pipe.readline()):
+                self._ended(0, self.process.wait())
             self.codes = {kind: code for code, kind in enumerate(json.loads(first))}
-            done = self.codes["done"]
-            moves = [self.codes[kind] for kind in ("rapid", "feed", "probe", "arc")]
+        moves = [self.codes[kind] for kind in ("rapid", "feed", "probe", "arc")]
+        line, file, refusal, done = 0, "", "", False
         while len(head := pipe.read(8)) == 8:
             count, size = np.frombuffer(head, "<u4").tolist()
             records = np.frombuffer(_all(pipe, count * RECORD.itemsize), RECORD).copy()
             block = Block(records, json.loads(_all(pipe, size)))
             if not count:
-                continue
+                if refusal:
+                    where = f" (in {Path(file).name})" if file else ""
+                    raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {refusal}")
+                if not done:
+                    self._ended(line, block.more[0])
+                return
             is_move = np.isin(records["kind"], moves)
             if is_move.any():
                 records["values"][is_move] *= _UNITS
-            line = int(records["line"][-1])
-            kind = int(records["kind"][-1])
             for told in records[records["kind"] == self.codes["file"]]:
                 file = block.more[int(told["values"][0])]
+            line, kind = int(records["line"][-1]), int(records["kind"][-1])
+            done = kind == self.codes["done"]
             if kind == self.codes["error"]:
-                yield Block(records[:-1], block.more)
-                where = f" (in {Path(file).name})" if file else ""
-                raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {block.more[-1]}")
-            yield block
-            if kind == done:
-                return
-        self._ended(line)
+                refusal = block.more[-1]
+                block = Block(records[:-1], block.more)
+            if len(block.records):
+                yield block
+        self._ended(line, self.process.wait())
 
-    def _ended(self, line: int) -> None:
+    def _ended(self, line: int, code: int) -> NoReturn:
         """Raise the error of a child that ended too early."""
-        code = self.process.wait()
         words = (self.folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()
         if code == -24:
+            seconds = self.jobs[self._number].seconds
             raise ProgramError(
-                max(line, 1), f"the program takes more than {self.job.seconds} s to interpret: has it an endless loop?"
+                max(line, 1), f"the program takes more than {seconds} s to interpret: has it an endless loop?"
             )
         said = words[-1] if words else "it said nothing"
         if code < 0:
@@ -162,16 +178,15 @@ class Run:
         raise InputError(f"LinuxCNC's interpreter ended with code {code}: {said}")
 
     def opened(self) -> set[Path]:
-        """Return the files it has opened: the program, and those of subprograms; when all blocks were read."""
-        self.process.wait()
-        names = map(os.fsdecode, (self.folder / "opened").read_bytes().split(b"\0"))
+        """Return the files the last job has opened: the program, and those of subprograms."""
+        names = map(os.fsdecode, (self.folder / str(self._number) / "opened").read_bytes().split(b"\0"))
         folder = self.folder.resolve()
         return {self.path.resolve(), *(file for file in map(Path, names) if not file.is_relative_to(folder))}
 
     def left(self) -> dict[int, float]:
-        """Return the parameters the controller would have stored afterwards; when all blocks were read."""
-        self.process.wait()
-        rows = (row.split() for row in (self.folder / "parameters").read_text(encoding="ascii").splitlines())
+        """Return the parameters the controller would have stored after the last job."""
+        text = (self.folder / str(self._number) / "parameters").read_text(encoding="ascii")
+        rows = (row.split() for row in text.splitlines())
         return {int(row[0]): float(row[1]) for row in rows if len(row) == 2}
 
 
@@ -182,17 +197,15 @@ def _all(pipe: IO[bytes], size: int) -> bytes:
     return found
 
 
-def _lay_out(folder: Path, path: Path, job: Job) -> dict[str, object]:
+def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: Job) -> None:
     """Write the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
     stored = job.stored
-    copy = folder / "program.ngc"
-    with path.open("rb") as program, copy.open("wb") as written:
-        while part := program.read(_PIPE):
-            written.write(part.translate(_ASCII))
-    names = [f"s{i}" for i in range(1 + len(job.subroutines))]
-    for name, target in zip(names, [path.parent, *job.subroutines], strict=True):
+    folder.mkdir()
+    names = [f"s{i}" for i in range(len(folders))]
+    for name, target in zip(names, folders, strict=True):
         (folder / name).symlink_to(target.absolute())
-    (folder / "ini").write_text(f"[RS274NGC]\nSUBROUTINE_PATH = {':'.join(names)}\n", encoding="ascii")
+    paths = ":".join(f"{folder.name}/{name}" for name in names)
+    (folder / "ini").write_text(f"[RS274NGC]\nSUBROUTINE_PATH = {paths}\n", encoding="ascii")
     numbers = sorted(stored.numbers().items())
     (folder / "parameters").write_text("".join(f"{n}\t{v:.9f}\n" for n, v in numbers), encoding="ascii")
     tools = [(n, stored.lengths.get(n, 0.0), stored.diameters.get(n, 0.0)) for n in range(1, HIGHEST_TOOL)]
@@ -201,8 +214,8 @@ def _lay_out(folder: Path, path: Path, job: Job) -> dict[str, object]:
     start = ""
     if stored.start is not None:
         start = " G53 G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(AXES, stored.start, strict=False))
-    return {
-        "program": str(copy),
+    given = {
+        "program": str(program),
         "home": str(folder),
         "ini": str(folder / "ini"),
         "parameters": str(folder / "parameters"),
@@ -217,3 +230,4 @@ def _lay_out(folder: Path, path: Path, job: Job) -> dict[str, object]:
         "task": int(job.task),
         "seconds": job.seconds,
     }
+    (folder / "job").write_text(json.dumps(given), encoding="utf-8")

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 HIGHEST_TOOL = 1000
 #: work coordinate systems, G54 to G59.3
@@ -63,6 +64,7 @@ class Stored:
         return result
 
 
+@lru_cache(64)
 def drawn(seed: int, startup: str = "") -> Stored:
     """Return a controller that has nothing else in common with that of another seed.
 
