@@ -15,7 +15,7 @@ from thermocomp.compensation.nc.revising.text import DIGITS
 from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.shopfloor import rs274
 
-#: what the programs do not say: that the controller starts in mm, the spindle turns, and nothing turns or shifts X and Y
+#: what the programs do not say: the controller starts in mm, the spindle turns, nothing turns or shifts X and Y
 STATED = Setup(inch=False, speed=3000.0, rotations=dict.fromkeys(range(1, 10), 0.0), no_shift=True)
 #: a drift that does not change [um]
 STEADY: Vector = (12.3, -7.7, 25.0)

@@ -156,7 +156,7 @@ class Side:
         """Put in what is told by points: a tap, a curve."""
         earlier = np.flatnonzero(self.is_kind(kind[:i], *MOVES))
         here = end[earlier[-1]] if len(earlier) else self._here
-        there = self._frame.program(tuple(here.tolist()))  # type: ignore[arg-type]
+        there = self._frame.program(tuple(here.tolist()))
         if kind[i] == self.run.codes["tap"]:
             points = [(*values[i, :3].tolist(), *there[3:])]
             values[i, 1], values[i, 2], values[i, 3] = values[i, 3], 0.0, 0.0  # scale of the speed

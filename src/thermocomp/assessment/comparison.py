@@ -160,7 +160,7 @@ class _Comparison:
             *self._times(was, now, moving),
         ]
         if pieces is not None:
-            checks += self._divided(was, now, pieces, shifts)
+            checks += self._divided(was, pieces, shifts)
         worst = [int(np.argmax(check.bad)) if check.bad.any() else len(was) for check in checks]
         if (first := min(worst)) < len(was):
             raise ProgramError(int(was.line[first]), "it " + checks[worst.index(first)].say(first))
@@ -171,7 +171,9 @@ class _Comparison:
         yield _Check(
             was.kind != now.kind, lambda i: f"makes a '{other(now.kind[i])}' in place of a '{name(was.kind[i])}'"
         )
-        yield _Check(was.line != now.line, lambda i: f"makes a '{name(was.kind[i])}' that belongs to line {now.line[i]}")
+        yield _Check(
+            was.line != now.line, lambda i: f"makes a '{name(was.kind[i])}' that belongs to line {now.line[i]}"
+        )
 
     def _numbers(self, was: Calls, now: Calls, moving: Mask) -> Iterator[_Check]:
         """Compare the numbers of calls that are no moves."""
@@ -208,12 +210,16 @@ class _Comparison:
         others = np.abs(now.end[:, 3:] - was.end[:, 3:]).max(axis=1) > STILL
         yield _Check(moving & others, lambda _: "moves another axis than X, Y and Z")
         stands, moves = (np.abs(c.end[:, :3] - c.start[:, :3]).max(axis=1) for c in (was, now))
-        still = (stands < STILL) & (was.plane == 0) & straight
         turning = np.abs(was.end[:, 3:6] - was.start[:, 3:6]).max(axis=1) > STILL
+        # a rapid to where the tool stands already may be the one that takes a new correction in
+        still = (stands < STILL) & (was.plane == 0) & straight
+        still &= turning | (was.kind != self.sides[0].run.codes["rapid"])
         yield _Check(
             still & (moves >= STILL),
-            lambda i: f"moves X, Y, Z by {moves[i] * 1e3:.2f} um where the original moves "
-            + ("a rotary axis only" if turning[i] else "nothing"),
+            lambda i: (
+                f"moves X, Y, Z by {moves[i] * 1e3:.2f} um where the original moves "
+                + ("a rotary axis only" if turning[i] else "nothing")
+            ),
         )
         bent = np.flatnonzero(self.sides[0].is_kind(was.kind, "tap", "curve") & (was.kind == now.kind)).tolist()
         bad = np.zeros(len(was), bool)
@@ -286,7 +292,7 @@ class _Comparison:
 
     # -- pieces ------------------------------------------------------------------------------------------------------
 
-    def _divided(self, was: Calls, now: Calls, pieces: _Pieces, shifts: Shifts) -> Iterator[_Check]:
+    def _divided(self, was: Calls, pieces: _Pieces, shifts: Shifts) -> Iterator[_Check]:
         """Compare the pieces of divided moves: they lie on the way of the original, shifted by what is between."""
         of, calls = pieces
         first, last = was.start[of], was.end[of]
@@ -306,13 +312,18 @@ class _Comparison:
                 out = first[mine][:, [i, j]] - about
                 angle = np.arctan2(out[:, 1], out[:, 0]) + np.sign(was.turns[of[mine]]) * calls.sweep[mine]
                 radius = np.hypot(*out.T)
-                place[mine, i], place[mine, j] = about[:, 0] + radius * np.cos(angle), about[:, 1] + radius * np.sin(angle)
+                place[mine, i], place[mine, j] = (
+                    about[:, 0] + radius * np.cos(angle),
+                    about[:, 1] + radius * np.sin(angle),
+                )
                 centre = (calls.centre[mine] - about) * 1e3
                 beside = (centre < low[mine][:, [i, j]]) | (centre > high[mine][:, [i, j]])
                 share[mine[beside.any(axis=1) | (calls.turns[mine] != np.sign(was.turns[of[mine]]))]] = np.nan
         found = (calls.end - place)[:, :3] * 1e3
         # the place along the way is known as well as the shift is
-        loose = STILL + np.abs(way[:, 3:]) * ((high - low).max(axis=1) / 1e3 / np.sqrt(np.maximum(length, STILL)))[:, None]
+        loose = (
+            STILL + np.abs(way[:, 3:]) * ((high - low).max(axis=1) / 1e3 / np.sqrt(np.maximum(length, STILL)))[:, None]
+        )
         beside = ((found < low) | (found > high)).any(axis=1) | (np.abs(calls.end - place)[:, 3:] > loose).any(axis=1)
         back = np.zeros(len(of), bool)
         back[1:] = (of[1:] == of[:-1]) & (share[1:] <= share[:-1])

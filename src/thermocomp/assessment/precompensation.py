@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 from thermocomp.assessment import states
 from thermocomp.assessment.comparison import Found, RefusedError, compare
-from thermocomp.assessment.ledger import Ledger as Ledger
-from thermocomp.assessment.ledger import Shift as Shift
+from thermocomp.assessment.ledger import Ledger, Shift
 from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.shopfloor import rs274
 from thermocomp.shopfloor.rs274process import Job, Run
+
+__all__ = ["Ledger", "Proof", "Shift", "prove"]
 
 #: what a state may be without if the original does not run with it
 _SPARED = ("rotation", "tool diameters")
@@ -133,8 +134,11 @@ def prove(
         except RefusedError as e:
             state[1].remove(_spared(proving, *state, e))
     spared = {name: sum(name not in mine for _, mine in wanted) for name in drawn}
-    words = [f"{name} (not in {spared[name]} of them, where it does not run)" if spared[name] else name
-             for name in states.REMEDIES if name in drawn]
+    words = [
+        f"{name} (not in {spared[name]} of them, where it does not run)" if spared[name] else name
+        for name in states.REMEDIES
+        if name in drawn
+    ]
     return Proof(
         min(f.moves for f in found),
         max(f.largest for f in found),

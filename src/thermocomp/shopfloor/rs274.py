@@ -14,12 +14,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermocomp.core.exceptions import ProgramError, ThermocompError
+from thermocomp.core.exceptions import ThermocompError
 from thermocomp.shopfloor import rs274process
-from thermocomp.shopfloor.rs274process import AXES as AXES
-from thermocomp.shopfloor.rs274process import Job, Run
-from thermocomp.shopfloor.stored import HIGHEST_TOOL as HIGHEST_TOOL
-from thermocomp.shopfloor.stored import Stored
+from thermocomp.shopfloor.rs274process import AXES, Job, Run
+from thermocomp.shopfloor.stored import HIGHEST_TOOL, Stored
+
+__all__ = [
+    "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Frame", "Place", "Stored",
+    "installed", "read",
+]  # fmt: skip
 
 PACKAGE = "linuxcnc-uspace"
 #: Axes of a plane of arcs: first, second, and the one the helix goes along.
@@ -141,7 +144,7 @@ def installed() -> str | None:
     if not python.exists():
         return f"{python} is not here; {advice}"
     with tempfile.TemporaryDirectory(prefix="rs274-") as folder:
-        trying = [python, rs274process.ISOLATED, "-c", "import gcode"]
+        trying = [str(python), rs274process.ISOLATED, "-c", "import gcode"]
         if subprocess.run(trying, capture_output=True, cwd=folder, check=False).returncode:
             return f"{python} cannot import gcode; {advice}"
         trial = Path(folder, "trial.ngc")

@@ -1,8 +1,8 @@
 """LinuxCNC's own interpreter in a child process: what a program makes of a controller, in blocks of numbers.
 
 The child runs isolated (``-I``) in a folder of its own and reads a copy of the program there: nothing that lies beside
-the program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module cannot
-tell of comments that are not.
+the program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module
+cannot tell of comments that are not.
 """
 
 import json
