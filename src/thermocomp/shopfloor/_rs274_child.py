@@ -1,12 +1,12 @@
 """Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
 
 A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
-thermocomp but the file `_rs274_hooks.py` beside it. `thermocomp.shopfloor.rs274process` starts it with the folders of
-jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with the names
-of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of what is no
-row of numbers: the first number of such a record is its place in the list. Behind each job stands a block without
-records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record tells of
-its centre.
+thermocomp but `_rs274_hooks.py` and `_rs274_kinds.py` beside it. `thermocomp.shopfloor.rs274process` starts it with the
+folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with
+the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of
+what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a block
+without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record
+tells of its centre.
 
 The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
 the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
@@ -28,77 +28,24 @@ from importlib.util import module_from_spec, spec_from_file_location
 from typing import Any, BinaryIO
 
 MM = 25.4
-#: what runs comments (py, ...) and ;py,
-PYTHON = "_ZN12PythonPlugin10run_stringEPKcRN5boost6python3api6objectEb"
-#: kind, how many numbers, line, numbers
-RECORD = struct.Struct("<HHi10d")
 #: records of a block
 BLOCK = 2048
 
-INT, D, B, P, TEXT = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p, ctypes.c_char_p
 
-
-class Pose(ctypes.Structure):
-    """Offsets X Y Z A B C U V W."""
-
-    _fields_ = (("values", D * 9),)
-
-
-#: canonical functions that are told with their numbers: mangled name -> kind, types
-TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
-    "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
-    "_Z11SELECT_TOOLi": ("select", (INT,)),
-    "_Z21STOP_SPEED_FEED_SYNCHv": ("unsync", ()),
-    "_Z23START_SPINDLE_CLOCKWISEii": ("m3", (INT, INT)),
-    "_Z30START_SPINDLE_COUNTERCLOCKWISEii": ("m4", (INT, INT)),
-    "_Z20STOP_SPINDLE_TURNINGi": ("m5", (INT,)),
-    "_Z17SET_SPINDLE_SPEEDid": ("speed", (INT, D)),
-    "_Z16SET_SPINDLE_MODEid": ("speedmode", (INT, D)),
-    "_Z14ORIENT_SPINDLEidi": ("orient", (INT, D, INT)),
-    "_Z28WAIT_SPINDLE_ORIENT_COMPLETEid": ("oriented", (INT, D)),
-    "_Z12PROGRAM_STOPv": ("m0", ()),
-    "_Z21OPTIONAL_PROGRAM_STOPv": ("m1", ()),
-    "_Z14PALLET_SHUTTLEv": ("pallet", ()),
-    "_Z11PROGRAM_ENDv": ("end", ()),
-    "_Z7MIST_ONv": ("mist", ()),
-    "_Z8FLOOD_ONv": ("flood", ()),
-    "_Z8MIST_OFFv": ("mistoff", ()),
-    "_Z9FLOOD_OFFv": ("floodoff", ()),
-    "_Z20ENABLE_FEED_OVERRIDEv": ("feedoverride", ()),
-    "_Z21DISABLE_FEED_OVERRIDEv": ("nofeedoverride", ()),
-    "_Z21ENABLE_SPEED_OVERRIDEi": ("speedoverride", (INT,)),
-    "_Z22DISABLE_SPEED_OVERRIDEi": ("nospeedoverride", (INT,)),
-    "_Z20ENABLE_ADAPTIVE_FEEDv": ("adaptive", ()),
-    "_Z21DISABLE_ADAPTIVE_FEEDv": ("noadaptive", ()),
-    "_Z16ENABLE_FEED_HOLDv": ("feedhold", ()),
-    "_Z17DISABLE_FEED_HOLDv": ("nofeedhold", ()),
-    "_Z21SET_MOTION_OUTPUT_BITi": ("m62", (INT,)),
-    "_Z23CLEAR_MOTION_OUTPUT_BITi": ("m63", (INT,)),
-    "_Z18SET_AUX_OUTPUT_BITi": ("m64", (INT,)),
-    "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
-    "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
-    "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
-}
-
-
-MOVES = ("rapid", "feed", "probe", "arc")
-OTHERS = (
-    "centre", "curve", "tap", "g5x", "g92", "rotation", "length", "plane", "unit", "feedrate", "sync", "dwell", "change",
-    "toolnumber", "tooltable", "wait", "path", "naive", "user", "comment", "message", "file", "error", "done",
-)  # fmt: skip
-KINDS = (*MOVES, *OTHERS, *(kind for kind, _ in TOLD.values()))
-CODES = {kind: code for code, kind in enumerate(KINDS)}
-RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in (*MOVES, "centre"))
-
-
-def hooks() -> Any:
-    """Return the hooks of the file beside this one; its folder is not one that modules are looked for in."""
-    spec = spec_from_file_location("_rs274_hooks", __file__.replace("_child", "_hooks"))
+def beside(name: str) -> Any:
+    """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
+    spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.Hooks()
+    return module
+
+
+kinds = beside("_rs274_kinds")
+INT, D, B, P, TEXT, Pose = kinds.INT, kinds.D, kinds.B, kinds.P, kinds.TEXT, kinds.Pose
+RECORD, KINDS, CODES, TOLD, PYTHON = kinds.RECORD, kinds.KINDS, kinds.CODES, kinds.TOLD, kinds.PYTHON
+RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
 
 
 class RefusedError(Exception):
@@ -124,7 +71,7 @@ class Canon:
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
         self.file = b""
         self.files: dict[bytes, None] = {}  # that were opened
-        self.hooks = hooks()
+        self.hooks = beside("_rs274_hooks").Hooks()
         self.linked = ctypes.PyDLL("librs274.so.0")
         self.sequence = self.linked._ZN6Interp15sequence_numberEv
         self.sequence.argtypes = (P,)
@@ -271,7 +218,7 @@ class Canon:
         self.spindle = number
         self.tell("toolnumber", number)
 
-    def tool_stored(self, place: int, number: int, pose: Pose, front: float, back: float, size: float, to: int) -> None:
+    def tool_stored(self, place: int, number: int, pose: Any, front: float, back: float, size: float, to: int) -> None:
         """G10 L1, L10, L11: M6 and G43 take the tool from here [mm]."""
         if 0 < number <= len(self.tools):
             self.tools[number - 1] = (number, pose.values[2], size)

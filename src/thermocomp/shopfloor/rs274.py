@@ -222,7 +222,8 @@ def _calls(run: Run) -> Iterator[Canonical]:
     centre = [0.0, 0.0]
     for records, more in run.blocks():
         names = {code: kind for kind, code in run.codes.items()}
-        for code, count, line, numbers in records.tolist():
+        columns = (records[name].tolist() for name in ("kind", "count", "line", "values"))
+        for code, count, line, numbers in zip(*columns, strict=True):
             kind = names[code]
             values = tuple(numbers[:count])
             if kind in {"rapid", "feed", "probe"}:
