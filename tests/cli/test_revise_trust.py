@@ -162,9 +162,9 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
 def test_a_fanuc_program_is_written_out(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     program = (
         "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z0. F30.\nM98 P100 L2\n/X0.\n"
-        "G90 G0 Z50.\nM30\nO100\nG91 Z-1.\nG90 X{}.\nM99\n%\n"
+        "G90 G0 Z50.\nM30\nO100\nG91 Z-1.\nG90 X{}\nM99\n%\n"
     )
-    Path("part.nc").write_text(program.format(100), encoding="ascii")
+    Path("part.nc").write_text(program.format("100."), encoding="ascii")
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") == 2
     assert "line 8: M98 (subprogram call): subprograms are not followed; --expand writes it" in said(capsys)
     assert revise("--controller", "fanuc", "--expand", program="part.nc", out="out.nc") == 0

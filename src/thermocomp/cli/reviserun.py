@@ -16,7 +16,6 @@ from thermocomp.cli.reviseexpand import written_out
 from thermocomp.cli.revisetravel import Travel
 from thermocomp.cli.shown import shown
 from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.reading.tokens import program_lines
 from thermocomp.compensation.nc.revising import diff, header
 from thermocomp.compensation.nc.revising.course import Bound, Course, Run
@@ -25,7 +24,6 @@ from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import scratch
-from thermocomp.shopfloor import rs274
 
 #: what a program that cannot be proved is refused with
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
@@ -119,13 +117,6 @@ class Done(NamedTuple):
     proving: float  #: for the proof
 
 
-def unprovable(setup: Setup) -> str:
-    """Return why no program for a controller can be proved here; empty if they can."""
-    if setup.controller != "linuxcnc":
-        return "a Fanuc program is not LinuxCNC's language"
-    return rs274.installed() or ""
-
-
 def revise(job: Job, *, hidden: bool) -> Done:
     """Revise a program and write all files; none if something is wrong, or if there is nothing to take off.
 
@@ -215,6 +206,9 @@ def _write(
                     tell(read / size, f"line {revised.number}")
             else:
                 blank = revised.texts
+                for listener in listeners:
+                    if isinstance(listener, Ledger):  # it counts the lines that are written
+                        listener.take(revised)
             yield revised.text, revised.texts
 
     with (
