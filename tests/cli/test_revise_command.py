@@ -103,7 +103,9 @@ def test_the_diff_makes_the_revised_program(job_folder: Path, ending: str, last:
         subprocess.run(["patch", "--binary", "-s", "-F0", "patched.ngc"], stdin=given, check=True)
     assert Path("patched.ngc").read_bytes() == Path("out.ngc").read_bytes()
     written = Path("out.ngc").read_bytes()
-    assert written.count(ending.encode()) == written.count(b"\n") > (PLATE + last).count("\n")
+    plus, minus = (sum(line.startswith(mark) for line in difference.split(b"\n")[2:]) for mark in (b"+", b"-"))
+    assert written.count(b"\n") == (PLATE + last).count("\n") + plus - minus
+    assert written.count(ending.encode()) == written.count(b"\n")
 
 
 def test_bytes_that_are_no_ascii_come_through(job_folder: Path) -> None:

@@ -276,10 +276,12 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share) -> Proof:
     """Return what the interpreter says."""
-    lines = max(job.revision.lines, 1)
+    lines, last = max(job.revision.lines, 1), 0
 
     def progress(line: int) -> None:
-        if line % TOLD == 0:
+        nonlocal last
+        if line >= last + TOLD:
+            last = line
             tell(line / lines, f"line {line}")
 
     try:

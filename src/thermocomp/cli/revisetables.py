@@ -37,12 +37,13 @@ def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
     )
     say("", f"Start: {job.begun}; {job.method}")
     console.print(_bounds(done.bounds))
-    if done.proof is not None:
+    if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
-            f"LinuxCNC's interpreter ran both programs {done.proof.sentence}: {_many(done.proof.moves, 'move')}, each "
-            f"that of the original plus its correction, within {max(done.proof.largest, 0.001):.3f} um",
+            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each that of the original plus "
+            f"its correction, within {max(proof.largest, 0.001):.3f} um",
         )
+        say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
     for warning in warnings(job, done):
         say("[yellow]but[/]", warning)
     for note in (*notes, *_place(job, done)):

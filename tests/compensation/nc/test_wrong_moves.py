@@ -175,3 +175,10 @@ def test_short_cuts_take_as_long_as_they_did(tmp_path: Path) -> None:
             if b.kind == "feed":
                 was, now = math.dist(a.machine[:3], b.machine[:3]), math.dist(c.machine[:3], d.machine[:3])
                 assert abs(now - was) <= max(0.02 * was, 0.005 * 10 / 60)
+
+
+@pytest.mark.parametrize("stop", ["M0", "M1"])
+def test_a_stop_comes_after_the_move_of_its_line(stop: str, tmp_path: Path) -> None:
+    """The operator moves the axes, and nobody knows any more what they carry: their place cannot be named."""
+    with pytest.raises(ProgramError, match="line 4: names the place of X, and nobody knows"):
+        tried(tmp_path, f"{BEGIN}S1000 M3\nX5 Y5 Z2 F100 G1 {stop}\nG92 X0\nG0 Z5\nM2\n")

@@ -18,7 +18,7 @@ ROOM = WIDTH - len(MARK) - 3
 
 _NUMBER = re.compile(r"\s*[O:]\s*\d+\b", re.IGNORECASE)
 #: brackets end a comment; % ends a program on old controls, even in a comment; ; ends a block on some
-_TOLD = str.maketrans("()%;", "[]__")
+_TOLD = str.maketrans("()%;", "[]_,")
 
 
 def blank(ending: str, lines: int = LINES) -> tuple[str, ...]:

@@ -78,10 +78,11 @@ class Method(ABC):
         """
         before, self.inner = self.carried, None
         refuse_probing(block)
-        if block.tool_change is not None or block.stops:  # the changer, or the operator, may have moved any axis
-            for i in range(3):
-                self.doubt(i, self.carried[i])
+        if block.tool_change is not None:  # the changer may have moved any axis
+            self.doubt_all()
         texts = self._revise(block, demand)
+        if block.stops:  # the operator may move any axis now
+            self.doubt_all()
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
             texts = (*texts[:-1], *parted(texts[-1]))
         placed = all(self.before) or all(self.before[i] for i in self.named(block))
@@ -120,6 +121,11 @@ class Method(ABC):
             if not self.doubtful[axis]:
                 self.other[axis] = other
             self.doubtful[axis] = True
+
+    def doubt_all(self) -> None:
+        """Take in that any axis may have been moved by hand or by the machine itself."""
+        for i in range(3):
+            self.doubt(i, self.carried[i])
 
     def stands(self, block: Block) -> bool:
         """Return whether a block moves no linear axis: it must not do so afterwards either.

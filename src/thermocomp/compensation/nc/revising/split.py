@@ -23,7 +23,26 @@ SHORTEST: Final = 2.0
 MOST: Final = 64
 #: what may stand beside the motion code: all that comes into force before the first piece and stays so
 _BESIDE: Final = frozenset(
-    {"G1", "G2", "G3", "G17", "G18", "G19", "G90", "G94", "M3", "M4", "M5", "M7", "M8", "M9", "M48", "M49"}
+    {
+        "G1",
+        "G2",
+        "G3",
+        "G17",
+        "G18",
+        "G19",
+        "G90",
+        "G90.1",
+        "G91.1",
+        "G94",
+        "M3",
+        "M4",
+        "M5",
+        "M7",
+        "M8",
+        "M9",
+        "M48",
+        "M49",
+    }
 )
 
 
