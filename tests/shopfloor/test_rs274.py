@@ -11,13 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ProgramError
-from thermocomp.shopfloor import rs274
+from thermocomp.shopfloor import rs274, rs274process
 from thermocomp.shopfloor.rs274 import Canonical, Frame, Stored, read
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 
 Run = Callable[..., list[Canonical]]
 MOVES = ("rapid", "feed", "arc", "probe", "tap")
+#: a child that tells what it is told to
+TELLS = f"""
+import json, os, struct, sys
+sys.path.append({str(rs274process.CHILD.parent)!r})
+from _rs274_child import CODES, KINDS, RAPID, RECORD
+def tell(*rows):
+    print(json.dumps(KINDS), flush=True)
+    os.write(1, struct.pack("<II", len(rows), 2) + b"".join(rows) + b"[]")
+"""
 
 
 @pytest.fixture
@@ -187,8 +196,9 @@ def test_an_endless_loop_ends(run: Run) -> None:
 
 def test_a_crash_is_an_error(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     child = tmp_path / "crash.py"
-    child.write_text("import os\nprint('rapid 7 1 2 3', flush=True)\nos.kill(os.getpid(), 11)\n", encoding="ascii")
-    monkeypatch.setattr(rs274, "CHILD", child)
+    told = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10)"
+    child.write_text(f"{TELLS}tell({told})\nos.kill(os.getpid(), 11)\n", encoding="ascii")
+    monkeypatch.setattr(rs274process, "CHILD", child)
     with pytest.raises(ProgramError, match="line 7: the interpreter died of signal 11"):
         run("M2\n")
     child.write_text("raise RuntimeError('of a version that is not known')\n", encoding="ascii")
@@ -216,14 +226,16 @@ def test_the_child_dies_with_the_reader(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_why_it_cannot_be_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert rs274.installed() is None
-    monkeypatch.setattr(rs274, "PYTHON", tmp_path / "python3")
+    monkeypatch.setattr(rs274process, "PYTHON", tmp_path / "python3")
     assert "install the Debian package linuxcnc-uspace" in str(rs274.installed.__wrapped__())
     (tmp_path / "python3").symlink_to("/usr/bin/false")
     assert "cannot import gcode" in str(rs274.installed.__wrapped__())
-    monkeypatch.setattr(rs274, "PYTHON", Path("/usr/bin/python3"))
+    monkeypatch.setattr(rs274process, "PYTHON", Path("/usr/bin/python3"))
     child = tmp_path / "mute.py"
-    child.write_text("print('rapid 7 1 2 3')\nprint('done 0')\n", encoding="ascii")
-    monkeypatch.setattr(rs274, "CHILD", child)
+    rows = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10), RECORD.pack(CODES['done'], 0, 0, *(0.0,) * 10)"
+    end = "os.write(1, struct.pack('<II', 0, 3) + b'[0]')"
+    child.write_text(f"{TELLS}tell({rows})\n{end}\n", encoding="ascii")
+    monkeypatch.setattr(rs274process, "CHILD", child)
     assert "does not tell of end, m3, m5, speed" in str(rs274.installed.__wrapped__())
 
 
@@ -259,3 +271,57 @@ def test_what_cannot_be_read_is_told_with_its_line(tmp_path: Path, head: str) ->
     with pytest.raises(ProgramError, match="No characters found") as caught:
         list(read(path))
     assert caught.value.line == head.count("\n") + 1
+
+
+def test_comments_of_any_bytes_are_read(run: Run, tmp_path: Path) -> None:
+    """The interpreter's module cannot tell of a comment that is not ASCII, in the program or in a subprogram."""
+    (tmp_path / "far.ngc").write_bytes("o<far> sub\n(Fräser 6 mm)\nG0 Y1\no<far> endsub\nM2\n".encode())
+    calls = run("G21\n(ge\xe4ndert \xb5m)\n(MSG,\xe4)\nG0 X1\no<far> call\nM2\n")
+    assert [c.text for c in calls if c.kind in ("comment", "message")][:2] == ["ge?ndert ?m", "?"]
+    assert [(c.line, c.kind) for c in calls if c.kind == "rapid"] == [(4, "rapid"), (3, "rapid")]
+    with pytest.raises(ProgramError, match="line 2: the interpreter refuses it"):
+        run("G21\nG0 X1\xe4\nM2\n")
+
+
+def test_nothing_beside_a_program_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mark = tmp_path / "mark"
+    made = f"open({str(mark)!r}, 'w')\n"
+    for name in ("gcode", "json", "ctypes", "sitecustomize", "usercustomize", "_rs274_hooks", "oword", "remap"):
+        (tmp_path / f"{name}.py").write_text(made, encoding="ascii")
+    user = tmp_path / "M101"
+    user.write_text(f"#!/bin/sh\ntouch {mark}\n", encoding="ascii")
+    user.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONSTARTUP", str(tmp_path / "gcode.py"))
+    path = tmp_path / "p.ngc"
+    path.write_text("G21\nM101\nG0 X1\n(LOGOPEN,mark)\n(LOG,x)\n(PROBEOPEN mark)\nM2\n", encoding="ascii")
+    assert rs274.installed.__wrapped__() is None
+    assert [c.kind for c in read(path) if c.kind in ("user", "rapid")] == ["user", "rapid"]
+    assert not mark.exists()
+    assert {f.name for f in tmp_path.iterdir()} == {
+        "M101", "p.ngc", "gcode.py", "json.py", "ctypes.py", "sitecustomize.py", "usercustomize.py", "_rs274_hooks.py",
+        "oword.py", "remap.py",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("comment", [";py,open({!r}, 'w')", "(py,open{{{!r}}})", "(PY,import os)"])
+def test_python_in_a_comment_is_not_run(run: Run, tmp_path: Path, comment: str) -> None:
+    mark = tmp_path / "mark"
+    with pytest.raises(ProgramError, match=r"line 3: the interpreter refuses it: it holds Python code \(py, ...\)"):
+        run(f"G21\nG0 X1\n{comment.format(str(mark))}\nG0 X2\nM2\n")
+    assert not mark.exists()
+
+
+def test_states_of_one_program_are_run_by_one_child(tmp_path: Path) -> None:
+    path = tmp_path / "p.ngc"
+    path.write_text("G21\nG54 G0 X1\n#5221 = 7\nM2\n", encoding="ascii")
+    jobs = [rs274process.Job(path, Stored(origins={1: (x,)})) for x in (1.0, 2.0)]
+    with rs274process.Run(*jobs) as running:
+        for _ in jobs:
+            kinds = [code for block in running.blocks() for code in block.records["kind"].tolist()]
+            assert kinds[-1] == running.codes["done"]
+            assert running.left()[5221] == 7.0
+            assert running.opened() == {path}
+        ends = [c.machine[0] for x in (1.0, 2.0) for c in read(path, jobs[int(x) - 1].stored) if c.kind == "rapid"]
+    assert ends == pytest.approx([2.0, 3.0])

@@ -1,107 +1,84 @@
-"""A revised program is judged by LinuxCNC's own interpreter: its moves are the original's plus what was asked for."""
+"""A revised program is judged by LinuxCNC's own interpreter: its moves are the original's plus what was asked for.
 
-import math
-from array import array
-from bisect import bisect_right
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
-from itertools import groupby, zip_longest
+It is run in eight stored controllers: what is stated is the same in all of them, what is not is drawn.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from thermocomp.compensation.nc.following import startup
+from thermocomp.assessment import states
+from thermocomp.assessment.comparison import Found, RefusedError, compare
+from thermocomp.assessment.ledger import Ledger, Shift
 from thermocomp.compensation.nc.following.block import Setup
-from thermocomp.compensation.nc.revising.frame import Vector
-from thermocomp.compensation.nc.revising.revise import Revised
-from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.shopfloor import rs274
-from thermocomp.shopfloor.rs274 import Canonical, Place
+from thermocomp.shopfloor.rs274process import Job, Run
 
-#: largest difference that is rounding [um]
-ROUNDING = 0.1
-MOVES = frozenset(("rapid", "feed", "arc", "probe", "tap", "curve"))
-#: what a revision changes to keep the places: they are judged by where the tool goes
-_OFFSETS = frozenset(("g5x", "g92", "length", "tooltable"))
-#: a header is added, and a program that tells its own line numbers tells others
-_SAID = frozenset(("comment", "message"))
-_INVERSE_TIME = 93
-#: of other axes [mm, deg]
-_SAME = 1e-6
-REVISED = "revised program"
+__all__ = ["Ledger", "Proof", "Shift", "prove"]
 
-
-class Shift(NamedTuple):
-    """By how much the moves of a line may be shifted [um, machine axes]."""
-
-    before: Vector  #: what the axes carry before it
-    after: Vector  #: what they carry behind it: its last move has to have this
-    inner: Vector  #: on the way, in a cycle
-    inverse: bool  #: G93: a way of another length gives another feed
-
-
-class Ledger:
-    """What every line of a program should be shifted by; as long as that stays the same it takes no room."""
-
-    def __init__(self) -> None:
-        self._lines = array("q")
-        self._numbers = array("d")
-        self._last: tuple[float, ...] = ()
-
-    def take(self, revised: Revised) -> None:
-        """Take a line in, in its order."""
-        block = revised.block
-        if block is None:
-            return
-        inverse = float(block.modal.feed_mode == _INVERSE_TIME)
-        entry = (*revised.carried, *revised.inner, inverse)
-        if entry != self._last:
-            self._lines.append(revised.number)
-            self._numbers.extend(entry)
-            self._last = entry
-
-    def at(self, line: int) -> Shift:
-        """Return what a line of the original should be shifted by."""
-        k = bisect_right(self._lines, line) - 1
-        if k < 0:
-            return Shift((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), inverse=False)
-        x, y, z, i, j, k_, inverse = self._numbers[7 * k : 7 * k + 7]
-        after = x, y, z
-        before: Vector = after
-        if self._lines[k] == line:
-            a, b, c = self._numbers[7 * k - 7 : 7 * k - 4] if k else (0.0, 0.0, 0.0)
-            before = a, b, c
-        return Shift(before, after, (i, j, k_), bool(inverse))
+#: what a state may be without if the original does not run with it
+_SPARED = ("rotation", "tool diameters")
 
 
 class Proof(NamedTuple):
     """What the interpreter has found."""
 
-    moves: int  #: canonical moves that were compared
+    moves: int  #: that were compared in each state
     largest: float  #: largest difference between a move and what was asked for [um]
-    states: int = 1  #: stored states of the controller
-    slower: float = 0.0  #: by how much a move takes longer or shorter, at most [%]
-    held: tuple[str, ...] = ()  #: what was the same in all of them
-    drawn: tuple[str, ...] = ()  #: and what was not
+    states: int  #: controllers both programs were run in
+    slower: float  #: largest change of the time a move takes, of the larger of it and 0.25 s [%]
+    held: tuple[str, ...]  #: what is stated, and the same in all states
+    drawn: tuple[str, ...]  #: what is not
 
     @property
     def sentence(self) -> str:
         """In which states it was proved."""
-        return f"in {self.states} controller state{'s' * (self.states != 1)}"
+        held = f"held {', '.join(self.held)}" if self.held else "nothing stated"
+        return f"in {self.states} controller states: {held}; drawn {', '.join(self.drawn)}"
 
 
-class Unprovable(InputError):  # noqa: N818 - no fault of anybody
-    """Nothing can be said about a program: it is not refused for a fault, but nobody has judged it."""
+class _Proving(NamedTuple):
+    """Two programs, and what is known of the controller."""
 
+    original: Path
+    revised: Path
+    ledger: Ledger
+    setup: Setup
 
-def stored(setup: Setup) -> rs274.Stored:
-    """Return what stands at the controller, as the interpreter wants it."""
-    return rs274.Stored(
-        origins={system: origin for system, origin in setup.offsets.items() if system <= 9},
-        lengths=setup.tools,
-        home28=setup.home or (),
-        rotations=setup.rotations,
-        startup=startup.whole(setup),
-    )
+    def run(
+        self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
+    ) -> Iterator[Found]:
+        """Compare them in states, one after the other."""
+        jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
+        with (
+            Run(*[state.job(Job(self.original)) for state in jobs]) as first,
+            Run(*[state.job(Job(self.revised)) for state in jobs]) as second,
+        ):
+            for number, _ in wanted:
+
+                def told(line: int, number: int = number) -> None:
+                    progress((line + number * self.ledger.lines) // states.STATES)
+
+                yield compare(first, second, self.ledger, told)
+
+    def fails(self, number: int, drawn: set[str]) -> bool:
+        """Return whether they fail in a state as they have failed before."""
+        try:
+            list(self.run([(number, drawn)]))
+        except (ProgramError, RefusedError):
+            return True
+        return False
+
+    def causes(self, number: int, drawn: set[str]) -> list[str]:
+        """Return what of that is drawn makes them fail: each by itself, or those without which they do not fail.
+
+        Nothing if they fail with nothing drawn as well.
+        """
+        if self.fails(number, set()):
+            return []
+        alone = [name for name in states.REMEDIES if name in drawn and self.fails(number, {name})]
+        return alone or [name for name in states.REMEDIES if name in drawn and not self.fails(number, drawn - {name})]
 
 
 def prove(
@@ -111,10 +88,11 @@ def prove(
     setup: Setup,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Proof:
-    """Run the interpreter on both programs, and compare them call by call.
+    """Run the interpreter on both programs in eight controller states, and compare them call by call.
 
-    Every move has to be that of the original, shifted by what its line should carry, within 0.1 um; all else that the
-    interpreter tells (feeds, speeds, tools, dwells ...) has to be the same.
+    Every move has to be that of the original, shifted by what its line should carry, within 0.1 um, and has to take as
+    long, within 2 % or 5 ms; where the original moves no linear axis none may move. All else that the interpreter tells
+    (feeds, speeds, tools, dwells ...) has to be the same. A move may be divided: then its pieces lie on its way.
 
     Parameters
     ----------
@@ -125,7 +103,7 @@ def prove(
     setup : Setup
         That of the revision.
     progress : callable, optional
-        Told the line of the original.
+        Told the line of the original, as if all states were one run.
 
     Returns
     -------
@@ -134,132 +112,79 @@ def prove(
     Raises
     ------
     ProgramError
-        A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp.
+        A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp, or it
+        depends on something that is stored in the controller and has not been stated.
     Unprovable
-        The interpreter refuses the original, so nothing can be proved; or it is not installed.
+        The interpreter refuses the original, or it is not installed.
     """
-    moves, largest = 0, 0.0
-    with closing(_pairs(original, revised, setup)) as pairs:
-        for line, group in groupby(pairs, key=lambda pair: pair[0].call.line):
-            progress(line)
-            shift = ledger.at(line)
-            last: tuple[_Told, _Told] | None = None
-            for was, now in group:
-                if was.call.file:
-                    what = f"calls {was.call.file}, another file: what it does there has not been shifted"
-                    raise ProgramError(line, what)
-                if not was.places:
-                    _compare(was.call, now.call, shift)
-                    continue
-                if last is not None:
-                    largest = max(largest, _off(*last, (shift.after, shift.before, shift.inner)))
-                last = was, now
-                moves += 1
-            if last is not None:
-                largest = max(largest, _off(*last, (shift.after,)))
-    return Proof(moves, largest)
-
-
-class _Told(NamedTuple):
-    """A call, and where a move goes: its end, or the points of a curve [mm, machine coordinates]."""
-
-    call: Canonical
-    places: tuple[Place, ...]
-
-
-def _pairs(original: Path, revised: Path, setup: Setup) -> Generator[tuple[_Told, _Told]]:
     if (reason := rs274.installed()) is not None:
         raise Unprovable(reason)
-    line = 0
-    with closing(_told(original, setup, "original")) as first, closing(_told(revised, setup, REVISED)) as second:
-        for was, now in zip_longest(first, second):
-            if was is None or now is None:
-                whose, kind = ("original", was.call.kind) if was else (REVISED, now.call.kind)
-                raise _fault(was.call.line if was else line, f"makes a '{kind}' in the {whose} only")
-            line = was.call.line
-            if was.call.kind != now.call.kind:
-                raise _fault(line, f"makes a '{now.call.kind}' in place of a '{was.call.kind}'")
-            yield was, now
+    proving = _Proving(original, revised, ledger, setup)
+    drawn = set(states.free(setup))
+    found: list[Found] = []
+    wanted = [(number, set(drawn)) for number in range(states.STATES)]
+    while len(found) < len(wanted):
+        state = wanted[len(found)]
+        try:
+            for more in proving.run(wanted[len(found) :], progress):
+                found.append(more)
+                state = wanted[min(len(found), len(wanted) - 1)]
+        except ProgramError as e:
+            raise _fault(proving, *state, e) from e
+        except RefusedError as e:
+            state[1].remove(_spared(proving, *state, e))
+    spared = {name: sum(name not in mine for _, mine in wanted) for name in drawn}
+    words = [
+        f"{name} (not in {spared[name]} of them, where it does not run)" if spared[name] else name
+        for name in states.REMEDIES
+        if name in drawn
+    ]
+    return Proof(
+        min(f.moves for f in found),
+        max(f.largest for f in found),
+        len(found),
+        max(f.slower for f in found),
+        states.held(setup),
+        tuple(words),
+    )
 
 
-def _told(path: Path, setup: Setup, whose: str) -> Generator[_Told]:
-    """Yield the calls that are compared."""
-    frame, here = rs274.Frame(), rs274.ORIGIN
-    calls = rs274.read(path, stored(setup), inch=bool(setup.inch), block_delete=setup.skip_optional)
+def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError) -> ProgramError:
+    """Return the error of a difference: a fault in the stated state, else what it depends on."""
+    what = f"LinuxCNC's interpreter disagrees: {error.reason}"
+    causes = proving.causes(number, drawn)
+    if not causes:
+        return ProgramError(error.line, f"{what}; please report this: nothing was written")
+    remedies = "; ".join(states.REMEDIES[cause] for cause in causes)
+    if "rotation" in causes:
+        remedies = f"a correction of X or Y turns with the rotation of its work coordinate system; {remedies}"
+    return ProgramError(
+        error.line,
+        f"{what}, in a controller where {_listed(causes)} {'is' if len(causes) == 1 else 'are'} another: that is not "
+        f"stated, so it cannot be proved; {remedies}",
+    )
+
+
+def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
+    """Return what a state has to be without so that the original runs in it."""
+    line, reason = error.args
+    neutral = Job(proving.original, states.stated(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional)
     try:
-        for call in calls:
-            kind, values = call.kind, call.values
-            frame.take(kind, values)
-            if kind in _OFFSETS or kind in _SAID:
-                continue
-            places: tuple[Place, ...] = ()
-            if kind == "tap":  # there, and back
-                places = (frame.machine((values[0], values[1], values[2], *frame.program(here)[3:])),)
-            elif kind == "curve":  # in XY; each of its points has a weight
-                there = frame.program(here)[2:]
-                points = zip(values[1::3], values[2::3], strict=True)
-                places = tuple(frame.machine((x, y, *there)) for x, y in points)
-                here = places[-1]
-            elif kind in MOVES:
-                places = (call.machine,)
-                here = call.machine
-            yield _Told(call, places)
+        with Run(neutral) as run:
+            for _ in run.blocks():
+                pass
     except ProgramError as e:
-        if whose == REVISED:
-            raise _fault(e.line, f"does not run the {whose}: {e.reason}") from e
-        raise Unprovable(f"LinuxCNC's interpreter does not run the {whose}: {e}") from e
-    finally:
-        calls.close()
+        raise Unprovable(f"LinuxCNC's interpreter does not run the original: {e}") from e
+    causes = proving.causes(number, drawn)
+    if len(causes) == 1 and causes[0] in _SPARED:
+        return causes[0]
+    causes = causes or ["start"]  # the only thing that is drawn always
+    raise Unprovable(
+        f"it cannot be proved: line {line}: where the tool stands depends on what is stored in the controller "
+        f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
+        + "; ".join(states.REMEDIES[cause] for cause in causes)
+    ) from error
 
 
-def _compare(was: Canonical, now: Canonical, shift: Shift) -> None:
-    """Compare calls that are no moves."""
-    if was.kind == "feedrate" and shift.inverse:
-        return
-    numbers = zip_longest(was.values, now.values, fillvalue=math.nan)
-    if was.text != now.text or not all(math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9) for a, b in numbers):
-        raise _fault(was.line, f"gives '{was.kind}' {now.text or now.values} instead of {was.text or was.values}")
-
-
-def _off(was: _Told, now: _Told, allowed: tuple[Vector, ...]) -> float:
-    """Return by how much a move is off [um], the nearest of the allowed shifts counted, axis by axis."""
-    first, second = was.call, now.call
-    if len(was.places) != len(now.places):
-        raise _fault(first.line, "makes another curve")
-    worst = 0.0
-    for a, b in zip(was.places, now.places, strict=True):
-        worst = max(worst, _apart(first, a[:3], b[:3], allowed, (0, 1, 2), "moves {axis} by"))
-        if any(abs(p - q) > _SAME for p, q in zip(a[3:], b[3:], strict=True)):
-            raise _fault(first.line, "moves another axis than X, Y and Z")
-    if first.arc is None or second.arc is None:
-        if first.arc is not second.arc:
-            raise _fault(first.line, "has lost or got an arc")
-        return worst
-    if (first.arc.plane, first.arc.turns) != (second.arc.plane, second.arc.turns):
-        raise _fault(first.line, "turns another way")
-    axes = rs274.PLANE_AXES[first.arc.plane][:2]
-    centres = first.arc.machine_centre, second.arc.machine_centre
-    return max(worst, _apart(first, *centres, allowed, axes, "moves {axis} of an arc's centre by"))
-
-
-def _apart(
-    call: Canonical,
-    was: Sequence[float],
-    now: Sequence[float],
-    allowed: tuple[Vector, ...],
-    axes: Sequence[int],
-    what: str,
-) -> float:
-    worst = 0.0
-    for axis in axes:
-        found = (now[axis] - was[axis]) * 1e3
-        off = min(abs(found - shift[axis]) for shift in allowed)
-        if not off <= ROUNDING:
-            wanted = allowed[0][axis]
-            raise _fault(call.line, f"{what.format(axis='XYZ'[axis])} {found:.2f} um instead of {wanted:.2f} um")
-        worst = max(worst, off)
-    return worst
-
-
-def _fault(line: int, what: str) -> ProgramError:
-    return ProgramError(line, f"LinuxCNC's interpreter disagrees: it {what}; please report this: nothing was written")
+def _listed(causes: list[str]) -> str:
+    return " and ".join(causes)

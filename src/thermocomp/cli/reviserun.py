@@ -215,6 +215,9 @@ def _write(
                     tell(read / size, f"line {revised.number}")
             else:
                 blank = revised.texts
+                for listener in listeners:
+                    if isinstance(listener, Ledger):  # it counts the lines that are written
+                        listener.take(revised)
             yield revised.text, revised.texts
 
     with (

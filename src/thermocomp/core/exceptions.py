@@ -78,6 +78,10 @@ class ProgramError(InputError):
         self.reason = reason
 
 
+class Unprovable(InputError):  # noqa: N818 - it is no error of anybody: nothing can be said
+    """Nothing can be proved of a revised program: no interpreter, or one that does not run the original."""
+
+
 class FitError(ThermocompError):
     """A model cannot be fitted to this data."""
 

@@ -1,12 +1,16 @@
-"""Run an NC program through LinuxCNC's interpreter and write its canonical calls, a line each, to standard output.
+"""Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
 
 A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
-thermocomp but the file `_rs274_hooks.py` beside it. `thermocomp.shopfloor.rs274` starts it with one argument (JSON) and
-reads what it writes.
+thermocomp but `_rs274_hooks.py` and `_rs274_kinds.py` beside it. `thermocomp.shopfloor.rs274process` starts it with the
+folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with
+the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of
+what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a block
+without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record
+tells of its centre.
 
 The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
 the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
-in inches from the module whatever the program's unit is, and leave here in mm, with 15 digits.
+in inches from the module whatever the program's unit is; but those of moves leave here in mm.
 """
 
 import ctypes
@@ -15,71 +19,46 @@ import math
 import os
 import re
 import resource
+import struct
 import sys
+import traceback
 from collections.abc import Callable
 from functools import partial
-from typing import Any
-
-from _rs274_hooks import Hooks  # type: ignore[import-not-found]
-
-sys.path.insert(0, "/usr/lib/python3/dist-packages")
+from importlib.util import module_from_spec, spec_from_file_location
+from typing import Any, BinaryIO
 
 MM = 25.4
-
-INT, D, B, P, TEXT = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p, ctypes.c_char_p
-
-
-class Pose(ctypes.Structure):
-    """Offsets X Y Z A B C U V W."""
-
-    _fields_ = (("values", D * 9),)
+#: records of a block
+BLOCK = 2048
 
 
-#: canonical functions that are told with their numbers: mangled name -> kind, types
-TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
-    "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
-    "_Z11SELECT_TOOLi": ("select", (INT,)),
-    "_Z21STOP_SPEED_FEED_SYNCHv": ("unsync", ()),
-    "_Z23START_SPINDLE_CLOCKWISEii": ("m3", (INT, INT)),
-    "_Z30START_SPINDLE_COUNTERCLOCKWISEii": ("m4", (INT, INT)),
-    "_Z20STOP_SPINDLE_TURNINGi": ("m5", (INT,)),
-    "_Z17SET_SPINDLE_SPEEDid": ("speed", (INT, D)),
-    "_Z16SET_SPINDLE_MODEid": ("speedmode", (INT, D)),
-    "_Z14ORIENT_SPINDLEidi": ("orient", (INT, D, INT)),
-    "_Z28WAIT_SPINDLE_ORIENT_COMPLETEid": ("oriented", (INT, D)),
-    "_Z12PROGRAM_STOPv": ("m0", ()),
-    "_Z21OPTIONAL_PROGRAM_STOPv": ("m1", ()),
-    "_Z14PALLET_SHUTTLEv": ("pallet", ()),
-    "_Z11PROGRAM_ENDv": ("end", ()),
-    "_Z7MIST_ONv": ("mist", ()),
-    "_Z8FLOOD_ONv": ("flood", ()),
-    "_Z8MIST_OFFv": ("mistoff", ()),
-    "_Z9FLOOD_OFFv": ("floodoff", ()),
-    "_Z20ENABLE_FEED_OVERRIDEv": ("feedoverride", ()),
-    "_Z21DISABLE_FEED_OVERRIDEv": ("nofeedoverride", ()),
-    "_Z21ENABLE_SPEED_OVERRIDEi": ("speedoverride", (INT,)),
-    "_Z22DISABLE_SPEED_OVERRIDEi": ("nospeedoverride", (INT,)),
-    "_Z20ENABLE_ADAPTIVE_FEEDv": ("adaptive", ()),
-    "_Z21DISABLE_ADAPTIVE_FEEDv": ("noadaptive", ()),
-    "_Z16ENABLE_FEED_HOLDv": ("feedhold", ()),
-    "_Z17DISABLE_FEED_HOLDv": ("nofeedhold", ()),
-    "_Z21SET_MOTION_OUTPUT_BITi": ("m62", (INT,)),
-    "_Z23CLEAR_MOTION_OUTPUT_BITi": ("m63", (INT,)),
-    "_Z18SET_AUX_OUTPUT_BITi": ("m64", (INT,)),
-    "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
-    "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
-    "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
-}
+def beside(name: str) -> Any:
+    """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
+    spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+kinds = beside("_rs274_kinds")
+INT, D, B, P, TEXT, Pose = kinds.INT, kinds.D, kinds.B, kinds.P, kinds.TEXT, kinds.Pose
+RECORD, KINDS, CODES, TOLD, PYTHON = kinds.RECORD, kinds.KINDS, kinds.CODES, kinds.TOLD, kinds.PYTHON
+RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
+
+
+class RefusedError(Exception):
+    """The program wants something that is not done for it."""
 
 
 class Canon:
     """Receives the canonical calls of the interpreter."""
 
-    def __init__(self, job: dict[str, Any], write: Callable[[str], Any]) -> None:
-        self.parameter_file = job["parameters"]
-        self.delete = bool(job["block_delete"])
-        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
-        self.write = write
+    def __init__(self, out: BinaryIO) -> None:
+        self.out = out
+        self.records: list[bytes] = []
+        self.more: list[Any] = []
         self.line = 0
         self.begun = 0  # 1 after the mark in the job's start block, 2 after its last call, the tool length
         self.metric = False
@@ -87,20 +66,27 @@ class Canon:
         self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
         self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
         self.angle = 0.0
-        self.spindle: int = job["spindle"]
         self.plane = 1
         self.feed = 0.0  # [mm/min]
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
         self.file = b""
         self.files: dict[bytes, None] = {}  # that were opened
-        self.hooks = Hooks()
+        self.hooks = beside("_rs274_hooks").Hooks()
         self.linked = ctypes.PyDLL("librs274.so.0")
         self.sequence = self.linked._ZN6Interp15sequence_numberEv
         self.sequence.argtypes = (P,)
         self.name = self.linked._ZN6Interp9file_nameEPcm
         self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
         self.buffer = ctypes.create_string_buffer(512)
-        self.program = job["program"].encode()
+        self.alone = True  # no other file has been opened
+
+    def begin(self, job: dict[str, Any]) -> None:
+        """Take what the program is run in."""
+        self.parameter_file = job["parameters"]
+        self.delete = bool(job["block_delete"])
+        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
+        self.spindle: int = job["spindle"]
+        self.program = os.path.realpath(job["program"].encode())
 
     def connect(self, module: str) -> None:
         """Turn the functions the module leaves empty to this object."""
@@ -114,6 +100,9 @@ class Canon:
         functions["_Z22START_SPEED_FEED_SYNCHidb"] = (self.synchronised, (None, INT, D, B))
         functions["_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi"] = (self.tool_stored, (None, INT, INT, Pose, D, D, D, INT))
         functions["fopen64"] = (self.opened, (P, TEXT, TEXT))
+        functions[PYTHON] = (self.python, (INT, P, TEXT, P, B))
+        functions["_Z7COMMENTPKc"] = (self.commented, (None, TEXT))  # the module knows ASCII only
+        functions["_Z7MESSAGEPc"] = (self.messaged, (None, TEXT))
         functions["_Z18CHANGE_TOOL_NUMBERi"] = (self.change_tool_number, (None, INT))
         functions["_Z9RIGID_TAPidddd"] = (self.tapped, (None, INT, D, D, D, D))
         functions["_Z4WAITiiid"] = (self.waited, (INT, INT, INT, INT, D))
@@ -133,6 +122,7 @@ class Canon:
             (None, INT, P, ctypes.c_uint),
         )
         before = self.hooks.turn("librs274", functions)
+        self.python_before = before[PYTHON]
         self.unit_before, self.open_before = before["_Z16USE_LENGTH_UNITS11CANON_UNITS"], before["fopen64"]
         made = {"_ZN6InterpC1Ev": (self.constructed, (None, P))}
         self.construct_before = self.hooks.turn(module, made)["_ZN6InterpC1Ev"]
@@ -149,21 +139,41 @@ class Canon:
 
     def move_to(self, line: int) -> None:
         self.line = line if self.begun == 2 else 0
+        if self.alone:
+            return
         self.name(self.interpreter, self.buffer, 512)
         name = self.buffer.value
         if name != self.file:
             self.file = name
             own = not name or os.path.samefile(name, self.program)  # noqa: PTH121
-            text = "" if own else name.decode("utf-8", "replace")
-            self.write(f"file {self.line} {text}\n")
+            self.extra("file", "" if own else name.decode("utf-8", "replace"))
 
     def tell(self, kind: str, *numbers: float) -> None:
         self.where()
-        self.write(f"{kind} {self.line} {' '.join(format(number, '.15g') for number in numbers)}\n")
+        self.record(kind, *numbers)
+
+    def record(self, kind: str, *numbers: float) -> None:
+        self.records.append(RECORD.pack(CODES[kind], len(numbers), self.line, *numbers, *(0.0,) * (10 - len(numbers))))
+        if len(self.records) >= BLOCK:
+            self.flush()
 
     def text(self, kind: str, text: str) -> None:
         self.where()
-        self.write(f"{kind} {self.line} {re.sub('[^ -~]', '?', text)}\n")
+        self.extra(kind, re.sub("[^ -~]", "?", text))
+
+    def extra(self, kind: str, what: Any) -> None:
+        """Tell what is no row of numbers."""
+        self.more.append(what)
+        self.record(kind, len(self.more) - 1)
+
+    def flush(self) -> None:
+        more = json.dumps(self.more).encode()
+        self.out.write(struct.pack("<II", len(self.records), len(more)))
+        self.out.writelines(self.records)
+        self.out.write(more)
+        self.out.flush()
+        self.records.clear()
+        self.more.clear()
 
     def length(self, value: float) -> float:
         return value if self.metric else value * MM
@@ -208,7 +218,7 @@ class Canon:
         self.spindle = number
         self.tell("toolnumber", number)
 
-    def tool_stored(self, place: int, number: int, pose: Pose, front: float, back: float, size: float, to: int) -> None:
+    def tool_stored(self, place: int, number: int, pose: Any, front: float, back: float, size: float, to: int) -> None:
         """G10 L1, L10, L11: M6 and G43 take the tool from here [mm]."""
         if 0 < number <= len(self.tools):
             self.tools[number - 1] = (number, pose.values[2], size)
@@ -218,8 +228,24 @@ class Canon:
         """Note a file that is there, the program's own included."""
         result: int = self.open_before(name, mode)
         if result and mode.startswith(b"r"):
-            self.files[os.path.realpath(name)] = None
+            path = os.path.realpath(name)
+            self.files[path] = None
+            self.alone &= path == self.program or self.begun < 2
         return result
+
+    def python(self, this: int, code: bytes, result: int, as_file: bool) -> int:
+        """Run Python code of the interpreter's own, and none of a program."""
+        if code == b"from interpreter import this":
+            done: int = self.python_before(this, code, result, as_file)
+            return done
+        self.where()
+        raise RefusedError(self.line, "it holds Python code (py, ...), which is not run here")
+
+    def commented(self, text: bytes) -> None:
+        self.comment(text.decode("latin-1"))
+
+    def messaged(self, text: bytes) -> None:
+        self.text("message", text.decode("latin-1"))
 
     def tapped(self, line: int, x: float, y: float, z: float, scale: float) -> None:
         self.tell("tap", self.length(x), self.length(y), self.length(z), scale)
@@ -242,58 +268,61 @@ class Canon:
         numbers = (D * ((last - first) // 8)).from_address(first)
         points = [n if i % 3 == 2 else self.length(n) for i, n in enumerate(numbers)]
         self.place = (points[-3] / MM, points[-2] / MM, *self.place[2:])
-        self.tell("curve", order, *points)
+        self.where()
+        self.extra("curve", [order, *points])
 
     # --- what the module tells ---
     def next_line(self, state: Any) -> None:
-        if self.interpreter:
+        if self.alone:
+            self.line = state.sequence_number if self.begun == 2 else 0
+        elif self.interpreter:
             self.move_to(state.sequence_number)
 
-    def straight_traverse(self, x: float, y: float, z: float, *more: float) -> None:
-        self.straight("rapid", x, y, z, more)
+    def straight_traverse(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
 
-    def straight_feed(self, x: float, y: float, z: float, *more: float) -> None:
-        self.straight("feed", x, y, z, more)
+    def straight_feed(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
 
-    def straight_probe(self, x: float, y: float, z: float, *more: float) -> None:
-        self.straight("probe", x, y, z, more)
-
-    def straight(self, kind: str, x: float, y: float, z: float, more: tuple[float, ...]) -> None:
-        self.place = (x, y, z, *more)
-        # percent formats take half the time of the others
-        text = "%s %d %.15g %.15g %.15g" % (kind, self.line, x * MM, y * MM, z * MM)
-        self.write(text + self.others(more) + "\n")
-
-    def others(self, more: tuple[float, ...]) -> str:
-        """Rotary and secondary axes; nothing if they stand at 0."""
-        if not any(more):
-            return ""
-        return " %.15g %.15g %.15g" % more[:3] + " %.15g %.15g %.15g" % tuple(v * MM for v in more[3:6])
+    def straight_probe(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
 
     def arc_feed(
         self, end1: float, end2: float, centre1: float, centre2: float, turns: int, end3: float, *more: float
     ) -> None:
         at = {1: (end1, end2, end3), 2: (end3, end1, end2), 3: (end2, end3, end1)}[self.plane]
+        plane = {1: 17, 2: 19, 3: 18}[self.plane]
         self.place = (*at, *more)
-        numbers = "%.15g %.15g %.15g %.15g %.15g" % tuple(v * MM for v in (end1, end2, centre1, centre2, end3))
-        self.write(f"arc {self.line} {turns} {numbers}{self.others(more)}\n")
+        centre = (centre1 * MM, centre2 * MM, turns, plane, *(0.0,) * 6)
+        self.records.append(RECORD.pack(CENTRE, 4, self.line, *centre))
+        self.records.append(RECORD.pack(ARC, 9, self.line, *self.place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
 
-    def offsets(self, kind: str, first: str, values: tuple[float, ...]) -> None:
+    def offsets(self, kind: str, first: tuple[int, ...], values: tuple[float, ...]) -> None:
         self.where()
         self.shifted(kind, values)
-        numbers = " ".join(format(v if 3 <= i < 6 else v * MM, ".15g") for i, v in enumerate(values))
-        self.write(f"{kind} {self.line} {first}{numbers}\n")
+        self.record(kind, *first, *(v if 3 <= i < 6 else v * MM for i, v in enumerate(values)))
         if kind == "length" and self.begun == 1:
             self.begun = 2
 
     def set_g5x_offset(self, index: int, *values: float) -> None:
-        self.offsets("g5x", f"{index} ", values)
+        self.offsets("g5x", (index,), values)
 
     def set_g92_offset(self, *values: float) -> None:
-        self.offsets("g92", "", values)
+        self.offsets("g92", (), values)
 
     def tool_offset(self, *values: float) -> None:
-        self.offsets("length", "", values)
+        self.offsets("length", (), values)
 
     def set_xy_rotation(self, angle: float) -> None:
         self.shifted("rotation", (angle,))
@@ -325,7 +354,7 @@ class Canon:
             self.text("comment", text)
 
     def message(self, text: str) -> None:
-        self.text("message", text)
+        """Not used: it is turned to `messaged`."""
 
     def set_traverse_rate(self, rate: float) -> None:
         """Not used by the programs' words."""
@@ -353,35 +382,64 @@ class Canon:
         return self.delete
 
 
-def main() -> None:
-    """Run the job of the first argument."""
-    job = json.loads(sys.argv[1])
+def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
+    """Run a job."""
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: it does not outlive the process that reads its end
     resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
-    with os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1 << 16) as out:
+    os.environ["HOME"] = job["home"]
+    os.environ["INI_FILE_NAME"] = job["ini"]
+    # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
+    tools = ctypes.CDLL("libtooldata.so.0")
+    tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
+    tools._Z13tooldata_initb(B(False))
+    tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
+    ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
+    canon.begin(job)
+    result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
+    failure = canon.hooks.failure
+    if isinstance(failure, RefusedError):
+        canon.line, reason = failure.args
+        canon.extra("error", reason)
+    elif failure is not None:
+        raise failure
+    elif result > gcode.MIN_ERROR:
+        canon.text("error", gcode.strerror(result))
+    else:
+        canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+        with open(job["opened"], "wb") as file:  # noqa: PTH123
+            file.write(b"\0".join(canon.files))
+        canon.record("done")
+    canon.flush()
+
+
+def main() -> None:
+    """Run the jobs of the folders that are named, each from the same fresh state of the interpreter's module."""
+    with os.fdopen(os.dup(1), "wb", buffering=1 << 18) as out:
         os.dup2(2, 1)  # (PRINT, ...) of a program goes to standard output
-        os.environ["HOME"] = job["home"]
-        if job["ini"]:
-            os.environ["INI_FILE_NAME"] = job["ini"]
+        os.environ["HOME"] = os.getcwd()  # noqa: PTH109
         import gcode  # type: ignore[import-not-found,unused-ignore]
 
-        # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
-        tools = ctypes.CDLL("libtooldata.so.0")
-        tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
-        tools._Z13tooldata_initb(B(False))
-        tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
-        canon = Canon(job, out.write)
+        canon = Canon(out)
         canon.connect("gcode.cpython")
-        ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
-        result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
-        if canon.hooks.failure is not None:
-            raise canon.hooks.failure
-        if result > gcode.MIN_ERROR:
-            canon.text("error", gcode.strerror(result))
-        else:
-            canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
-            with open(job["opened"], "wb") as file:  # noqa: PTH123
-                file.write(b"\0".join(canon.files))
-            out.write("done 0\n")
+        out.write(json.dumps(KINDS).encode() + b"\n")
+        out.flush()
+        for folder in sys.argv[1:]:
+            child = os.fork()
+            if not child:
+                code = 1
+                try:
+                    with open(f"{folder}/job", encoding="utf-8") as file:  # noqa: PTH123
+                        job = json.load(file)
+                    run(job, canon, gcode)
+                    code = 0
+                except BaseException:  # noqa: BLE001
+                    traceback.print_exc()
+                finally:
+                    sys.stderr.flush()
+                    os._exit(code)
+            end = json.dumps([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])]).encode()
+            out.write(struct.pack("<II", 0, len(end)) + end)
+            out.flush()
 
 
 if __name__ == "__main__":

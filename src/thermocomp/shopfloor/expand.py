@@ -1,11 +1,10 @@
 """Expands an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; the result is proven."""
 
-import random
 import re
 from array import array
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 
@@ -13,7 +12,8 @@ from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.shopfloor.origins import DEPENDS, G10
 from thermocomp.shopfloor.plain import Writer
 from thermocomp.shopfloor.proof import compare, kept
-from thermocomp.shopfloor.rs274 import HIGHEST_TOOL, Canonical, Stored, read
+from thermocomp.shopfloor.rs274 import Canonical, read
+from thermocomp.shopfloor.stored import Stored, drawn
 from thermocomp.shopfloor.words import Side
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
@@ -74,28 +74,8 @@ class _Around:
 
     def controller(self, seed: int) -> Stored:
         """Return a controller that has nothing else in common with that of another seed."""
-        chance = random.Random(seed)
-
-        def some(count: int, most: float = 300.0) -> tuple[float, ...]:
-            return tuple(round(chance.uniform(-most, most), 6) for _ in range(count))
-
-        startup = [self.startup or ""]
-        startup += [f"G64 P0.{seed}"] * ("G6" not in startup[0]) + [f"G9{8 + seed % 2}"] * ("G9" not in startup[0])
-        tools = range(1, HIGHEST_TOOL)
-        return Stored(
-            origins={system: some(9) for system in range(1, 10)},
-            rotations={system: some(1, 20.0)[0] for system in range(1, 10)},
-            shift=some(9, 10.0),
-            lengths={tool: round(chance.uniform(20.0, 200.0), 6) for tool in tools},
-            diameters={tool: round(chance.uniform(0.001, 0.1), 6) for tool in tools} | dict(self.diameters),
-            active_length=round(chance.uniform(20.0, 200.0), 6),
-            spindle=HIGHEST_TOOL - seed,
-            home28=some(9),
-            home30=some(9),
-            startup=" ".join(startup),
-            start=some(9),
-            parameters=dict(zip(range(31, 5001), some(4970, 1000.0), strict=True)),
-        )
+        stored = drawn(seed, self.startup or "")
+        return replace(stored, diameters={**stored.diameters, **self.diameters})
 
 
 def expand(

@@ -1,33 +1,35 @@
-"""LinuxCNC's own interpreter, run in a child process: the canonical calls of an NC program.
+"""The canonical calls of an NC program, as LinuxCNC's own interpreter tells them.
 
 It is what judges every program that is written here, and what takes loops and parameters apart (see `expand`). It comes
 with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
 """
 
-import json
 import math
-import os
 import subprocess
 import tempfile
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from thermocomp.core.exceptions import InputError, ProgramError, ThermocompError
+import numpy as np
 
-#: The Python of the Debian package, which has the module `gcode`.
-PYTHON = Path("/usr/bin/python3")
-CHILD = Path(__file__).with_name("_rs274_child.py")
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.shopfloor import rs274process
+from thermocomp.shopfloor.rs274process import AXES, Job, Run
+from thermocomp.shopfloor.stored import HIGHEST_TOOL, Stored
+
+__all__ = [
+    "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Frame", "Place", "Stored",
+    "installed", "read",
+]  # fmt: skip
+
 PACKAGE = "linuxcnc-uspace"
-AXES = "XYZABCUVW"
 #: Axes of a plane of arcs: first, second, and the one the helix goes along.
 PLANE_AXES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
-HIGHEST_TOOL = 1000
-MOST_FOLDERS = 8
 
 Place = tuple[float, float, float, float, float, float, float, float, float]
+Places = np.ndarray[Any, np.dtype[np.float64]]
 ORIGIN: Place = (0.0,) * 9
 
 
@@ -61,60 +63,6 @@ class Canonical(NamedTuple):
     arc: ArcPath | None
     values: tuple[float, ...]
     text: str
-
-
-@dataclass(frozen=True)
-class Stored:
-    """What is stored in the controller and not in the program.
-
-    Parameters
-    ----------
-    origins : dict of int to sequence of float
-        Of the work coordinate systems, 1 (G54) to 9 (G59.3), X to W [mm, deg]; the others are 0.
-    rotations : dict of int to float
-        Of the work coordinate systems about Z [deg].
-    shift : sequence of float
-        G92 offset in force, X to W [mm, deg].
-    lengths, diameters : dict of int to float
-        Of the tools [mm]; all tools up to 1000 are there, those that are not named with 0.
-    active_length : float
-        Tool length offset in force at the start [mm].
-    spindle : int
-        Number of the tool in the spindle at the start; 0: none.
-    home28, home30 : sequence of float
-        Where G28 and G30 go, X to W [mm, deg].
-    startup : str
-        Codes in force at the start that no program's end puts back, such as ``G64 P0.01 G98`` (mm).
-    start : sequence of float or None
-        Machine coordinates at the start, X to W [mm, deg]; None: the origin of the first work coordinate system.
-    parameters : dict of int to float
-        Others, such as ``#100``.
-    """
-
-    origins: Mapping[int, Sequence[float]] = field(default_factory=dict)
-    rotations: Mapping[int, float] = field(default_factory=dict)
-    shift: Sequence[float] = ()
-    lengths: Mapping[int, float] = field(default_factory=dict)
-    diameters: Mapping[int, float] = field(default_factory=dict)
-    active_length: float = 0.0
-    spindle: int = 0
-    home28: Sequence[float] = ()
-    home30: Sequence[float] = ()
-    startup: str = "G64 G98"
-    start: Sequence[float] | None = None
-    parameters: Mapping[int, float] = field(default_factory=dict)
-
-    def numbers(self) -> dict[int, float]:
-        """Return all parameters as the controller keeps them."""
-        result = dict(self.parameters)
-        result |= {5161 + i: value for i, value in enumerate(self.home28)}
-        result |= {5181 + i: value for i, value in enumerate(self.home30)}
-        result |= {5211 + i: value for i, value in enumerate(self.shift)}
-        result[5210] = float(any(self.shift))
-        for system, origin in self.origins.items():
-            result |= {5201 + 20 * system + i: value for i, value in enumerate(origin)}
-        result |= {5210 + 20 * system: angle for system, angle in self.rotations.items()}
-        return result
 
 
 class Frame:
@@ -167,6 +115,15 @@ class Frame:
         turned = (x * self._cos - y * self._sin, x * self._sin + y * self._cos, *more)
         return _nine(a + b for a, b in zip(turned, self._fixed, strict=True))
 
+    def machines(self, places: Places) -> Places:
+        """Machine coordinates of program coordinates, a row each."""
+        turned = places + self.shift
+        if self.rotation:
+            x, y = turned[:, 0].copy(), turned[:, 1].copy()
+            turned[:, 0], turned[:, 1] = x * self._cos - y * self._sin, x * self._sin + y * self._cos
+        turned += self._fixed
+        return turned
+
     def program(self, p: Place) -> Place:
         """Program coordinates of machine coordinates."""
         x, y, *more = (a - b for a, b in zip(p, self._fixed, strict=True))
@@ -183,12 +140,13 @@ def _nine(values: Iterator[float] | Sequence[float]) -> Place:
 def installed() -> str | None:
     """Return why the interpreter cannot be used here; None if it can."""
     advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
-    if not PYTHON.exists():
-        return f"{PYTHON} is not here; {advice}"
-    found = subprocess.run([PYTHON, "-c", "import gcode"], capture_output=True, text=True, check=False)
-    if found.returncode:
-        return f"{PYTHON} cannot import gcode; {advice}"
+    python = rs274process.PYTHON
+    if not python.exists():
+        return f"{python} is not here; {advice}"
     with tempfile.TemporaryDirectory(prefix="rs274-") as folder:
+        trying = [str(python), rs274process.ISOLATED, "-c", "import gcode"]
+        if subprocess.run(trying, capture_output=True, cwd=folder, check=False).returncode:
+            return f"{python} cannot import gcode; {advice}"
         trial = Path(folder, "trial.ngc")
         trial.write_text("G21 M3 S7\nG0 X1\nM5\nM2\n", encoding="ascii")
         try:
@@ -248,112 +206,43 @@ def read(
     InputError
         The file is not there, or the interpreter crashed.
     """
-    stored = stored or Stored()
-    path = path.absolute()
-    if not path.is_file():
-        raise InputError(f"{path} is not a file")
-    if len(subroutines) > MOST_FOLDERS:
-        raise InputError(f"{len(subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
-    with tempfile.TemporaryDirectory(prefix="rs274-") as name:
-        folder = Path(name)
-        job = _job(folder, path, stored, inch, subroutines)
-        job |= {"block_delete": block_delete, "task": int(task), "seconds": seconds}
-        with (folder / "errors").open("wb") as errors:
-            process = subprocess.Popen(
-                [PYTHON, "-E", CHILD, json.dumps(job)],
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                cwd=folder,
-                encoding="utf-8",
-            )
-        try:
-            yield from _calls(process, folder, seconds)
-        finally:
-            process.kill()  # does nothing if it has ended
-            process.communicate()
+    job = Job(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
+    with Run(job) as run:
+        yield from _calls(run)
         if opened is not None:
-            names = map(os.fsdecode, (folder / "opened").read_bytes().split(b"\0"))
-            opened.update(file for file in map(Path, names) if not file.is_relative_to(folder.resolve()))
+            opened.update(run.opened())
         if left is not None:
-            rows = (row.split() for row in (folder / "parameters").read_text(encoding="ascii").splitlines())
-            left.update({int(row[0]): float(row[1]) for row in rows if len(row) == 2})
+            left.update(run.left())
 
 
-def _job(folder: Path, path: Path, stored: Stored, inch: bool, subroutines: Sequence[Path]) -> dict[str, object]:
-    """Lay out the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
-    names = [f"s{i}" for i in range(1 + len(subroutines))]
-    for name, target in zip(names, [path.parent, *subroutines], strict=True):
-        (folder / name).symlink_to(target.absolute())
-    (folder / "ini").write_text(f"[RS274NGC]\nSUBROUTINE_PATH = {':'.join(names)}\n", encoding="ascii")
-    numbers = sorted(stored.numbers().items())
-    (folder / "parameters").write_text("".join(f"{n}\t{v:.9f}\n" for n, v in numbers), encoding="ascii")
-    tools = [(n, stored.lengths.get(n, 0.0), stored.diameters.get(n, 0.0)) for n in range(1, HIGHEST_TOOL)]
-    table = "".join(f"T{n} P{n} Z{length:.9f} D{diameter:.9f}\n" for n, length, diameter in tools)
-    (folder / "table").write_text(table, encoding="ascii")
-    start = ""
-    if stored.start is not None:
-        start = " G53 G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(AXES, stored.start, strict=False))
-    return {
-        "program": str(path),
-        "home": str(folder),
-        "ini": str(folder / "ini"),
-        "parameters": str(folder / "parameters"),
-        "table": str(folder / "table"),
-        "opened": str(folder / "opened"),
-        "tools": tools,
-        "spindle": stored.spindle,
-        "units": f"G21 G90 G17 G40 G49 G80 G94 {stored.startup}{start}",
-        # the child waits for this comment and the tool length after it: then the program begins
-        "start": f"(begin) G2{0 if inch else 1} G43.1 Z{stored.active_length / (25.4 if inch else 1.0):.9f}",
-    }
-
-
-def _calls(process: "subprocess.Popen[str]", folder: Path, seconds: int) -> Iterator[Canonical]:
-    """Read what the child writes."""
-    assert process.stdout is not None
-    frame, plane, line, file, done = Frame(), 17, 0, "", False
+def _calls(run: Run) -> Iterator[Canonical]:
+    """Put what the interpreter tells into words."""
+    frame, plane, file, turns = Frame(), 17, "", 1
     nowhere: tuple[Place, Place] = (ORIGIN, ORIGIN)
-    for row in process.stdout:
-        kind, place, rest = row.rstrip("\n").split(" ", 2) if row.count(" ") > 1 else (*row.split(), "")
-        line = int(place)
-        if kind in {"rapid", "feed", "probe"}:
-            values = tuple(map(float, rest.split()))
-            end = (*values, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) if len(values) == 3 else values
-            yield Canonical(kind, line, file, end, frame.machine(end), None, (), "")  # type: ignore[arg-type]
-        elif kind == "arc":
-            turns, *numbers = map(float, rest.split())
-            first, second, centre1, centre2, third, *more = numbers
-            i, j, k = PLANE_AXES[plane]
-            at, centre = [0.0] * 3, [0.0] * 3
-            at[i], at[j], at[k] = first, second, third
-            centre[i], centre[j], centre[k] = centre1, centre2, third
-            end = _nine((*at, *(more or (0.0,) * 6)))
-            turned = frame.machine(_nine((*centre, *end[3:])))
-            arc = ArcPath(plane, (centre[0], centre[1], centre[2]), turned[:3], int(turns))
-            yield Canonical(kind, line, file, end, frame.machine(end), arc, (), "")
-        elif kind in {"comment", "message"}:
-            yield Canonical(kind, line, file, *nowhere, None, (), rest)
-        elif kind == "file":
-            file = Path(rest).name if rest else ""
-        elif kind == "error":
-            where = f" (in {file})" if file else ""
-            raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {rest}")
-        elif kind == "done":
-            done = True
-        else:
-            values = tuple(map(float, rest.split()))
-            if kind == "plane":
-                plane = int(values[0])
-            frame.take(kind, values)
-            yield Canonical(kind, line, file, *nowhere, None, values, "")
-    code = process.wait()
-    if not done:
-        words = (folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        if code == -24:
-            raise ProgramError(
-                max(line, 1), f"the program takes more than {seconds} s to interpret: has it an endless loop?"
-            )
-        said = words[-1] if words else "it said nothing"
-        if code < 0:
-            raise ProgramError(max(line, 1), f"the interpreter died of signal {-code}: {said}")
-        raise InputError(f"LinuxCNC's interpreter ended with code {code}: {said}")
+    centre = [0.0, 0.0]
+    for records, more in run.blocks():
+        names = {code: kind for kind, code in run.codes.items()}
+        columns = (records[name].tolist() for name in ("kind", "count", "line", "values"))
+        for code, count, line, numbers in zip(*columns, strict=True):
+            kind = names[code]
+            values = tuple(numbers[:count])
+            if kind in {"rapid", "feed", "probe"}:
+                yield Canonical(kind, line, file, values, frame.machine(values), None, (), "")
+            elif kind == "centre":
+                centre[:], turns, plane = values[:2], int(values[2]), int(values[3])
+            elif kind == "arc":
+                i, j, _ = PLANE_AXES[plane]
+                at = list(values)
+                at[i], at[j] = centre
+                about = at[0], at[1], at[2]
+                arc = ArcPath(plane, about, frame.machine(_nine(at))[:3], turns)
+                yield Canonical(kind, line, file, values, frame.machine(values), arc, (), "")
+            elif kind in {"comment", "message"}:
+                yield Canonical(kind, line, file, *nowhere, None, (), more[int(values[0])])
+            elif kind == "file":
+                file = Path(more[int(values[0])]).name
+            elif kind == "curve":
+                yield Canonical(kind, line, file, *nowhere, None, tuple(more[int(values[0])]), "")
+            elif kind != "done":
+                frame.take(kind, values)
+                yield Canonical(kind, line, file, *nowhere, None, values, "")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermocomp.assessment.precompensation import stored
+from thermocomp.assessment.states import stated
 from thermocomp.compensation.nc.following.block import Modal, Setup
 from thermocomp.compensation.nc.following.follower import follow
 from thermocomp.compensation.nc.following.startup import modal, tidy, whole
@@ -93,8 +93,8 @@ def test_the_program_takes_as_long_as_if_it_had_said_it(startup: str) -> None:
 
 
 def test_the_interpreter_starts_as_the_follower() -> None:
-    assert stored(Setup()).startup == "G64 G99"
-    assert stored(Setup(startup="G64 P0.01 G98")).startup == "G64 P0.01 G98"
+    assert stated(Setup()).startup == "G64 G99"
+    assert stated(Setup(startup="G64 P0.01 G98")).startup == "G64 P0.01 G98"
     assert whole(Setup(startup="G61")) == "G61 G99"
     assert whole(Setup(startup="G98")) == "G64 G98"
     assert whole(Setup(controller="fanuc")) == "G64 G98"

@@ -1,0 +1,65 @@
+"""The canonical calls that `_rs274_child.py` tells, and how they stand in its blocks: standard library only."""
+
+import ctypes
+import struct
+from typing import Any
+
+#: what runs comments (py, ...) and ;py,
+PYTHON = "_ZN12PythonPlugin10run_stringEPKcRN5boost6python3api6objectEb"
+#: kind, how many numbers, line, numbers
+RECORD = struct.Struct("<HHi10d")
+
+INT, D, B, P, TEXT = ctypes.c_int, ctypes.c_double, ctypes.c_bool, ctypes.c_void_p, ctypes.c_char_p
+
+
+class Pose(ctypes.Structure):
+    """Offsets X Y Z A B C U V W."""
+
+    _fields_ = (("values", D * 9),)
+
+
+#: canonical functions that are told with their numbers: mangled name -> kind, types
+TOLD: dict[str, tuple[str, tuple[Any, ...]]] = {
+    "_Z13SET_FEED_MODEii": ("feedmode", (INT, INT)),
+    "_Z11SELECT_TOOLi": ("select", (INT,)),
+    "_Z21STOP_SPEED_FEED_SYNCHv": ("unsync", ()),
+    "_Z23START_SPINDLE_CLOCKWISEii": ("m3", (INT, INT)),
+    "_Z30START_SPINDLE_COUNTERCLOCKWISEii": ("m4", (INT, INT)),
+    "_Z20STOP_SPINDLE_TURNINGi": ("m5", (INT,)),
+    "_Z17SET_SPINDLE_SPEEDid": ("speed", (INT, D)),
+    "_Z16SET_SPINDLE_MODEid": ("speedmode", (INT, D)),
+    "_Z14ORIENT_SPINDLEidi": ("orient", (INT, D, INT)),
+    "_Z28WAIT_SPINDLE_ORIENT_COMPLETEid": ("oriented", (INT, D)),
+    "_Z12PROGRAM_STOPv": ("m0", ()),
+    "_Z21OPTIONAL_PROGRAM_STOPv": ("m1", ()),
+    "_Z14PALLET_SHUTTLEv": ("pallet", ()),
+    "_Z11PROGRAM_ENDv": ("end", ()),
+    "_Z7MIST_ONv": ("mist", ()),
+    "_Z8FLOOD_ONv": ("flood", ()),
+    "_Z8MIST_OFFv": ("mistoff", ()),
+    "_Z9FLOOD_OFFv": ("floodoff", ()),
+    "_Z20ENABLE_FEED_OVERRIDEv": ("feedoverride", ()),
+    "_Z21DISABLE_FEED_OVERRIDEv": ("nofeedoverride", ()),
+    "_Z21ENABLE_SPEED_OVERRIDEi": ("speedoverride", (INT,)),
+    "_Z22DISABLE_SPEED_OVERRIDEi": ("nospeedoverride", (INT,)),
+    "_Z20ENABLE_ADAPTIVE_FEEDv": ("adaptive", ()),
+    "_Z21DISABLE_ADAPTIVE_FEEDv": ("noadaptive", ()),
+    "_Z16ENABLE_FEED_HOLDv": ("feedhold", ()),
+    "_Z17DISABLE_FEED_HOLDv": ("nofeedhold", ()),
+    "_Z21SET_MOTION_OUTPUT_BITi": ("m62", (INT,)),
+    "_Z23CLEAR_MOTION_OUTPUT_BITi": ("m63", (INT,)),
+    "_Z18SET_AUX_OUTPUT_BITi": ("m64", (INT,)),
+    "_Z20CLEAR_AUX_OUTPUT_BITi": ("m65", (INT,)),
+    "_Z23SET_MOTION_OUTPUT_VALUEid": ("m67", (INT, D)),
+    "_Z20SET_AUX_OUTPUT_VALUEid": ("m68", (INT, D)),
+}
+
+
+MOVES = ("rapid", "feed", "probe", "arc")
+OTHERS = (
+    "centre", "curve", "tap", "g5x", "g92", "rotation", "length", "plane", "unit", "feedrate", "sync", "dwell",
+    "change",
+    "toolnumber", "tooltable", "wait", "path", "naive", "user", "comment", "message", "file", "error", "done",
+)  # fmt: skip
+KINDS = (*MOVES, *OTHERS, *(kind for kind, _ in TOLD.values()))
+CODES = {kind: code for code, kind in enumerate(KINDS)}

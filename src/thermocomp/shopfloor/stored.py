@@ -1,0 +1,104 @@
+"""What is stored in a controller and not in the program; and controllers that have nothing in common."""
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+HIGHEST_TOOL = 1000
+#: work coordinate systems, G54 to G59.3
+SYSTEMS = range(1, 10)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What is stored in the controller and not in the program.
+
+    Parameters
+    ----------
+    origins : dict of int to sequence of float
+        Of the work coordinate systems, 1 (G54) to 9 (G59.3), X to W [mm, deg]; the others are 0.
+    rotations : dict of int to float
+        Of the work coordinate systems about Z [deg].
+    shift : sequence of float
+        G92 offset in force, X to W [mm, deg].
+    lengths, diameters : dict of int to float
+        Of the tools [mm]; all tools up to 1000 are there, those that are not named with 0.
+    active_length : float
+        Tool length offset in force at the start [mm].
+    spindle : int
+        Number of the tool in the spindle at the start; 0: none.
+    home28, home30 : sequence of float
+        Where G28 and G30 go, X to W [mm, deg].
+    startup : str
+        Codes in force at the start that no program's end puts back, such as ``G64 P0.01 G98`` (mm).
+    start : sequence of float or None
+        Machine coordinates at the start, X to W [mm, deg]; None: the origin of the first work coordinate system.
+    parameters : dict of int to float
+        Others, such as ``#100``.
+    """
+
+    origins: Mapping[int, Sequence[float]] = field(default_factory=dict)
+    rotations: Mapping[int, float] = field(default_factory=dict)
+    shift: Sequence[float] = ()
+    lengths: Mapping[int, float] = field(default_factory=dict)
+    diameters: Mapping[int, float] = field(default_factory=dict)
+    active_length: float = 0.0
+    spindle: int = 0
+    home28: Sequence[float] = ()
+    home30: Sequence[float] = ()
+    startup: str = "G64 G98"
+    start: Sequence[float] | None = None
+    parameters: Mapping[int, float] = field(default_factory=dict)
+
+    def numbers(self) -> dict[int, float]:
+        """Return all parameters as the controller keeps them."""
+        result = dict(self.parameters)
+        result |= {5161 + i: value for i, value in enumerate(self.home28)}
+        result |= {5181 + i: value for i, value in enumerate(self.home30)}
+        result |= {5211 + i: value for i, value in enumerate(self.shift)}
+        result[5210] = float(any(self.shift))
+        for system, origin in self.origins.items():
+            result |= {5201 + 20 * system + i: value for i, value in enumerate(origin)}
+        result |= {5210 + 20 * system: angle for system, angle in self.rotations.items()}
+        return result
+
+
+@lru_cache(64)
+def drawn(seed: int, startup: str = "") -> Stored:
+    """Return a controller that has nothing else in common with that of another seed.
+
+    Parameters
+    ----------
+    seed : int
+        Its parity tells of G98 (even) or G99, where `startup` does not.
+    startup : str
+        Codes in force at the start that are stated.
+
+    Returns
+    -------
+    Stored
+        Origins and homes within 300 mm, rotations within 20 degrees, a G92 shift within 10 mm, tools of 20 to 200 mm.
+    """
+    chance = random.Random(seed)
+
+    def some(count: int, most: float = 300.0) -> tuple[float, ...]:
+        return tuple(round(chance.uniform(-most, most), 6) for _ in range(count))
+
+    codes = [startup]
+    codes += [f"G64 P0.{seed}"] * ("G6" not in startup) + [f"G9{8 + seed % 2}"] * ("G9" not in startup)
+    tools = range(1, HIGHEST_TOOL)
+    return Stored(
+        origins={system: some(9) for system in SYSTEMS},
+        rotations={system: some(1, 20.0)[0] for system in SYSTEMS},
+        shift=some(9, 10.0),
+        lengths={tool: round(chance.uniform(20.0, 200.0), 6) for tool in tools},
+        diameters={tool: round(chance.uniform(0.001, 0.1), 6) for tool in tools},
+        active_length=round(chance.uniform(20.0, 200.0), 6),
+        spindle=HIGHEST_TOOL - seed,
+        home28=some(9),
+        home30=some(9),
+        startup=" ".join(codes),
+        start=some(9),
+        parameters=dict(zip(range(31, 5001), some(4970, 1000.0), strict=True)),
+    )
