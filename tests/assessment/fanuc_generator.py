@@ -68,9 +68,8 @@ class _Post:
         if self.chance.random() < 0.2:
             self.add(f"{back} {code} {words} {self.one('K0', 'L0')}")
         elif self.chance.random() < 0.15:
-            self.add(
-                f"G91 {back} {code} X{self.some(5, 9)} Z{self.some(-9, -6)} R-1.{extra} F100. K{self.chance.randint(1, 4)}"
-            )
+            times = self.chance.randint(1, 4)
+            self.add(f"G91 {back} {code} X{self.some(5, 9)} Z{self.some(-9, -6)} R-1.{extra} F100. K{times}")
             self.add(f"Y{self.some(3, 9)}", "G80", "G90")
             return
         else:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from thermocomp import __version__
+from thermocomp.assessment.fanucproof import prove_fanuc
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
 from thermocomp.cli import reviseheader
 from thermocomp.cli.progress import Share, by_share
@@ -16,7 +17,6 @@ from thermocomp.cli.reviseexpand import written_out
 from thermocomp.cli.revisetravel import Travel
 from thermocomp.cli.shown import shown
 from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.following.block import Setup
 from thermocomp.compensation.nc.reading.tokens import program_lines
 from thermocomp.compensation.nc.revising import diff, header
 from thermocomp.compensation.nc.revising.course import Bound, Course, Run
@@ -119,10 +119,8 @@ class Done(NamedTuple):
     proving: float  #: for the proof
 
 
-def unprovable(setup: Setup) -> str:
-    """Return why no program for a controller can be proved here; empty if they can."""
-    if setup.controller != "linuxcnc":
-        return "a Fanuc program is not LinuxCNC's language"
+def unprovable() -> str:
+    """Return why no program can be proved here; empty if they can."""
     return rs274.installed() or ""
 
 
@@ -287,8 +285,10 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share
             last = line
             tell(line / lines, f"line {line}")
 
+    setup = job.revision.setup
+    judge = prove if setup.controller == "linuxcnc" else prove_fanuc
     try:
-        return prove(original, revised, ledger, job.revision.setup, progress)
+        return judge(original, revised, ledger, setup, progress)
     except ProgramError:
         raise
     except InputError as e:  # whatever it is that keeps the interpreter from judging
