@@ -142,9 +142,12 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
         "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z-1. F300.\nX100. F50.\nG0 Z50.\nM30\n%\n"
     )
     Path("50%.nc").write_bytes(program.replace("\n", "\r\n").encode("ascii"))
+    Path("odd.nc").write_text(
+        program.replace("G0 Z50.\nM30", "G92 Z50.\nG92.1 X0 Y0 Z0\nG52 Z0\nM30"), encoding="ascii"
+    )
     before = set(job_folder.iterdir())
-    assert revise("--controller", "fanuc", program="50%.nc", out="out.nc", proved=True) == 2
-    assert "it cannot be proved: a Fanuc program is not LinuxCNC's language; --unproved writes it" in said(capsys)
+    assert revise("--controller", "fanuc", program="odd.nc", out="out.nc", proved=True) == 2
+    assert "it cannot be proved: line 11 cannot be said in LinuxCNC's words: G92 beside G52" in said(capsys)
     assert set(job_folder.iterdir()) == before
     assert revise("--controller", "fanuc", program="50%.nc", out="out.nc") == 0
     assert "but no interpreter has judged it (--unproved)" in " ".join(capsys.readouterr().out.split())
@@ -157,6 +160,19 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
     words = [w for line in lines[2 + len(header) :] for w in line.split() if w.startswith("Z-")]
     assert words
     assert all(len(w.partition(".")[2]) <= 3 for w in words)
+
+
+@pytest.mark.usefixtures("interpreter")
+def test_a_fanuc_program_is_proved(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program = (
+        "%\nO1234\nG21 G90 G17 G94\nG0 G91 G28 Z0.\nT1 M6\nS4000 M3\nG90 G0 G54 X0. Y0.\nG43 H1 Z50.\nG1 Z0. F30.\n"
+        "M98 P100 L2\nG90 G0 Z50.\nM30\nO100\nG91 Z-1.\nG90 X100.\nX0.\nM99\n%\n"
+    )
+    Path("part.nc").write_text(program, encoding="ascii")
+    assert revise("--controller", "fanuc", "--expand", program="part.nc", out="out.nc", proved=True) == 0
+    assert "in 8 controller states" in " ".join(capsys.readouterr().out.split())
+    assert "UNPROVED" not in Path("out.nc").read_text("ascii")
+    assert "IN 8 CONTROLLER STATES" in Path("out.nc").read_text("ascii")
 
 
 def test_a_fanuc_program_is_written_out(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

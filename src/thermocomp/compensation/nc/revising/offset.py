@@ -82,7 +82,7 @@ class Offset(Method):
             and modal.absolute
             and bool(block.moves)
             and not modal.cutter
-            and not modal.turned
+            and not (modal.turned or "G69" in block.codes)  # G52 would come before G69
             and not block.line.optional
             and bool(self.named(block))
             and not self.stands(block)
