@@ -6,7 +6,7 @@ import pytest
 from fanuc_generator import program
 from test_fanuc_programs import PROGRAMS, REFUSED, SETUP, Trial, revise
 
-from thermocomp.assessment.fanucproof import prove_fanuc
+from thermocomp.assessment.precompensation import prove
 from thermocomp.core.exceptions import InputError, ProgramError, Unprovable
 
 #: why a random program is refused
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("interpreter")
 
 def proved(trial: Trial, seen: list[int] | None = None) -> tuple[int, int]:
     lines: list[int] = []
-    proof = prove_fanuc(trial.original, trial.revised, trial.ledger, SETUP, lines.append)
+    proof = prove(trial.original, trial.revised, trial.ledger, SETUP, lines.append)
     if seen is not None:
         seen += lines
     assert proof.largest < 0.1
@@ -123,6 +123,6 @@ def test_what_cannot_be_said_cannot_be_proved(tmp_path: Path) -> None:
     path = tmp_path / "program.nc"
     path.write_text("G21 G90 S1 M3\nG92 X0. Y0. Z5.\nG0 X1. Y1. Z5.\nG92.1 X0. Y0. Z0.\nG52 X1.\nM30\n", "ascii")
     trial = revise(path, tmp_path, "coordinates")
-    with pytest.raises(Unprovable, match=r"line 5 cannot be said in LinuxCNC's words: G92 beside G52 or G68"):
+    with pytest.raises(Unprovable, match=r"cannot be said in LinuxCNC's words: line 5: G92 beside G52 or G68"):
         proved(trial)
     assert issubclass(Unprovable, InputError)

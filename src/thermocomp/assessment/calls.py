@@ -27,19 +27,37 @@ _SPINDLE = ("feedmode", "sync", "unsync", "speed")
 
 @dataclass
 class Calls:
-    """Columns, an entry per call."""
+    """Columns, an entry per call.
+
+    Parameters
+    ----------
+    kind, line, raw : array of int
+        Code of the kind; line of the original; line of the program that was run.
+    values : array, calls x 10
+        Numbers; of a curve or a tap the first one is its place in `Side.curves`.
+    start, end : array, calls x 9
+        Of moves: machine coordinates [mm, deg].
+    centre : array, calls x 2
+        Of arcs: machine coordinates in their plane [mm].
+    plane, turns : array of int
+        Of arcs: 17, 18, 19; positive anticlockwise.
+    sweep : array
+        Of arcs [rad].
+    seconds : array
+        How long a move in feed takes [s].
+    """
 
     kind: Integers
-    line: Integers  #: of the original
-    raw: Integers  #: of the program that was run
-    values: Floats  #: x 10; of a curve the number of its points in `Side.curves`
-    start: Floats  #: x 9; machine coordinates [mm, deg]
-    end: Floats  #: x 9
-    centre: Floats  #: x 2; of arcs, machine coordinates in their plane [mm]
+    line: Integers
+    raw: Integers
+    values: Floats
+    start: Floats
+    end: Floats
+    centre: Floats
     plane: Integers
     turns: Integers
-    sweep: Floats  #: of arcs [rad]
-    seconds: Floats  #: in feed
+    sweep: Floats
+    seconds: Floats
 
     def __len__(self) -> int:
         return len(self.kind)

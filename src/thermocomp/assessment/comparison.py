@@ -38,7 +38,15 @@ class _Check(NamedTuple):
     say: Callable[[int], str]
 
 
-def compare(first: Run, second: Run, ledger: Ledger, progress: Callable[[int], object]) -> Found:
+class Lines(NamedTuple):
+    """Where the lines of both programs, as the interpreter has them, come from: lines of the original."""
+
+    first: Callable[[Integers], Integers]  #: of the original, or of its translation
+    second: Callable[[Integers], Integers]  #: of the revised program, or of its translation
+    divided: bool = True  #: a line that has become several may have divided its move
+
+
+def compare(first: Run, second: Run, ledger: Ledger, origin: Lines, progress: Callable[[int], object]) -> Found:
     """Run the next job of both programs, side by side, and compare what they do.
 
     Parameters
@@ -47,6 +55,7 @@ def compare(first: Run, second: Run, ledger: Ledger, progress: Callable[[int], o
         Of the original, and of the revised program.
     ledger : Ledger
         What the lines of the original should be shifted by.
+    origin : Lines
     progress : callable
         Told lines of the original.
 
@@ -65,7 +74,7 @@ def compare(first: Run, second: Run, ledger: Ledger, progress: Callable[[int], o
     def drop(lines: Integers) -> Mask:
         return ledger.of(lines).inverse
 
-    sides = Side(first, lambda lines: lines, drop), Side(second, ledger.originals, drop)
+    sides = Side(first, origin.first, drop), Side(second, origin.second, drop)
     was, now = _run(sides[0]), sides[1].chunks()
     comparison = _Comparison(*sides, ledger)
     a: Calls | None = None
@@ -73,11 +82,11 @@ def compare(first: Run, second: Run, ledger: Ledger, progress: Callable[[int], o
     while True:
         a = next(was, None) if a is None else a
         try:
-            b = _joined(next(now, None), sides[1]) if b is None else b
+            b = _joined(next(now, None), sides[1], divided=origin.divided) if b is None else b
         except ProgramError as e:
             for _ in was:  # a program that is refused itself says nothing of its revision
                 pass
-            line = int(ledger.originals(np.array([e.line]))[0])
+            line = int(origin.second(np.array([e.line]))[0])
             raise ProgramError(line, f"it does not run the revised program: {e.reason}") from e
         if a is None or b is None:
             break
@@ -96,16 +105,16 @@ def _run(side: Side) -> Iterator[Calls]:
     try:
         yield from side.chunks()
     except ProgramError as e:
-        raise RefusedError(e.line, e.reason) from e
+        raise RefusedError(int(side.original(np.array([e.line]))[0]), e.reason) from e
 
 
-def _joined(calls: Calls | None, side: Side) -> "_Joined | None":
+def _joined(calls: Calls | None, side: Side, *, divided: bool) -> "_Joined | None":
     """Return calls with the pieces of moves that were divided as one, and the pieces."""
     if calls is None:
         return None
     same = (calls.kind[1:] == calls.kind[:-1]) & (calls.line[1:] == calls.line[:-1]) & (calls.raw[1:] > calls.raw[:-1])
     same &= side.is_kind(calls.kind[1:], "rapid", "feed", "arc")
-    if not same.any():
+    if not (divided and same.any()):
         return _Joined(calls, None)
     begins = np.concatenate(([True], ~same))
     ends = np.concatenate((~same, [True]))

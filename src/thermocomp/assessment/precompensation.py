@@ -3,14 +3,20 @@
 It is run in eight stored controllers: what is stated is the same in all of them, what is not is drawn.
 """
 
+from array import array
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+import numpy as np
+
 from thermocomp.assessment import states
-from thermocomp.assessment.comparison import Found, RefusedError, compare
-from thermocomp.assessment.ledger import Ledger, Shift
+from thermocomp.assessment.comparison import Found, Lines, RefusedError, compare
+from thermocomp.assessment.ledger import Integers, Ledger, Shift
+from thermocomp.assessment.translation import Translator, UntranslatableError
 from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.reading.tokens import program_lines
 from thermocomp.core.exceptions import ProgramError, Unprovable
 from thermocomp.shopfloor import rs274
 from thermocomp.shopfloor.rs274process import Job, Run
@@ -45,6 +51,7 @@ class _Proving(NamedTuple):
     revised: Path
     ledger: Ledger
     setup: Setup
+    origin: Lines
 
     def run(
         self, wanted: Sequence[tuple[int, set[str]]], progress: Callable[[int], object] = lambda _: None
@@ -60,7 +67,7 @@ class _Proving(NamedTuple):
                 def told(line: int, number: int = number) -> None:
                     progress((line + number * self.ledger.lines) // states.STATES)
 
-                yield compare(first, second, self.ledger, told)
+                yield compare(first, second, self.ledger, self.origin, told)
 
     def fails(self, number: int, drawn: set[str]) -> bool:
         """Return whether they fail in a state as they have failed before."""
@@ -92,7 +99,8 @@ def prove(
 
     Every move has to be that of the original, shifted by what its line should carry, within 0.1 um, and has to take as
     long, within 2 % or 5 ms; where the original moves no linear axis none may move. All else that the interpreter tells
-    (feeds, speeds, tools, dwells ...) has to be the same. A move may be divided: then its pieces lie on its way.
+    (feeds, speeds, tools, dwells ...) has to be the same. A move may be divided: then its pieces lie on its way. A
+    Fanuc's programs are said in LinuxCNC's words first.
 
     Parameters
     ----------
@@ -115,11 +123,55 @@ def prove(
         A move is not where it should be, or the interpreter refuses the revised program: a fault of thermocomp, or it
         depends on something that is stored in the controller and has not been stated.
     Unprovable
-        The interpreter refuses the original, or it is not installed.
+        The interpreter refuses the original, or it is not installed; what a Fanuc does LinuxCNC does otherwise.
     """
     if (reason := rs274.installed()) is not None:
         raise Unprovable(reason)
-    proving = _Proving(original, revised, ledger, setup)
+    if setup.controller == "linuxcnc":
+        return _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
+    with TemporaryDirectory(prefix="translation-") as folder:
+        try:
+            first = _Translated.of(original, Path(folder) / "original.ngc", setup)
+            second = _Translated.of(revised, Path(folder) / "revised.ngc", setup)
+        except UntranslatableError as e:
+            raise Unprovable(f"it cannot be said in LinuxCNC's words: {e}") from e
+        origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
+        return _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
+
+
+def _same(lines: Integers) -> Integers:
+    return lines
+
+
+class _Translated(NamedTuple):
+    """A Fanuc's program in LinuxCNC's words."""
+
+    path: Path
+    setup: Setup
+    sources: "array[int]"  #: line of the program, by line of the translation
+
+    @classmethod
+    def of(cls, program: Path, path: Path, setup: Setup) -> "_Translated":
+        """Write the translation of a program."""
+        translator, sources = Translator(setup), array("i")
+        with (
+            program.open(encoding="latin-1", newline="") as texts,
+            path.open("w", encoding="latin-1", newline="") as written,
+        ):
+            for text, source in translator.translate(program_lines(texts)):
+                written.write(text)
+                sources.append(source)
+        return cls(path, translator.setup(), sources)
+
+    def lines(self, lines: Integers) -> Integers:
+        """Return the lines of the program that lines of the translation come from."""
+        found = np.frombuffer(self.sources, np.intc).astype(int)
+        return np.where(lines > 0, found[np.clip(lines, 1, len(found)) - 1], 0)
+
+
+def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
+    """Run both programs in all states."""
+    setup = proving.setup
     drawn = set(states.free(setup))
     found: list[Found] = []
     wanted = [(number, set(drawn)) for number in range(states.STATES)]

@@ -24,7 +24,7 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
         "tool lengths": "state them, such as --tool '1=120 mm'",
         "homes": "state it: --home '0 mm, 0 mm, 0 mm'; G30 cannot be stated",
         "start": "position all axes before",
-        "unit": "write G20 or G21 at the top, or state it: --unit",
+        "unit": "write G20 or G21 at the top, or state it: --units",
         "optional lines": "say whether they are run: --block-delete",
         "tool diameters": "expand the program for its tools: --expand",
         "parameters": "give them a value in the program",

@@ -147,5 +147,5 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
         raise InputError(
             "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
         )
-    if not way.unproved and (reason := reviserun.unprovable()):
+    if not way.unproved and (reason := rs274.installed()):
         raise InputError(f"it cannot be proved: {reason}; {reviserun.ALL_THE_SAME}")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from thermocomp import __version__
-from thermocomp.assessment.fanucproof import prove_fanuc
 from thermocomp.assessment.precompensation import Ledger, Proof, prove
 from thermocomp.cli import reviseheader
 from thermocomp.cli.progress import Share, by_share
@@ -25,7 +24,6 @@ from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import scratch
-from thermocomp.shopfloor import rs274
 
 #: what a program that cannot be proved is refused with
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
@@ -117,11 +115,6 @@ class Done(NamedTuple):
     proof: Proof | None  #: None: the interpreter has not judged it
     seconds: float  #: for the revision
     proving: float  #: for the proof
-
-
-def unprovable() -> str:
-    """Return why no program can be proved here; empty if they can."""
-    return rs274.installed() or ""
 
 
 def revise(job: Job, *, hidden: bool) -> Done:
@@ -285,10 +278,8 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share
             last = line
             tell(line / lines, f"line {line}")
 
-    setup = job.revision.setup
-    judge = prove if setup.controller == "linuxcnc" else prove_fanuc
     try:
-        return judge(original, revised, ledger, setup, progress)
+        return prove(original, revised, ledger, job.revision.setup, progress)
     except ProgramError:
         raise
     except InputError as e:  # whatever it is that keeps the interpreter from judging

@@ -91,6 +91,7 @@ def local(state: State, orders: Orders, block: Block) -> None:
         state.rezeroed.add(letter)
         if code == "G92":
             state.rotary[letter] = orders.values[letter]
+        state.turned_to()
     if code == "G92":
         offsets.name_place(state.place, values, state.known)
         still = _LENGTH_CERTAIN
@@ -118,7 +119,9 @@ def g10(state: State, orders: Orders, block: Block) -> None:
 
 
 def _origin(state: State, orders: Orders, block: Block, kind: int, number: int) -> None:
-    state.rezeroed |= ROTARY & orders.values.keys()
+    if anew := ROTARY & orders.values.keys():
+        state.rezeroed |= anew
+        state.turned_to()
     offsets = state.offsets
     values = state.axis_values(orders)
     if state.fanuc:

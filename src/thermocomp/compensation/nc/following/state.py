@@ -13,7 +13,6 @@ from thermocomp.compensation.nc.following.orders import Orders
 
 MM: Final = 25.4  # per inch
 _TRUE: Known = (True, True, True)
-_NONE: Final[dict[str, float]] = {}
 
 
 class State:
@@ -37,6 +36,7 @@ class State:
         self.known: Known = (False, False, False)
         self.rotary: dict[str, float] = dict.fromkeys(ROTARY, 0.0)
         self.rezeroed: set[str] = set()  # rotary axes that have got another zero
+        self.turned: dict[str, float] = {}
         self.feed = 0.0
         self.feed_word = 0.0
         self.spindle: float | None = setup.speed or None
@@ -127,13 +127,10 @@ class State:
         z += values.get("Z", 0.0) * scale
         return (x, y, z), self.known
 
-    @property
-    def turned(self) -> dict[str, float]:
-        """Rotary axes that are not at 0 [deg]; nan: they have got another zero."""
-        if not (self.rezeroed or any(self.rotary.values())):
-            return _NONE
+    def turned_to(self) -> None:
+        """Note which rotary axes are not at 0 [deg]; nan: they have got another zero."""
         at = self.rotary | dict.fromkeys(self.rezeroed, math.nan)
-        return {letter: angle for letter, angle in at.items() if angle % 360.0}
+        self.turned = {letter: angle for letter, angle in at.items() if angle % 360.0}
 
     def turn(self, orders: Orders) -> float:
         """Move the rotary axes; return how far they go [deg]."""
@@ -143,6 +140,8 @@ class State:
             step = value - self.rotary[letter] if self.modal.absolute else value
             self.rotary[letter] += step
             way = math.hypot(way, step)
+        if way:
+            self.turned_to()
         return way
 
     def reach(self, place: Point, known: Known) -> None:

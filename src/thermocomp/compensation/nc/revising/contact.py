@@ -42,8 +42,10 @@ class Contact:
     def most(self, block: Block, axis: int) -> float:
         """Return by how much the correction of an axis may change in a block [um]."""
         rapid = not block.moves or block.moves[-1].rapid
-        if (rapid and (not self.touching or self._lifts(block))) or self._above(block):
+        if (rapid and not self.touching) or self._above(block):
             return math.inf
+        if rapid and self._lifts(block) and (axis == 2 or block.modal.plane != 17):
+            return math.inf  # along a wall it goes up, and nowhere else
         if not self.touching and abs(block.end[axis] - block.start[axis]) > CLEAR:
             return math.inf  # it comes down
         spread = self._length / SPREAD

@@ -11,6 +11,7 @@ from thermocomp.compensation.nc.revising.text import LONGEST, Digits, parted
 from thermocomp.core.exceptions import ProgramError
 
 AXES = "XYZ"
+ALL: Known = (True, True, True)
 #: shorter ways are none: F counts degrees then, if rotary axes turn [mm]
 STILL = 1e-7
 
@@ -85,7 +86,7 @@ class Method(ABC):
             self.doubt_all()
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
             texts = (*texts[:-1], *parted(texts[-1]))
-        placed = all(self.before) or all(self.before[i] for i in self.named(block))
+        placed = self.before == ALL or all(self.before[i] for i in self.named(block))
         self.before = block.known
         other = None
         if any(self.doubtful):
@@ -137,6 +138,10 @@ class Method(ABC):
         """
         if block.kind != "line":
             return False
+        a, b = block.start, block.end
+        moves = abs(b[0] - a[0]) > STILL or abs(b[1] - a[1]) > STILL or abs(b[2] - a[2]) > STILL
+        if moves and ROTARY.isdisjoint(block.words):
+            return False
         unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
         if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
             raise ProgramError(
@@ -144,7 +149,7 @@ class Method(ABC):
                 f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
                 f"counts degrees: position {' '.join(unknown)} by a rapid before",
             )
-        return not unknown and all(abs(b - a) <= STILL for a, b in zip(block.start, block.end, strict=True))
+        return not unknown and not moves
 
     def frame(self, block: Block) -> Frame:
         """Return how corrections stand in the words of a block."""

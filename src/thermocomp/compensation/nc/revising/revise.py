@@ -229,7 +229,7 @@ class Revision:
                     cut,
                     change.other,
                     change.placed,
-                    bow([carried for _, carried in knots]),
+                    bow([carried for _, carried in knots]) if len(knots) > 2 else 0.0,
                 )
             )
         if not headed:
@@ -257,20 +257,22 @@ class Revision:
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
         """Return what becomes of a block, and what the axes carry where on its way."""
         method = self.method
-        parts, known_before, begun = [1.0], method.before, method.carried
+        before, begun = method.before, method.carried
+        parts = [1.0]
         if len(samples) > 2 and samples[1].demand is not None:
-            axes = axes_to_split(block, known_before)
+            axes = axes_to_split(block, before)
             parts = shares(samples, begun, axes, method.step, length(block.moves[0]))
-        blocks = [block] if len(parts) == 1 else pieces(block, parts, known_before, self.setup.controller)
+        if len(parts) == 1:
+            change = method.revise(block, samples[-1].demand or begun)
+            check.check(block, change)
+            return change, [(0.0, begun), (1.0, change.after)]
         demands = {s.share: s.demand for s in samples}
         changes = []
-        for piece, share in zip(blocks, parts, strict=True):
+        for piece, share in zip(pieces(block, parts, before, self.setup.controller), parts, strict=True):
             change = method.revise(piece, demands[share] or begun)
             check.check(piece, change)
             changes.append(change)
         knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
-        if len(changes) == 1:
-            return changes[0], knots
         texts = tuple(text for c in changes for text in c.texts)
         return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other, changes[0].placed), knots
 
