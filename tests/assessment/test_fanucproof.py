@@ -10,7 +10,7 @@ from thermocomp.assessment.precompensation import prove
 from thermocomp.core.exceptions import InputError, ProgramError, Unprovable
 
 #: why a random program is refused
-FOR_A_REASON = ("uses the offset that the correction is put in", "has not been positioned", "no thermal drift any more")
+FOR_A_REASON = ("uses the offset that the correction is put in", "has not been positioned", "is no thermal drift")
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

@@ -1,6 +1,7 @@
 """Subprograms, macros and loops of a Fanuc written out, judged by LinuxCNC running the equal program with O-words."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -280,6 +281,7 @@ def test_the_programs_that_come_with_the_tests() -> None:
         out = "".join(line for line, _ in written(text))
         acts = any(mark in text for mark in ("M98", "M97", "G65", "#"))
         assert (out == text) == (not acts)
-        assert not any(mark in out for mark in ("M98", "M97", "G65 P", "M99", "WHILE", "GOTO"))
+        code = re.sub(r"\([^)]*\)", "", out)
+        assert not any(mark in code for mark in ("M98", "M97", "G65 P", "M99", "WHILE", "GOTO"))
         plain += not acts
     assert plain > 15
