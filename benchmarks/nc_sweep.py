@@ -2,12 +2,14 @@
 
 Run with ``python benchmarks/nc_sweep.py --programs 2000 --seed 1``. Each seed gives one program, which is revised by
 both methods, for Z alone or for X, Y and Z. The judge (`tests/compensation/nc/state_judge.py`) knows nothing of what
-the revision wanted. Printed are the counts, and why programs were refused; a wrong one is written with what is wrong
-into the folder of ``--wrong``. An interrupted sweep goes on with another ``--seed``.
+the revision wanted. Printed are the counts, and why programs were refused. The folder of ``--found`` gets what was
+found, and what is wrong with both programs; a sweep that was interrupted goes on with what is there.
 """
 
 import argparse
+import json
 import sys
+from dataclasses import asdict, replace
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1] / "tests"
@@ -24,20 +26,34 @@ def main() -> int:
     parser.add_argument("--programs", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1, help="of the first program")
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--wrong", type=Path, default=Path("sweep-wrong"), help="folder for wrong programs")
+    parser.add_argument("--found", type=Path, default=Path("sweep-found"), help="folder for what is found")
+    parser.add_argument("--no-proof", action="store_true", help="the judge alone, in half the time")
     options = parser.parse_args()
-    outcomes: list[Outcome] = []
-    for outcome in sweep(range(options.seed, options.seed + options.programs), options.processes):
-        if outcome.kind in ("wrong", "report"):
-            outcome.write(options.wrong)
-            print(f"seed {outcome.seed} {outcome.way} {outcome.axes}: {outcome.reasons[0]}", flush=True)
-        if not outcomes or outcome.seed != outcomes[-1].seed:
+    options.found.mkdir(parents=True, exist_ok=True)
+    log = options.found / "outcomes.jsonl"
+    wanted = range(options.seed, options.seed + options.programs)
+    outcomes = [o for o in _read(log) if o.seed in wanted]
+    done = {o.seed for o in outcomes}
+    with log.open("a", encoding="utf-8") as out:
+        for outcome in sweep([seed for seed in wanted if seed not in done], options.processes, not options.no_proof):
+            if outcome.kind in ("wrong", "report"):
+                outcome.write(options.found)
+                print(f"seed {outcome.seed} {outcome.way} {outcome.axes}: {outcome.reasons[0]}", flush=True)
+            outcomes.append(replace(outcome, original="", revised="", reasons=outcome.reasons[:20]))
+            print(json.dumps(asdict(outcomes[-1])), file=out, flush=True)
             print(f"\rseed {outcome.seed}", end="", file=sys.stderr, flush=True)
-        outcomes.append(outcome)
     counts = Counts(outcomes)
     print(f"\n{counts}")
     wrong = any(counts.of(way, kind) for way in ("coordinates", "offset") for kind in ("wrong", "report"))
     return int(wrong or counts.refused("coordinates") > GOAL)
+
+
+def _read(log: Path) -> list[Outcome]:
+    """Return what was found before; a program that was interrupted between its two methods is not there."""
+    if not log.exists():
+        return []
+    found = [Outcome(**json.loads(row)) for row in log.read_text(encoding="utf-8").splitlines() if row.endswith("}")]
+    return [o for o in found if o.way == "" or sum(p.seed == o.seed for p in found) >= 2]
 
 
 if __name__ == "__main__":

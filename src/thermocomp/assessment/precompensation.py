@@ -134,9 +134,10 @@ def prove(
             first = _Translated.of(original, Path(folder) / "original.ngc", setup)
             second = _Translated.of(revised, Path(folder) / "revised.ngc", setup)
         except UntranslatableError as e:
-            raise Unprovable(f"it cannot be said in LinuxCNC's words: {e}") from e
+            raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
         origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
-        return _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
+        proof = _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
+        return proof._replace(held=("what it is in LinuxCNC's words", *proof.held))
 
 
 def _same(lines: Integers) -> Integers:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from thermocomp.compensation.nc.following.block import PLANES, Block, Point, Setup
+from thermocomp.compensation.nc.following.block import PLANES, Block, Point, Setup, system_name
 from thermocomp.compensation.nc.following.codes import CYCLES
 from thermocomp.compensation.nc.following.cycles import KEPT
 from thermocomp.compensation.nc.following.follower import Follower
@@ -213,7 +213,7 @@ class Translator:
             if len(self.systems) == len(_SPARE):
                 raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
             self.systems[system] = _SPARE[len(self.systems)]
-        return [_name(self.systems[system])]
+        return [system_name(self.systems[system])]
 
     def _speeds(self, block: Block, codes: set[str]) -> list[str]:
         """F, S, T; F once more behind G94, which a Fanuc keeps and LinuxCNC forgets."""
@@ -334,10 +334,6 @@ def number(value: float) -> str:
 
 def _words(values: dict[str, float], letters: str) -> str:
     return " ".join(f"{letter}{number(values[letter])}" for letter in letters if letter in values)
-
-
-def _name(system: int) -> str:
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
 
 
 def _cannot(block: Block, why: str) -> UntranslatableError:

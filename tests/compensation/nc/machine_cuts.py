@@ -42,6 +42,23 @@ def pass_at_depth(w: Writer) -> None:
     w.rapid(Z=w.clear)
 
 
+def flat(w: Writer) -> None:
+    """Cut in X and Y where the program does not say where Z is."""
+    draw = w.draw
+    w.put(draw.choice(("M0", "G53 G0 Z0", "M1")))
+    w.lost(*"XYZ")
+    w.motion = ""
+    x, y = w.spot()
+    w.rapid(X=x, Y=y)
+    w.feed(f=1200, X=x + 40.0)
+    if w.maybe(0.6):
+        w.arc("G3", (0.0, 10.0), X=x + 50.0, Y=y + 10.0)
+    w.feed(Y=y + 60.0)
+    if w.rotary and w.maybe(0.3):
+        w.feed(f=900, **{w.rotary[0]: draw.uniform(-90, 90)})
+    w.rapid(Z=w.clear)
+
+
 def planes(w: Writer) -> None:
     """Arcs in all planes: half and full circles, by centre and by radius, with a helix."""
     draw = w.draw
@@ -182,7 +199,7 @@ def parameters(w: Writer) -> None:
     w.put(f"#1={w.number(x)}")
     w.put(f"#2=[#1+{w.number(20)}]")
     w.put(f"G0 X#1 Y{w.number(y)}")
-    w.put(f"G1 Z[0-#<depth>] F{w.feedrate(300)}")
+    w.put(f"G1 Z{draw.choice(('[0-#<depth>]', '-#<depth>', '[-1*#<depth>]'))} F{w.feedrate(300)}")
     w.put(f"X[#2] F[{w.feedrate(100)}*4]")
     w.put(f"Y[{w.number(y)}+10/2]" if not w.inch else f"Y{w.number(y)}")
     w.put(f"G0 Z[#<depth>+{w.number(w.clear)}]")

@@ -55,6 +55,8 @@ def _holes(w: Writer, x: float, y: float, level: str, habit: str) -> tuple[float
         place = f"X{w.number(x)} Y{w.number(y)}"
         if k and not w.repeat and w.maybe(0.5):
             place, y = f"X{w.number(x)}", w.at["Y"] or y
+        if k and not w.repeat and w.maybe(0.1):
+            place += f" Z{w.number(depth - 1.0)}"
         told = level if k == 0 else ""
         if (habit == "99 then 98" and k == holes - 1) or (habit == "mixed" and k and w.maybe(0.5)):
             told = "G98"
@@ -99,6 +101,11 @@ def steps(w: Writer) -> None:
         w.by("G1", f=300, Z=-2.0)
         for _ in range(draw.randint(1, 4)):
             w.by("G1", f=draw.choice((None, 600)), X=draw.uniform(-20, 20), Y=draw.choice((None, 5.0)))
+            if w.rotary and w.maybe(0.5):
+                still = {"X": 0.0, "Y": 0.0, "Z": 0.0} if w.repeat else {}
+                w.by(draw.choice(("G1", "G1", "G0")), f=1440, **still, **{w.rotary[0]: draw.choice((90.0, -45.0))})
+            elif w.maybe(0.15):
+                w.put(draw.choice(("M0", "M1")))
         w.by("G0", Z=w.clear + 1.0)
     elif kind == 1:
         w.by("G1", f=500, Z=-1.5)

@@ -99,6 +99,9 @@ def systems(w: Writer) -> None:
     if w.maybe(0.35):
         axes = draw.choice(("XYZ", "XY", "Z"))
         words = " ".join(f"{a}{w.number(draw.uniform(-90, 90))}" for a in axes)
+        if w.rotary and w.maybe(0.2):
+            words += f" {w.rotary[0]}10"
+            w.lost(w.rotary[0])
         w.put(f"G10 L2 P{system} {words}")
     w.put(name)
     w.lost("X", "Y", "Z")
@@ -119,7 +122,7 @@ def shift(w: Writer) -> None:
     if kind == 0:
         axes = draw.choice(("X", "XY", "Z", "XYZ"))
         w.put("G92 " + " ".join(f"{a}{w.number(draw.choice((0, 5, 12.5)))}" for a in axes))
-        back = draw.choice(("G92.1", "G92.2", "G92.1"))
+        back = draw.choice(("G92.1", "G92.2", "G92.2\nG92.3\nG92.1"))
     else:
         axes = draw.choice(("X", "XY", "Z"))
         w.put("G52 " + " ".join(f"{a}{w.number(draw.uniform(-30, 30))}" for a in axes))
@@ -152,6 +155,8 @@ def home(w: Writer) -> None:
             ("G91 G28 Z0\nG90", "Z"),
             ("G91 G30 Z0\nG90", "Z"),
             ("G53 G0 Z0", "Z"),
+            *((f"G28 {letter}0", letter) for letter in w.rotary),
+            *((f"G53 G0 Z0 {letter}0", f"Z{letter}") for letter in w.rotary),
             (f"G53 G0 X{w.number(-100)} Y{w.number(-50)}", "XY"),
             (f"G53 G1 Z0 F{w.feedrate(900)}", "Z"),
         )

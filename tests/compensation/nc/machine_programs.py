@@ -135,6 +135,7 @@ SECTIONS: dict[str, tuple[int, Callable[[Writer], None]]] = {
     "systems": (3, machine_places.systems),
     "shift": (2, machine_places.shift),
     "home": (3, machine_places.home),
+    "flat": (2, machine_cuts.flat),
     "planes": (3, machine_cuts.planes),
     "bore": (2, machine_cuts.helical_bore),
     "compensated": (1, machine_cuts.compensated),

@@ -1,6 +1,7 @@
 """Writes the lines of a random program, and knows where the tool is: habits of posts and shops."""
 
 import random
+import re
 
 MM = 25.4
 
@@ -34,6 +35,9 @@ class Writer:
         self.numbered = self.maybe(0.25)
         self.percent = self.maybe(0.25)
         self.small = self.maybe(0.1)
+        self.zeros = self.maybe(0.15)
+        self.pointed = self.maybe(0.2)
+        self.ending = "\r\n" if self.maybe(0.1) else "\n"
         self.decimals = draw.choice((2, 3, 3, 4))
         self.plain = self.maybe(0.5)
         self.clear = draw.choice((10.0, 20.0, 50.0))
@@ -61,7 +65,11 @@ class Writer:
         text = f"{value / self.unit:.{digits}f}"
         if "." in text and self.plain:
             text = text.rstrip("0").rstrip(".")
-        return "0" if text in ("-0", "") else text
+        if float(text) == 0.0:
+            return "0.0" if self.pointed else "0"
+        if self.pointed:
+            text = re.sub(r"^(-?)0\.", r"\1.", text) if "." in text else f"{text}."
+        return text
 
     def angle(self, value: float) -> str:
         """Return an angle as it is written."""
@@ -80,6 +88,8 @@ class Writer:
         """Write lines with the habits of this program."""
         for part in text.split("\n"):
             row = part
+            if self.zeros:
+                row = re.sub(r"\b([GM])(\d)(?![\d.])", r"\g<1>0\2", row)
             if self.glued and "#" not in row and "[" not in row:
                 row = row.replace(" ", "")
             if self.small:
@@ -92,7 +102,7 @@ class Writer:
 
     def text(self) -> str:
         """Return the program."""
-        return "\n".join(self.lines) + "\n"
+        return self.ending.join(self.lines) + self.ending
 
     def lost(self, *letters: str) -> None:
         """Forget where axes are."""
@@ -173,8 +183,11 @@ class Writer:
         for letter, step in steps.items():
             if step is None:
                 continue
-            text = self.number(step)
+            text = self.angle(step) if letter in "ABC" else self.number(step)
             words.append(letter + text)
+            if letter in "ABC":
+                self.at[letter] = (self.at[letter] or 0.0) + float(text)
+                continue
             self.at[letter] = (self.at[letter] or 0.0) + float(text) * self.unit
         words += self._f(f) if code == "G1" else []
         self.motion = code

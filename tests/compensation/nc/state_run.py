@@ -121,7 +121,7 @@ def run(text: str, state: State, folder: Path) -> Ran:
         The interpreter refuses it.
     """
     path = folder / "judged.ngc"
-    lines = re.sub(r"[^\n\x20-\x7e\t%]", "?", text).split("\n")
+    lines = re.sub(r"[^\n\x20-\x7e\t%]", "?", text.replace("\r", "")).split("\n")
     numbers: Sequence[int] = range(1, len(lines) + 1)
     if state.jog:
         lines, numbers = _jogged(lines, state.jog)

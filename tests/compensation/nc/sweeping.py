@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import state_judge
@@ -65,6 +66,12 @@ class Outcome:
         """The reasons without lines and numbers."""
         return list(dict.fromkeys(map(_group, self.reasons)))
 
+    def refused(self, error: InputError) -> "Outcome":
+        """Take in that thermocomp refuses it."""
+        self.reasons = (f"line {error.line}: {error.reason}" if isinstance(error, ProgramError) else str(error),)
+        self.kind = "report" if "please report" in self.reasons[0] else "refused"
+        return self
+
     def write(self, folder: Path) -> None:
         """Write both programs and the reason."""
         folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +98,7 @@ def setup(way: str, axes: str) -> Setup:
     )
 
 
-def tried(seed: int, folder: Path) -> Iterator[Outcome]:
+def tried(seed: int, folder: Path, proof: bool) -> Iterator[Outcome]:
     """Yield what becomes of the program of a seed by both ways, or that it is no program."""
     text = program(seed)
     axes = random.Random(seed).choice(("Z", "XYZ"))
@@ -101,20 +108,18 @@ def tried(seed: int, folder: Path) -> Iterator[Outcome]:
         yield Outcome(seed, "", axes, "invalid", (str(error),))
         return
     for way in WAYS:
-        yield outcome(seed, text, way, axes, folder)
+        yield outcome(seed, text, way, axes, folder, proof)
 
 
-def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
-    """Revise a program and have it judged."""
+def outcome(seed: int, text: str, way: str, axes: str, folder: Path, proof: bool = False) -> Outcome:
+    """Revise a program and have it judged, and proved as `thermocomp revise` does it."""
     found = Outcome(seed, way, axes, "revised", original=text)
     path = folder / "original.ngc"
     path.write_text(text, encoding="latin-1", newline="")
     try:
         trial = revise(path, folder, Swinging(axes), way, setup=setup(way, axes))
     except InputError as error:
-        found.reasons = (f"line {error.line}: {error.reason}" if isinstance(error, ProgramError) else str(error),)
-        found.kind = "report" if "please report" in found.reasons[0] else "refused"
-        return found
+        return found.refused(error)
     found.revised = trial.revised.read_text(encoding="latin-1")
     most = tuple(max(abs(row.deviation[i]) for row in trial.rows) for i in range(3))
     stated = state_run.Stated(no_rotation=axes != "Z", no_shift=way == "offset")
@@ -126,24 +131,38 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path) -> Outcome:
         found.kind, found.reasons = "wrong", tuple(error.faults)
     except state_judge.InvalidError as error:
         found.kind, found.reasons = "invalid", (str(error),)
+    if proof and found.kind == "revised":
+        try:
+            trial.proved()
+        except InputError as error:
+            return found.refused(error)
     return found
 
 
-def sweep(seeds: range, processes: int = 1) -> Iterator[Outcome]:
-    """Yield what becomes of the programs of some seeds, in their order."""
+def sweep(seeds: Sequence[int], processes: int = 1, proof: bool = True) -> Iterator[Outcome]:
+    """Yield what becomes of the programs of some seeds, in their order.
+
+    Parameters
+    ----------
+    seeds : sequence of int
+    processes : int
+    proof : bool
+        They are also proved as `thermocomp revise` does it; what cannot be proved is refused.
+    """
     pieces = [seeds[k : k + PIECE] for k in range(0, len(seeds), PIECE)]
+    piece = partial(_piece, proof=proof)
     if processes == 1:
         for some in pieces:
-            yield from _piece(some)
+            yield from piece(some)
         return
     with ProcessPoolExecutor(processes) as pool:
-        for found in pool.map(_piece, pieces):
+        for found in pool.map(piece, pieces):
             yield from found
 
 
-def _piece(seeds: range) -> list[Outcome]:
+def _piece(seeds: Sequence[int], proof: bool) -> list[Outcome]:
     with tempfile.TemporaryDirectory(prefix="sweep-") as folder:
-        return [found for seed in seeds for found in tried(seed, Path(folder))]
+        return [found for seed in seeds for found in tried(seed, Path(folder), proof)]
 
 
 class Counts:

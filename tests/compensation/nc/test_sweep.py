@@ -13,11 +13,11 @@ def right(counts: Counts) -> None:
         assert not counts.of(way, "report")
 
 
-def test_two_dozen_programs_are_right_in_every_state() -> None:
-    counts = Counts(list(sweep(range(1, 25))))
+def test_programs_are_right_in_every_state() -> None:
+    counts = Counts(list(sweep(range(1, 17))))
     right(counts)
-    assert counts.valid >= 23
-    assert len(counts.of("coordinates", "revised")) >= 18
+    assert counts.valid >= 15
+    assert len(counts.of("coordinates", "revised")) >= 12
 
 
 @pytest.mark.long

@@ -3,6 +3,7 @@
 from thermocomp.compensation.nc.following import fanuc
 from thermocomp.compensation.nc.following.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
 from thermocomp.compensation.nc.following.block import PLANES, Arc, Block, Known, Move
+from thermocomp.compensation.nc.following.codes import ROTARY
 from thermocomp.compensation.nc.following.cycles import KEPT, Cycle, CycleError, pause
 from thermocomp.compensation.nc.following.offsets import mark, put
 from thermocomp.compensation.nc.following.orders import Orders
@@ -71,14 +72,15 @@ def home(state: State, orders: Orders, block: Block) -> None:
     code = orders.groups["once"]
     if state.modal.cutter:
         raise orders.error(f"{code} {_NOT_COMPENSATED}")
+    turns = not ROTARY.isdisjoint(orders.values)  # whether it is there already or not
     rotary = state.turn(orders)
     named = state.axis_values(orders)
-    if not named and not rotary and state.fanuc:
+    if not named and not turns and state.fanuc:
         raise orders.error(f"{code} without axis words; name the axes that go home, such as {code} Z0")
     place, _ = state.goal(orders)
     start, between = state.machine, state.offsets.machine(place)
     far = state.setup.home or (0.0, 0.0, 0.0)
-    if named or rotary:
+    if named or turns:
         target = state.offsets.program(far)
         place = put(place, {i: target[i] for i in named})
         far = state.offsets.machine(place)
@@ -86,7 +88,7 @@ def home(state: State, orders: Orders, block: Block) -> None:
     block.moves += [Move(True, start, between, rotary=rotary), Move(True, between, far)]
     state.machine = far
     state.place = state.offsets.program(far)
-    axes = named or ({} if rotary else {0: 0.0, 1: 0.0, 2: 0.0})
+    axes = named or ({} if turns else {0: 0.0, 1: 0.0, 2: 0.0})
     state.known = mark(state.known, axes, to=False)
 
 

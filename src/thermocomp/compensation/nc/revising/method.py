@@ -185,7 +185,8 @@ class Method(ABC):
 
     def leave(self, block: Block) -> None:
         """Take in a move in machine coordinates: its axes carry nothing afterwards."""
-        axes = self.named(block) or ([0, 1, 2] if block.kind == "home" else [])
+        all_go = block.kind == "home" and ROTARY.isdisjoint(block.words)
+        axes = self.named(block) or ([0, 1, 2] if all_go else [])
         if axes and self.frame(block).turned and {0, 1} & set(axes):
             axes = sorted({0, 1, *axes})
             if any(self.carried[i] for i in axes if i not in self.named(block) and i != 2):
