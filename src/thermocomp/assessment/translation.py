@@ -5,7 +5,6 @@ what moves nothing is left out. What a LinuxCNC does otherwise, or cannot do, is
 """
 
 import math
-from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
@@ -112,35 +111,26 @@ class Translator:
     ----------
     systems : dict of int to int
         LinuxCNC's systems, by those of G54.1 (100 + P) that stand in the program.
-    stops : array of int
-        Lines of the translation, from 1, that end on the way of their line: cycles that go up afterwards.
     """
 
     def __init__(self, setup: Setup) -> None:
         self.systems: dict[int, int] = {}
-        self.stops = array("i")
         self._setup = setup
         self._follower = Follower(setup)
         self._stores: set[str] = set()  # G52, G68 and G92 share one in LinuxCNC
         self._local: Point = (0.0, 0.0, 0.0)  # of G52 [mm]
         self._turned = False
-        self._up = ""  # the line that goes from R to the level of a cycle
         self._turning = 0
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
         """Yield the lines of the translation, see `translate`."""
-        count = 0
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
                 continue
-            self._up = ""
             texts = self._told(block)
-            for k, text in enumerate(texts):
-                count += 1
-                if k + 1 < len(texts) and texts[k + 1] == self._up:
-                    self.stops.append(count)
+            for text in texts:
                 yield f"{'/' if line.optional else ''}{text}\n", line.number
             if block.ends:
                 return
@@ -317,8 +307,8 @@ class Translator:
         level, plane = state.level or 0.0, block.sticky["R"] * scale
         if modal.absolute and modal.retract == 98 and abs(block.start[across] - plane) < 1e-3 < level - plane:
             # from R a Fanuc goes to the next hole at R; LinuxCNC goes up before, or does not, as numbers are rounded
-            self._up = f"G0 {letter}{number(level / scale)}"
-            return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [self._up, *after]
+            up = f"G0 {letter}{number(level / scale)}"
+            return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
