@@ -137,6 +137,10 @@ class Offset(Method):
         """Follow what the controller makes of it: a named axis goes to the shifted place."""
         kind = block.kind
         if kind in ("machine", "home"):
+            if kind == "home" and block.modal.absolute:  # by way of a place in work coordinates
+                named = self.named(block)
+                x, y, z = (self._shift[i] if i in named else self.carried[i] for i in range(3))
+                self.inner = x, y, z
             self.leave(block)
             return
         if self.names_place(block):
