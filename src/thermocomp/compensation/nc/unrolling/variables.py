@@ -72,6 +72,16 @@ class Variables:
     def value(self, line: int, text: str, what: str, *, word: bool = True) -> float:
         """Return the value of an expression.
 
+        Parameters
+        ----------
+        line : int
+            It stands in.
+        text : str
+        what : str
+            It is, for the error.
+        word : bool
+            See `thermocomp.compensation.nc.reading.expressions.evaluate`.
+
         Raises
         ------
         ProgramError
