@@ -32,6 +32,7 @@ def ledger(
     header: int = 0,
     texts: Mapping[int, int] | None = None,
     bow: float = 0.0,
+    placed: bool = True,
 ) -> Ledger:
     """Return what lines 1, 2, ... carry at their end, and on the way; and how many lines they have become."""
     made = Ledger()
@@ -41,7 +42,7 @@ def ledger(
         modal = Modal(feed_mode=93 if number in inverse else 94)
         written = ("",) * (texts or {}).get(number, 1)
         block = Block(Line(number, ""), modal)
-        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, bow=bow))
+        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, bow=bow, placed=placed))
     return made
 
 
@@ -198,6 +199,7 @@ AT = "G21 G0 X0 Y0 Z0 A0\n"
         ("G21\nG0 X1\nM2\n", "G21\nG0 X1\nG0 X1\nM2\n", 3, "makes a 'rapid' in place of"),
         ("G21\nG4 P1\nM2\n", "G21\nG4 P2\nM2\n", 2, "gives 'dwell'"),
         ("%\nG21\nG0 X1\nG0 X2\n%\n", "%\nG21\nG0 X1\n%\n", 4, "in the original only|in place of"),
+        ("%\nG21\nG0 X1\n%\n", "%\nG21\nG0 X1\nG0 X2\n%\n", 4, "in the revised program only|in place of"),
         ("G21\nG0 A1\nM2\n", "G21\nG0 A2\nM2\n", 2, "moves another axis"),
         (f"{AT}G2 X2 I1 F9\nM2\n", f"{AT}G3 X2 I1 F9\nM2\n", 2, "turns another way"),
         (f"{AT}G2 X2 R2 F9\nM2\n", f"{AT}G2 X2 R2.1 F9\nM2\n", 2, r"moves Y of an arc's centre by -?\d+"),

@@ -82,6 +82,7 @@ def test_what_stands_beside_a_cut_stays_beside_its_first_piece(tmp_path: Path) -
         "G2 X0 Y0 I200 P2\n",
         "G0 X500\n",
         "X500 A360\n",
+        "M0\nX500\n",
     ],
 )
 def test_what_is_not_a_plain_cut_stays_whole(text: str, tmp_path: Path) -> None:

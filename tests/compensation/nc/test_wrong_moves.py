@@ -75,7 +75,14 @@ TABLE = replace(STATED, rotary={"A": "table", "B": "table"})
 
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 @pytest.mark.parametrize(
-    "turn", ["G1 X10 Y0 Z-1 A{} F720", "G95 G1 X10 Y0 Z-1 A{} F0.5", "G0 X10 Y0 Z-1 A{}", "G1 A{} Z-1 F720"]
+    "turn",
+    [
+        "G1 X10 Y0 Z-1 A{} F720",
+        "G95 G1 X10 Y0 Z-1 A{} F0.5",
+        "G0 X10 Y0 Z-1 A{}",
+        "G1 A{} Z-1 F720",
+        "G0 Z20\nG4 P60\nG0 X{0}\nG4 P60\nG0 X{0} Z20 A{0}\nG0 X10",
+    ],
 )
 def test_a_turn_of_the_table_stays_one(way: str, turn: str, tmp_path: Path) -> None:
     """F counts degrees only while X, Y and Z stand still: a micrometre of Z makes 3.6 s of 30 s."""
@@ -182,3 +189,9 @@ def test_a_stop_comes_after_the_move_of_its_line(stop: str, tmp_path: Path) -> N
     """The operator moves the axes, and nobody knows any more what they carry: their place cannot be named."""
     with pytest.raises(ProgramError, match="line 4: names the place of X, and nobody knows"):
         tried(tmp_path, f"{BEGIN}S1000 M3\nX5 Y5 Z2 F100 G1 {stop}\nG92 X0\nG0 Z5\nM2\n")
+
+
+def test_a_place_behind_a_tool_change_has_no_name(tmp_path: Path) -> None:
+    """The changer moves the axes, and nobody knows any more what they carry."""
+    with pytest.raises(ProgramError, match="line 5: names the place of X, and nobody knows"):
+        tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X5 Y5 Z2\nT1 M6\nG92 X0\nG0 Z5\nM2\n")
