@@ -137,7 +137,12 @@ def prove(
             raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
         origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
         proof = _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
-        return proof._replace(held=("what it is in LinuxCNC's words", *proof.held))
+        # a Fanuc stores no rotation, but G68 may have been left on; and with G52 or G68 no G92 can be drawn
+        assumed = {"no rotation": "no G68 at the start (assumed)"}
+        if not setup.no_shift:
+            assumed["no G92"] = "no G92 at the start (assumed)"
+        held = (assumed.get(word, word) for word in proof.held)
+        return proof._replace(held=("what it is in LinuxCNC's words", *held))
 
 
 def _same(lines: Integers) -> Integers:

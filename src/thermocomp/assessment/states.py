@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from thermocomp.compensation.nc.following import startup
-from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.following.block import Setup, system_name
 from thermocomp.shopfloor.rs274process import Job
 from thermocomp.shopfloor.stored import SYSTEMS, Stored, drawn
 
@@ -120,22 +120,16 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> State:
 def held(setup: Setup) -> tuple[str, ...]:
     """Return what is stated, in words."""
     said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
-    said += [f"{_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
+    said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]
     said += [f"tool {tool} = {length:g} mm" for tool, length in sorted(setup.tools.items())]
     said += [] if setup.home is None else [f"home {_point(setup.home)}"]
     angles = sorted(setup.rotations.items())
     if len(angles) >= len(SYSTEMS) and not any(angle for _, angle in angles):
         said.append("no rotation")
     else:
-        said += [f"{_name(system)} turned by {angle:g} deg" for system, angle in angles]
+        said += [f"{system_name(system)} turned by {angle:g} deg" for system, angle in angles]
     said += ["no G92"] * setup.no_shift + [setup.startup] * bool(setup.startup)
     return (*said, *["optional lines left out"] * setup.skip_optional)
-
-
-def _name(system: int) -> str:
-    if system > 100:
-        return f"G54.1 P{system - 100}"
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
 
 
 def _point(place: tuple[float, ...]) -> str:

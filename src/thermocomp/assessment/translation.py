@@ -5,12 +5,11 @@ what moves nothing is left out. What a LinuxCNC does otherwise, or cannot do, is
 """
 
 import math
-from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from thermocomp.compensation.nc.following.block import PLANES, Block, Point, Setup
+from thermocomp.compensation.nc.following.block import PLANES, Block, Point, Setup, system_name
 from thermocomp.compensation.nc.following.codes import CYCLES
 from thermocomp.compensation.nc.following.cycles import KEPT
 from thermocomp.compensation.nc.following.follower import Follower
@@ -112,35 +111,26 @@ class Translator:
     ----------
     systems : dict of int to int
         LinuxCNC's systems, by those of G54.1 (100 + P) that stand in the program.
-    stops : array of int
-        Lines of the translation, from 1, that end on the way of their line: cycles that go up afterwards.
     """
 
     def __init__(self, setup: Setup) -> None:
         self.systems: dict[int, int] = {}
-        self.stops = array("i")
         self._setup = setup
         self._follower = Follower(setup)
         self._stores: set[str] = set()  # G52, G68 and G92 share one in LinuxCNC
         self._local: Point = (0.0, 0.0, 0.0)  # of G52 [mm]
         self._turned = False
-        self._up = ""  # the line that goes from R to the level of a cycle
         self._turning = 0
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
         """Yield the lines of the translation, see `translate`."""
-        count = 0
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
                 continue
-            self._up = ""
             texts = self._told(block)
-            for k, text in enumerate(texts):
-                count += 1
-                if k + 1 < len(texts) and texts[k + 1] == self._up:
-                    self.stops.append(count)
+            for text in texts:
                 yield f"{'/' if line.optional else ''}{text}\n", line.number
             if block.ends:
                 return
@@ -223,7 +213,7 @@ class Translator:
             if len(self.systems) == len(_SPARE):
                 raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
             self.systems[system] = _SPARE[len(self.systems)]
-        return [_name(self.systems[system])]
+        return [system_name(self.systems[system])]
 
     def _speeds(self, block: Block, codes: set[str]) -> list[str]:
         """F, S, T; F once more behind G94, which a Fanuc keeps and LinuxCNC forgets."""
@@ -317,8 +307,8 @@ class Translator:
         level, plane = state.level or 0.0, block.sticky["R"] * scale
         if modal.absolute and modal.retract == 98 and abs(block.start[across] - plane) < 1e-3 < level - plane:
             # from R a Fanuc goes to the next hole at R; LinuxCNC goes up before, or does not, as numbers are rounded
-            self._up = f"G0 {letter}{number(level / scale)}"
-            return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [self._up, *after]
+            up = f"G0 {letter}{number(level / scale)}"
+            return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
@@ -344,10 +334,6 @@ def number(value: float) -> str:
 
 def _words(values: dict[str, float], letters: str) -> str:
     return " ".join(f"{letter}{number(values[letter])}" for letter in letters if letter in values)
-
-
-def _name(system: int) -> str:
-    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"
 
 
 def _cannot(block: Block, why: str) -> UntranslatableError:

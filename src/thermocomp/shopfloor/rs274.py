@@ -208,15 +208,15 @@ def read(
     """
     job = Job(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
     with Run(job) as run:
-        yield from _calls(run)
+        yield from calls(run)
         if opened is not None:
             opened.update(run.opened())
         if left is not None:
             left.update(run.left())
 
 
-def _calls(run: Run) -> Iterator[Canonical]:
-    """Put what the interpreter tells into words."""
+def calls(run: Run) -> Iterator[Canonical]:
+    """Yield the calls of the next job of a run; see `read`."""
     frame, plane, file, turns = Frame(), 17, "", 1
     nowhere: tuple[Place, Place] = (ORIGIN, ORIGIN)
     centre = [0.0, 0.0]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from state_pieces import joined
 from state_run import MOVES, STILL, Move, Ran, State, bare, followed, run, turned
 
-from thermocomp.core.exceptions import ProgramError, ThermocompError
+from thermocomp.core.exceptions import ThermocompError
 from thermocomp.shopfloor import rs274
 
 Vector = tuple[float, float, float]
@@ -86,17 +86,15 @@ def judge(
     compared = moves = 0
     first: dict[bool, dict[int, list[Vector]]] = {}
     wrong: list[str] = []
-    for number, state in enumerate(drawn):
-        try:
-            was = run(original, state, folder)
-        except ThermocompError:
+    runs = zip(drawn, run(original, drawn, folder), run(revised, drawn, folder), strict=True)
+    for number, (state, was, done) in enumerate(runs):
+        if isinstance(was, ThermocompError):
             continue  # such as arcs of G18 in rotated coordinates
         faults: list[str] = []
-        try:
-            now = joined(was, run(revised, state, folder), most)
-        except ProgramError as error:
-            wrong.append(f"state {number}: the interpreter refuses the revised program: {error}")
+        if isinstance(done, ThermocompError):
+            wrong.append(f"state {number}: the interpreter refuses the revised program: {done}")
             continue
+        now = joined(was, done, most)
         compared += 1
         moves += len(was.moves)
         if (fault := _calls(was, now)) is None:

@@ -5,10 +5,13 @@ import random
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
+from thermocomp.core.exceptions import ThermocompError
 from thermocomp.shopfloor import rs274
+from thermocomp.shopfloor.rs274process import Job, Run
 
 #: states that are drawn
 STATES = 8
@@ -112,23 +115,28 @@ class Ran:
     left: dict[int, float] = field(default_factory=dict)  #: parameters the controller would have stored afterwards
 
 
-def run(text: str, state: State, folder: Path) -> Ran:
-    """Run a program in a state.
-
-    Raises
-    ------
-    ThermocompError
-        The interpreter refuses it.
-    """
+def run(text: str, drawn: Sequence[State], folder: Path) -> list[Ran | ThermocompError]:
+    """Run a program in states; where the interpreter refuses it, its error stands in the place of the run."""
     path = folder / "judged.ngc"
-    lines = re.sub(r"[^\n\x20-\x7e\t%]", "?", text.replace("\r", "")).split("\n")
-    numbers: Sequence[int] = range(1, len(lines) + 1)
-    if state.jog:
-        lines, numbers = _jogged(lines, state.jog)
-    path.write_text("\n".join(lines), encoding="ascii")
-    modes = [mode.feed for mode in followed(lines)]
+    plain = re.sub(r"[^\n\x20-\x7e\t%]", "?", text.replace("\r", "")).split("\n")
+    found: list[Ran | ThermocompError] = []
+    for jog, group in groupby(drawn, key=lambda state: state.jog):  # a hand at the machine makes another program
+        lines, numbers = _jogged(plain, jog) if jog else (plain, range(1, len(plain) + 1))
+        path.write_text("\n".join(lines), encoding="ascii")
+        modes = [mode.feed for mode in followed(lines)]
+        jobs = [Job(path, state.stored, block_delete=state.skip) for state in group]
+        with Run(*jobs) as runs:
+            for _ in jobs:
+                try:
+                    found.append(_told(runs, modes, numbers))
+                except ThermocompError as error:
+                    found.append(error)
+    return found
+
+
+def _told(runs: Run, modes: Sequence[int], numbers: Sequence[int]) -> Ran:
     ran, machine = Ran(), _Machine()
-    for call in rs274.read(path, state.stored, block_delete=state.skip, left=ran.left):
+    for call in rs274.calls(runs):
         line = numbers[min(call.line, len(numbers)) - 1] if call.line else 0
         if call.kind in MOVES:
             move = machine.move(call, line)
@@ -141,6 +149,7 @@ def run(text: str, state: State, folder: Path) -> Ran:
             # in G93 LinuxCNC makes a feed of F and the length of the move: there its time is compared
             inverse = call.kind == "feedrate" and modes[min(call.line, len(modes)) - 1] == 93
             ran.calls.append((call.kind, line, () if inverse else call.values, call.text))
+    ran.left.update(runs.left())
     return ran
 
 

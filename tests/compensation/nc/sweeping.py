@@ -102,10 +102,9 @@ def tried(seed: int, folder: Path, proof: bool) -> Iterator[Outcome]:
     """Yield what becomes of the program of a seed by both ways, or that it is no program."""
     text = program(seed)
     axes = random.Random(seed).choice(("Z", "XYZ"))
-    try:
-        state_run.run(text, state_run.states(seed, state_run.Stated(True, True))[0], folder)
-    except ThermocompError as error:
-        yield Outcome(seed, "", axes, "invalid", (str(error),))
+    (ran,) = state_run.run(text, state_run.states(seed, state_run.Stated(True, True))[:1], folder)
+    if isinstance(ran, ThermocompError):
+        yield Outcome(seed, "", axes, "invalid", (str(ran),))
         return
     for way in WAYS:
         yield outcome(seed, text, way, axes, folder, proof)

@@ -54,6 +54,7 @@ FEATURES = [
     Feature("place named by G92", "G1 Z-1\nG92 Z0\nX20\nZ-1\nG0 Z11\nG92.1\nG0 Z12\n", offset=5),
     Feature("place named by G52", "G52 X5 Z1\nG0 X0 Z10\nG1 Z-1\nG52 X0 Z0\nG0 Z10\n", offset=4),
     Feature("comments", "G1 Z-1 (Z-2)\nX5 (MSG, Z7) Y5 ; Z-9\n; Z-3\nG0 (a) Z1 0 (b)\n"),
+    Feature("a cut that may be skipped", "X9\n/G1 Z-1 F100\n/X20\nG0 Z10\nX0\n"),
     Feature("block delete", "G1 Z-1\n/ Z-2\nX20\nZ-1.5\nG0 Z10\n"),
     Feature(
         "rotated coordinates", "G10 L2 P1 R30\nG0 X10 Y0\nG1 Z-1\nX20\nY20\nG10 L2 P1 R0\nG0 X0 Y0 Z10\n", offset=5

@@ -225,6 +225,26 @@ def test_arc_tells_centre_and_sense_in_machine_coordinates() -> None:
     assert block.modal.rotation == 90.0
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("G0 Z5\n/G1 Z-1 F100\n/X9\nG0 Z20\nX5\n", 0),
+        ("G0 Z5\n/G1 Z-1 F100\n/G0 Z5\nX9\n", 0),
+        ("G0 Z5\n/G1 Z-1 F100\nM8\nX9\n", 4),
+        ("/G1 Z-1 F100\nX9\n", 2),
+        ("G0 Z5\n/G1 Z-1 F100\nG80\nG0 X9\n", 0),
+        ("G0 Z5\n/G81 X1 Z-1 R2 F100\nG80\n", 2),
+        ("G1 Z5 F50\n/X9 F100\nX10\n", 0),
+    ],
+)
+def test_the_motion_code_of_an_optional_line(text: str, line: int) -> None:
+    if not line:
+        assert run(text)
+        return
+    with pytest.raises(ProgramError, match=f"line {line}: .*(is run by G1 of an optional line|optional line)"):
+        run(text)
+
+
 def test_optional_lines() -> None:
     text = "G21 G90 G0 X1 Y1 Z1\n/X2\nY5\n"
     assert [b.known for b in run(text)] == [(True, True, True), (False, True, True), (False, True, True)]

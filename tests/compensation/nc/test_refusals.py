@@ -107,7 +107,7 @@ NOT_FOLLOWED = [
     ("G81 X1 Z-1 R1\nG18\nG81 X1 Y-1 R1 Z0", "G80 before"),
     ("/G91", "--block-delete"),
     ("G91 G0\n/X1", "--block-delete"),
-    ("G0\n/G1 X1", "--block-delete"),
+    ("G0\n/G91 X1", "--block-delete"),
     ("/G92 X1", "--block-delete"),
     ("/M3", "--block-delete"),
     ("/M30", "--block-delete"),

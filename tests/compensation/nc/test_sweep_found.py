@@ -11,6 +11,7 @@ FOUND = {
     "holes end at their first level": "G0 X0 Y0 Z20\nG99 G81 X10 Z-12 R1 F100\nG98 X20\nG80\nG4 P20\nG0 Z30",
     "a rotary axis alone goes home": "G0 X10 Y0 Z20 A90\nG4 P20\nG28 A0\nG4 P20\nG0 X30\nG0 X30 Y5 Z10",
     "a rotary axis at home goes home": "G0 X10 Y0 Z20 A0\nG4 P20\nG28 A0\nG4 P20\nG0 X30\nG10 L20 P1 Z0\nG0 Z9",
+    "the first hole is where the tool stands": ("G0 X0 Y0 Z20\nG4 P20\nG98 G81 X0 Y0 Z-8 R3 F500\nX20\nG80\nG0 Z20"),
 }
 
 

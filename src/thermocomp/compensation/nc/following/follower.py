@@ -5,6 +5,7 @@ move with its interpreter. What cannot be followed for certain is refused with l
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 from thermocomp.compensation.nc.following import fanuc, motion, placing, setting
@@ -20,6 +21,7 @@ _AXIS_LETTERS: Final = frozenset("XYZABC")
 _PLAIN_LETTERS: Final = frozenset("XYZF")
 _PROBES: Final = frozenset({"G31", "G38.2", "G38.3", "G38.4", "G38.5"})
 _THREADS: Final = frozenset({"G33", "G33.1"})
+_STATED_ANEW: Final = frozenset({"", "G0", "G1", "G2", "G3"})
 _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
@@ -63,6 +65,7 @@ class Follower:
         self._began = False
         self._demarcated = False
         self._ended = False
+        self._if_skipped: str | None = None  # motion in force if the optional lines are not run
 
     def step(self, line: Line) -> Block:
         """Run one line.
@@ -89,7 +92,11 @@ class Follower:
         if not line.words and not line.assignments:
             return self._idle(line)
         orders = self._reader.read(line)
-        return self._optional(orders) if line.optional else self._run(orders)
+        if line.optional:
+            return self._optional(orders)
+        if self._if_skipped is not None:
+            self._check_motion(orders, self._if_skipped)
+        return self._run(orders)
 
     def _idle(self, line: Line) -> Block:
         state = self.state
@@ -116,9 +123,11 @@ class Follower:
 
     def _optional(self, orders: Orders) -> Block:
         """Run a line that the operator may skip: then nothing after it may depend on it."""
-        before = self._summary()
+        before, motion = self._summary(), self.state.modal.motion
         block = self._run(orders)
         after = self._summary()
+        if self.state.modal.motion != motion and self._if_skipped is None:
+            self._if_skipped = motion
         changed = [what for what, was in before.items() if after[what] != was]
         if block.ends:
             changed.append("the end of the program")
@@ -139,13 +148,26 @@ class Follower:
             block.known = self.state.known = (x, y, z)
         return block
 
+    def _check_motion(self, orders: Orders, otherwise: str) -> None:
+        """Refuse a line that is run by a motion code of an optional line."""
+        told, force = orders.groups.get("motion"), self.state.modal.motion
+        if told is None and force != otherwise and self._motion(orders):
+            raise orders.error(
+                f"is run by {force} of an optional line (/), or by {otherwise or 'none'} if the operator skips that; "
+                "write its motion code, or decide with --block-delete"
+            )
+        if told is not None or force == otherwise:
+            self._if_skipped = None
+
     def _summary(self) -> dict[str, object]:
         state = self.state
+        # whoever needs a motion code or a feed after optional lines has to state the one; the other tells the time only
+        plain = state.modal.motion in _STATED_ANEW and not state.fanuc
         return {
-            "modal codes": state.modal,
+            "modal codes": replace(state.modal, motion="") if plain else state.modal,
             "offsets": state.offsets.state(),
             "tool lengths": (dict(state.lengths), dict(state.doubtful)),
-            "the feed": (state.feed, state.feed_word),
+            "the feed": None if plain else (state.feed, state.feed_word),
             "the spindle's speed": (state.spindle, state.turning),
             "the tool": (state.tool, state.selected),
             "the cycle": (dict(state.sticky), state.level),

@@ -11,7 +11,7 @@ from thermocomp.compensation.nc.following.block import PLANES, Block
 from thermocomp.compensation.nc.following.codes import CYCLES
 from thermocomp.compensation.nc.revising.contact import CLEAR
 from thermocomp.compensation.nc.revising.frame import Frame, Vector
-from thermocomp.compensation.nc.revising.method import AXES, Method
+from thermocomp.compensation.nc.revising.method import AXES, STILL, Method
 from thermocomp.compensation.nc.revising.text import number
 from thermocomp.core.exceptions import ProgramError
 
@@ -89,8 +89,10 @@ class Offset(Method):
         )
 
     def _near(self, block: Block) -> bool:
-        """Return whether a cycle begins at its R: which one is higher must not change."""
-        drill = PLANES[block.modal.plane][2]
+        """Return whether a cycle begins at its R, which of them is higher must not change, or where the tool stands."""
+        first, second, drill = PLANES[block.modal.plane]
+        if all(self.before[i] and abs(block.end[i] - block.start[i]) <= STILL for i in (first, second)):
+            return True
         plane = block.sticky["R"] / (self.frame(block).scale[drill] * 1e3)
         return self.before[drill] and abs(block.start[drill] - plane) < CLEAR
 
@@ -135,6 +137,10 @@ class Offset(Method):
         """Follow what the controller makes of it: a named axis goes to the shifted place."""
         kind = block.kind
         if kind in ("machine", "home"):
+            if kind == "home" and block.modal.absolute:  # by way of a place in work coordinates
+                named = self.named(block)
+                x, y, z = (self._shift[i] if i in named else self.carried[i] for i in range(3))
+                self.inner = x, y, z
             self.leave(block)
             return
         if self.names_place(block):
