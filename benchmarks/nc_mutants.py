@@ -34,6 +34,7 @@ class Mutant(NamedTuple):
     old: str  #: stands there once
     new: str
     tests: list[str]  #: of which one has to fail
+    also: Sequence[dict[str, str]] = ()  #: more to replace at once: file, old, new
 
 
 class StrayError(Exception):
@@ -63,14 +64,23 @@ def run(folder: Path, tests: Sequence[str], patience: float | None = None) -> tu
     return done.returncode, done.stdout + done.stderr
 
 
-def apply(mutant: Mutant, source: Path) -> tuple[Path, str]:
-    """Put a mutant into the source; return the file and how it was."""
-    path = source / mutant.file
-    text = path.read_text(encoding="utf-8")
-    if text.count(mutant.old) != 1:
-        raise StrayError(f"{mutant.name}: {text.count(mutant.old)} times in {mutant.file}: {mutant.old!r}")
-    write(path, text.replace(mutant.old, mutant.new))
-    return path, text
+def apply(mutant: Mutant, source: Path) -> dict[Path, str]:
+    """Put a mutant into the source; return the files as they were."""
+    before: dict[Path, str] = {}
+    for file, old, new in (mutant[2:5], *((more["file"], more["old"], more["new"]) for more in mutant.also)):
+        path = source / file
+        text = path.read_text(encoding="utf-8")
+        if text.count(old) != 1:
+            raise StrayError(f"{mutant.name}: {text.count(old)} times in {file}: {old!r}")
+        before.setdefault(path, text)
+        write(path, text.replace(old, new))
+    return before
+
+
+def take_back(before: dict[Path, str]) -> None:
+    """Write files as they were."""
+    for path, text in before.items():
+        write(path, text)
 
 
 def write(path: Path, text: str) -> None:
@@ -83,9 +93,9 @@ def write(path: Path, text: str) -> None:
 def judge(mutant: Mutant, folder: Path) -> bool:
     """Return whether a test sees a mutant; print a line."""
     begin = time.perf_counter()
-    as_it_was = apply(mutant, folder / "src" / "thermocomp")
+    before = apply(mutant, folder / "src" / "thermocomp")
     code, said = run(folder, mutant.tests, PATIENCE)
-    write(*as_it_was)
+    take_back(before)
     verdict = {FAILED: "killed", PASSED: "SURVIVED", HANGS: "HANGS"}.get(code, f"BROKEN (pytest {code})")
     print(f"{mutant.name:22} {mutant.what:88} {verdict} {time.perf_counter() - begin:6.1f} s", flush=True)
     if verdict.startswith("BROKEN"):
@@ -113,7 +123,7 @@ def main() -> int:
                 shutil.copy(ROOT / part, folder / part)
         try:
             for mutant in chosen:  # all of them are there, before any test is run
-                write(*apply(mutant, folder / "src" / "thermocomp"))
+                take_back(apply(mutant, folder / "src" / "thermocomp"))
         except StrayError as error:
             print(error, file=sys.stderr)
             return 2

@@ -75,6 +75,13 @@ def test_a_move_takes_as_long(tmp_path: Path) -> None:
     assert proof.slower == pytest.approx(1.0)
 
 
+def test_a_short_move_takes_as_long(tmp_path: Path) -> None:
+    original = HEAD + "G0 X0 Y0 Z0\nG1 X0.1 F60\nM2\n"
+    with pytest.raises(ProgramError, match=r"line 3: .* it takes 0\.11 s for a move of 0\.1 s"):
+        judge(tmp_path, original, original.replace("X0.1", "X0.11"), [shift(), shift(), shift(10)])
+    judge(tmp_path, original, original.replace("X0.1", "X0.104"), [shift(), shift(), shift(4)])
+
+
 def test_a_feed_that_is_another_for_a_rotary_axis_is_found(tmp_path: Path) -> None:
     original = HEAD + "G0 X0 Y0 Z0 A0\nG93\nG1 A90 F2\nG94\nM2\n"
     with pytest.raises(ProgramError, match=r"takes 29\.85 s for a move of 30 s"):
@@ -341,6 +348,15 @@ def test_an_arc_may_be_divided(tmp_path: Path, plane: str) -> None:
     for was, now in (("8 ", "8.0004 "), ("-6 ", "-5.9996 "), ("0.024", "0.0264")):
         with pytest.raises(ProgramError, match=r"line 3: .*(piece of a divided move|moves|refuses)"):
             judge(tmp_path, original, pieces.replace(was, now), rows, texts={3: 3})
+
+
+@pytest.mark.parametrize(("first", "second"), [("G3", "G2"), ("G2", "G3")])
+def test_an_arc_in_pieces_keeps_its_turn(first: str, second: str, tmp_path: Path) -> None:
+    """Half a circle takes as long either way."""
+    original = HEAD + "G0 X10 Y0 Z0\nG3 I-10 J0 F1000\nM2\n"
+    pieces = original.replace("G3 I-10 J0 F1000\n", f"{first} X-10 I-10 J0 F1000\n{second} X10 I10\n")
+    with pytest.raises(ProgramError, match=r"line 3: .*(turns another way|a piece of a divided move)"):
+        judge(tmp_path, original, pieces, [shift()] * 4, texts={3: 2})
 
 
 def test_an_arc_in_pieces_keeps_its_centre(tmp_path: Path) -> None:

@@ -76,13 +76,13 @@ def test_what_stands_beside_a_cut_stays_beside_its_first_piece(tmp_path: Path) -
         "G91 G1 X500\nG90\n",
         "G61\nX500\n",
         "G61.1\nX500\n",
-        "G93 G1 X500 F1\nG94 F100\n",
+        "G93\nG1 X500 F1\nG94 F100\n",
         "/X500\nX500\n",
         "X[500]\n",
         "G2 X0 Y0 I200 P2\n",
         "G0 X500\n",
         "X500 A360\n",
-        "M0\nX500\n",
+        "M0\nX500 Z-1\n",
     ],
 )
 def test_what_is_not_a_plain_cut_stays_whole(text: str, tmp_path: Path) -> None:
