@@ -40,8 +40,8 @@ class Proof(NamedTuple):
     @property
     def sentence(self) -> str:
         """In which states it was proved."""
-        held = f"held {', '.join(self.held)}" if self.held else "nothing stated"
-        return f"in {self.states} controller states: {held}; drawn {', '.join(self.drawn)}"
+        held = ", ".join(("what the program states", *self.held))
+        return f"in {self.states} controller states: held {held}; drawn {', '.join(self.drawn)}"
 
 
 class _Proving(NamedTuple):
