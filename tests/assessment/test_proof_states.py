@@ -163,6 +163,12 @@ def test_an_arc_from_where_the_machine_happens_to_stand(tmp_path: Path) -> None:
         judge(tmp_path, original, original, [shift()] * 3)
 
 
+def test_an_arc_from_a_place_in_another_system(tmp_path: Path) -> None:
+    original = HEAD + "G0 X0 Y0 Z5\nG55\nG2 X2 Y0 I1 J0 F100\nM2\n"
+    with pytest.raises(Unprovable, match=r"cannot be proved: line 4: .*\(origins\).*--origin"):
+        judge(tmp_path, original, original, [shift()] * 5)
+
+
 def test_what_does_not_run_with_a_drawn_tool_is_proved_without_one(tmp_path: Path) -> None:
     original = HEAD + "T1 M6\nG0 X0 Y0 Z0\nG41 G1 X5 F100\nX10\nG3 X10 Y0.02 I0 J0.01\nG1 X5\nG40 X0\nM2\n"
     proof = judge(tmp_path, original, original, [shift()] * 9)

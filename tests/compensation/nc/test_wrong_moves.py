@@ -112,6 +112,15 @@ def test_where_a_cycle_ends_nobody_dives(cycle: str, tmp_path: Path) -> None:
     assert 0.01 < farthest(trial) < 1.0
 
 
+@pytest.mark.parametrize("before", ["", "G0 Z5\nG55\n", "G0 Z5\nG43 H2\n", "G0 Z5\nG10 L2 P1 Z0\n"])
+def test_no_word_is_added_where_nobody_knows(before: str, tmp_path: Path) -> None:
+    """At the start, and where an origin or a length changes that the program does not tell."""
+    trial = tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X0 Y0\n{before}G4 P200\nG0 X50\nG1 X60 F100\nG0 Z5\nG1 Z-1\nM2\n")
+    rows = {row.text.strip(): row for row in trial.rows}
+    assert not any("Z" in rows[line].texts[-1] for line in ("G0 X50", "G1 X60 F100"))
+    assert rows["G1 Z-1"].texts != ("G1 Z-1\n",)
+
+
 @pytest.mark.parametrize("stop", ["M0", "M1", "M60"])
 def test_no_word_is_added_behind_a_stop(stop: str, tmp_path: Path) -> None:
     """The operator may have moved the axes: X alone would become a diagonal rapid."""
