@@ -20,7 +20,7 @@ demo: $(VENV)/.study
 
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium linuxcnc-uspace
-	$(BIN)/python -m pytest --cov --cov-report=term
+	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh linuxcnc-uspace

@@ -130,6 +130,6 @@ def test_what_cannot_be_said_cannot_be_proved(tmp_path: Path) -> None:
     path = tmp_path / "program.nc"
     path.write_text("G21 G90 S1 M3\nG92 X0. Y0. Z5.\nG0 X1. Y1. Z5.\nG92.1 X0. Y0. Z0.\nG52 X1.\nM30\n", "ascii")
     trial = revise(path, tmp_path, "coordinates")
-    with pytest.raises(Unprovable, match=r"cannot be said in LinuxCNC's words: line 5: G92 beside G52 or G68"):
+    with pytest.raises(Unprovable, match=r"line 5 cannot be said in LinuxCNC's words: G92 beside G52 or G68"):
         proved(trial)
     assert issubclass(Unprovable, InputError)

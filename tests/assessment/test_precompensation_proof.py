@@ -31,7 +31,7 @@ def ledger(
     inverse: Sequence[int] = (),
     header: int = 0,
     texts: Mapping[int, int] | None = None,
-    bow: float = 0.0,
+    knots: Mapping[int, tuple[Vector, ...]] | None = None,
     placed: bool = True,
 ) -> Ledger:
     """Return what lines 1, 2, ... carry at their end, and on the way; and how many lines they have become."""
@@ -42,7 +42,8 @@ def ledger(
         modal = Modal(feed_mode=93 if number in inverse else 94)
         written = ("",) * (texts or {}).get(number, 1)
         block = Block(Line(number, ""), modal)
-        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, bow=bow, placed=placed))
+        inside = (knots or {}).get(number, ())
+        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, placed=placed, knots=inside))
     return made
 
 

@@ -74,6 +74,28 @@ def test_the_program_is_never_written_over(job_folder: Path, capsys: pytest.Capt
     assert "gone.ngc: no such file" in said(capsys)
 
 
+@pytest.mark.parametrize("number", ["O2001 (PART)", ":12"])
+def test_whose_a_program_with_a_number_is_has_to_be_said(
+    job_folder: Path, capsys: pytest.CaptureFixture[str], number: str
+) -> None:
+    """A dwell of 3 s is one of 50 min otherwise."""
+    program = f"%\n{number}\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z5.\nG4 P3000\nG1 Z-1. F300.\nM30\n%\n"
+    Path("part.nc").write_text(program, encoding="ascii")
+    assert revise(program="part.nc", out="out.nc") == 2
+    assert f"line 2: '{number}' is how a Fanuc's or Haas's programs begin: say --controller fanuc" in said(capsys)
+    assert revise("--controller", "fanuc", program="part.nc", out="out.nc") in (0, 1)
+
+
+def test_a_cut_with_a_standing_spindle_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("bad.ngc").write_text(PLATE.replace("S6000 M3", "S6000 M5"), encoding="ascii")
+    assert revise(program="bad.ngc") == 0
+    Path("bad.ngc").write_text(PLATE.replace("G1 Z-1", "M5\nG1 Z-1"), encoding="ascii")
+    assert revise("--overwrite", program="bad.ngc") in (0, 1)
+    assert "the spindle stands at line 9, and the tool moves in feed: is that right?" in " ".join(
+        capsys.readouterr().out.split()
+    )
+
+
 def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
     assert revise() == 0
     first = {p.name: p.read_bytes() for p in job_folder.iterdir()}
@@ -94,6 +116,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
         (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "want X, Y and Z"),
         (judged(lags("z_um")), ["--tool", "one=1 mm"], "want the number of a tool"),
+        (judged(lags("z_um")), ["--harmless", "M3"], "M3 is known (spindle on, clockwise), and is followed as that"),
         (judged(lags("z_um")), ["--tolerance", "0 um"], "must be positive"),
         (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is no thermal drift"),
         (judged(lags("z_um")), ["--every", "10"], "write a value with its unit, such as"),

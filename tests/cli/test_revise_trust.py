@@ -147,7 +147,7 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
     )
     before = set(job_folder.iterdir())
     assert revise("--controller", "fanuc", program="odd.nc", out="out.nc", proved=True) == 2
-    assert "it cannot be said in LinuxCNC's words: line 11: G92 beside G52" in said(capsys)
+    assert "line 11 cannot be said in LinuxCNC's words: G92 beside G52" in said(capsys)
     assert set(job_folder.iterdir()) == before
     assert revise("--controller", "fanuc", program="50%.nc", out="out.nc") == 0
     assert "but no interpreter has judged it (--unproved)" in " ".join(capsys.readouterr().out.split())

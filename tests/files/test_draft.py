@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from thermocomp.files.draft import draft, scratch
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import draft, publish, scratch
 
 pytestmark = pytest.mark.skipif(find_spec("fcntl") is None, reason="files are not locked here")
 
@@ -95,3 +96,22 @@ def test_a_draft_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     with draft(target) as path:
         path.write_text("new")
     assert target.read_text() == "new"
+
+
+def test_a_file_that_comes_into_being_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    first, last = tmp_path / "a.diff", tmp_path / "a.ngc"
+    with scratch(tmp_path) as folder:
+        drafts = {first: folder / "1", last: folder / "2"}
+        for path in drafts.values():
+            path.write_text("new")
+        last.write_text("precious")
+        with pytest.raises(InputError, match="has come into being meanwhile; nothing was written"):
+            publish(drafts, overwrite=False)
+        assert not first.exists()
+        assert last.read_text() == "precious"
+        publish(drafts, overwrite=True)
+    assert (first.read_text(), last.read_text()) == ("new", "new")
+    with scratch(tmp_path) as folder:
+        (folder / "1").write_text("newer")
+        publish({tmp_path / "b": folder / "1"}, overwrite=False)
+    assert (tmp_path / "b").read_text() == "newer"

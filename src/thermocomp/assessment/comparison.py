@@ -169,7 +169,7 @@ class _Comparison:
             *self._times(was, now, moving),
         ]
         if pieces is not None:
-            checks += self._divided(was, pieces, shifts)
+            checks += self._divided(was, pieces)
         worst = [int(np.argmax(check.bad)) if check.bad.any() else len(was) for check in checks]
         if (first := min(worst)) < len(was):
             raise ProgramError(int(was.line[first]), "it " + checks[worst.index(first)].say(first))
@@ -303,39 +303,39 @@ class _Comparison:
 
     # -- pieces ------------------------------------------------------------------------------------------------------
 
-    def _divided(self, was: Calls, pieces: _Pieces, shifts: Shifts) -> Iterator[_Check]:
-        """Compare the pieces of divided moves: they lie on the way of the original, shifted by what is between."""
+    def _divided(self, was: Calls, pieces: _Pieces) -> Iterator[_Check]:
+        """Compare the pieces of divided moves: without what each should carry, they end on the way of the original."""
         of, calls = pieces
-        first, last = was.start[of], was.end[of]
-        low = np.minimum(shifts.before, shifts.after)[of] - (ROUNDING + shifts.bow[of])[:, None]
-        high = np.maximum(shifts.before, shifts.after)[of] + (ROUNDING + shifts.bow[of])[:, None]
-        way = last - first
-        length = np.einsum("ij,ij->i", way[:, :3], way[:, :3])
-        middle = first[:, :3] + (low + high) / 2e3
-        share = np.einsum("ij,ij->i", calls.end[:, :3] - middle, way[:, :3]) / np.maximum(length, STILL**2)
+        first, way = was.start[of], was.end[of] - was.start[of]
+        asked = np.full((len(of), 3), np.nan)
+        for move in np.unique(of).tolist():
+            mine = np.flatnonzero(of == move)
+            if len(knots := self.ledger.knots.get(int(was.line[move]), ())) == len(mine):
+                asked[mine] = knots
+        end = calls.end[:, :3] - asked / 1e3
+        square = np.maximum(np.einsum("ij,ij->i", way[:, :3], way[:, :3]), STILL**2)
+        share = np.einsum("ij,ij->i", end - first[:, :3], way[:, :3]) / square
         place = first + share[:, None] * way
+        turned = np.zeros(len(of), bool)
         for plane, (i, j, _) in PLANE_AXES.items():
             mine = np.flatnonzero(was.plane[of] == plane)
-            if len(mine):
-                share[mine] = calls.sweep[mine] / was.sweep[of[mine]]
-                place[mine] = first[mine] + share[mine, None] * way[mine]
-                about = was.centre[of[mine]]
-                out = first[mine][:, [i, j]] - about
-                angle = np.arctan2(out[:, 1], out[:, 0]) + np.sign(was.turns[of[mine]]) * calls.sweep[mine]
-                radius = np.hypot(*out.T)
-                place[mine, i], place[mine, j] = (
-                    about[:, 0] + radius * np.cos(angle),
-                    about[:, 1] + radius * np.sin(angle),
-                )
-                centre = (calls.centre[mine] - about) * 1e3
-                beside = (centre < low[mine][:, [i, j]]) | (centre > high[mine][:, [i, j]])
-                share[mine[beside.any(axis=1) | (calls.turns[mine] != np.sign(was.turns[of[mine]]))]] = np.nan
-        found = (calls.end - place)[:, :3] * 1e3
-        # the place along the way is known as well as the shift is
-        loose = (
-            STILL + np.abs(way[:, 3:]) * ((high - low).max(axis=1) / 1e3 / np.sqrt(np.maximum(length, STILL)))[:, None]
-        )
-        beside = ((found < low) | (found > high)).any(axis=1) | (np.abs(calls.end - place)[:, 3:] > loose).any(axis=1)
+            if not len(mine):
+                continue
+            about, sense = was.centre[of[mine]], np.sign(was.turns[of[mine]])
+            begin, there = first[mine][:, [i, j]] - about, end[mine][:, [i, j]] - about
+            cross = begin[:, 0] * there[:, 1] - begin[:, 1] * there[:, 0]
+            angle = sense * np.arctan2(cross, np.einsum("ij,ij->i", begin, there)) % (2.0 * np.pi)
+            share[mine] = angle / was.sweep[of[mine]]
+            place[mine] = first[mine] + share[mine, None] * way[mine]
+            radius, angle = np.hypot(*begin.T), np.arctan2(begin[:, 1], begin[:, 0]) + sense * angle
+            place[mine, i], place[mine, j] = about[:, 0] + radius * np.cos(angle), about[:, 1] + radius * np.sin(angle)
+            centre = (calls.centre[mine] - about) * 1e3 - asked[mine][:, [i, j]]
+            turned[mine] = ~(np.abs(centre) <= ROUNDING).all(axis=1) | (calls.turns[mine] != sense)
+        found = (end - place[:, :3]) * 1e3
+        # rotary axes are as far as the others are, which is known to the rounding
+        loose = STILL + np.abs(way[:, 3:]) * (ROUNDING / 1e3 / np.sqrt(square))[:, None]
+        beside = turned | ~(np.abs(found) <= ROUNDING).all(axis=1)
+        beside |= (np.abs(calls.end - place)[:, 3:] > loose).any(axis=1)
         back = np.zeros(len(of), bool)
         back[1:] = (of[1:] == of[:-1]) & (share[1:] <= share[:-1])
         beside |= back | ~((share > 0.0) & (share < 1.0))
@@ -344,12 +344,10 @@ class _Comparison:
 
         def say(i: int) -> str:
             k = int(np.argmax(beside & (of == i)))
-            gaps = np.maximum(low[k] - found[k], found[k] - high[k])
-            axis = int(np.argmax(gaps))
-            return (
-                f"puts a piece of a divided move beside its way: {'XYZ'[axis]} by {found[k, axis]:.2f} um instead of "
-                f"{low[k, axis] + ROUNDING:.2f} to {high[k, axis] - ROUNDING:.2f} um"
-            )
+            if np.isnan(asked[k]).any():
+                return "divides a move into other pieces than were asked for"
+            axis = int(np.argmax(np.abs(found[k])))
+            return f"puts a piece of a divided move beside its way: {'XYZ'[axis]} by {found[k, axis]:.2f} um"
 
         yield _Check(bad, say)
 

@@ -22,7 +22,7 @@ class Shift(NamedTuple):
     after: Vector  #: what they carry behind it: its last move has to have this
     inner: Vector  #: on the way, in a cycle
     inverse: bool  #: G93: a way of another length gives another feed
-    bow: float = 0.0  #: by how much the pieces of a move that was divided may carry more or less
+    knots: tuple[Vector, ...] = ()  #: at the inner ends of the pieces of a move that was divided
     other: Vector | None = None  #: what they may carry instead, where the program leaves open which
 
 
@@ -33,7 +33,6 @@ class Shifts(NamedTuple):
     after: Floats
     inner: Floats
     inverse: Booleans
-    bow: Floats
     placed: Booleans  #: it is known where the axes stood that it names
     others: tuple[Floats, ...]  #: what may be carried instead before it, and behind it
 
@@ -66,7 +65,9 @@ class Ledger:
 
     def __init__(self) -> None:
         self._carried, self._inner, self._other = _Track(3), _Track(3), _Track(3)
-        self._inverse, self._bow, self._loose = _Track(1), _Track(1), _Track(1)
+        self._inverse, self._loose = _Track(1), _Track(1)
+        #: by line whose move was divided: what is carried at the inner ends of its pieces
+        self.knots: dict[int, tuple[Vector, ...]] = {}
         # lines that have become none or several, or the header: first line of the revised program, how many, original
         self._first, self._count, self._original = array("i"), array("i"), array("i")
         self._written = 0
@@ -87,7 +88,8 @@ class Ledger:
         x, y, z = (i - c for i, c in zip(revised.inner, revised.carried, strict=True))
         self._inner.take(line, (x, y, z))
         self._inverse.take(line, (float(block.modal.feed_mode == _INVERSE_TIME),))
-        self._bow.take(line, (revised.bow,))
+        if revised.knots:
+            self.knots[line] = revised.knots
         self._loose.take(line, (float(not revised.placed),))
         x, y, z = (o - c for o, c in zip(revised.other or revised.carried, revised.carried, strict=True))
         self._other.take(line, (x, y, z))
@@ -95,17 +97,24 @@ class Ledger:
     def of(self, lines: Integers) -> Shifts:
         """Return what lines of the original should be shifted by."""
         after = self._carried.at(lines)
-        inverse, bow = self._inverse.at(lines)[:, 0] > 0, self._bow.at(lines)[:, 0]
+        inverse = self._inverse.at(lines)[:, 0] > 0
         before, placed = self._carried.at(lines - 1), self._loose.at(lines)[:, 0] == 0
         others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
-        return Shifts(before, after, after + self._inner.at(lines), inverse, bow, placed, others)
+        return Shifts(before, after, after + self._inner.at(lines), inverse, placed, others)
 
     def at(self, line: int) -> Shift:
         """Return what a line of the original should be shifted by."""
         found = self.of(np.array([line]))
-        before, after, inner, inverse, bow = (row[0].tolist() for row in found[:5])
+        before, after, inner, inverse = (row[0].tolist() for row in found[:4])
         other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
-        return Shift(tuple(before), tuple(after), tuple(inner), inverse, bow, None if other == tuple(after) else other)
+        return Shift(
+            tuple(before),
+            tuple(after),
+            tuple(inner),
+            inverse,
+            self.knots.get(line, ()),
+            None if other == tuple(after) else other,
+        )
 
     def originals(self, lines: Integers) -> Integers:
         """Return the lines of the original that lines of the revised program come from."""

@@ -40,8 +40,9 @@ class Proof(NamedTuple):
     @property
     def sentence(self) -> str:
         """In which states it was proved."""
-        held = ", ".join(("what the program states", *self.held))
-        return f"in {self.states} controller states: held {held}; drawn {', '.join(self.drawn)}"
+        held = ", ".join(("what the program says", *self.held))
+        drawn = (f"{name} (in half of them)" if name in states.HALF else name for name in self.drawn)
+        return f"in {self.states} controller states; the same in all: {held}; not the same: {', '.join(drawn)}"
 
 
 class _Proving(NamedTuple):
@@ -142,7 +143,7 @@ def prove(
         if not setup.no_shift:
             assumed["no G92"] = "no G92 at the start (assumed)"
         held = (assumed.get(word, word) for word in proof.held)
-        return proof._replace(held=("what it is in LinuxCNC's words", *held))
+        return proof._replace(held=("as LinuxCNC runs its translation", *held))
 
 
 def _same(lines: Integers) -> Integers:
@@ -238,7 +239,7 @@ def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError
         return causes[0]
     causes = causes or ["start"]  # the only thing that is drawn always
     raise Unprovable(
-        f"it cannot be proved: line {line}: where the tool stands depends on what is stored in the controller "
+        f"line {line}: where the tool stands depends on what is stored in the controller "
         f"({_listed(causes)}), and the original does not run in all states of it: {reason}; "
         + "; ".join(states.REMEDIES[cause] for cause in causes)
     ) from error

@@ -14,6 +14,8 @@ from thermocomp.shopfloor.stored import SYSTEMS, Stored, drawn
 STATES = 8
 #: seed of a start that is none of theirs
 ELSEWHERE = 99
+#: what is there in half of the states only
+HALF = frozenset({"rotation", "G92"})
 #: what is drawn: how to state it
 REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
     {

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 
 from rich.console import Console
@@ -13,8 +14,9 @@ from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing,
 from thermocomp.cli.revisetravel import Travel
 from thermocomp.compensation.nc.drifting.stations import Station
 from thermocomp.compensation.nc.following.block import Setup
+from thermocomp.compensation.nc.reading.recognise import program_number
 from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising.revise import Revision
+from thermocomp.compensation.nc.revising.revise import FIRST, Revision
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
 from thermocomp.shopfloor import rs274
@@ -71,6 +73,8 @@ def revise(
     int
         0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
+    if controller.controller is None:
+        _refuse_number(program)
     ncprogram.opened(program).close()
     starting.check()
     found = drifting.stations()
@@ -103,6 +107,7 @@ def revise(
         diameters=controller.diameters(expand=way.expand),
         subroutines=way.folders(),
         travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
+        overwrite=overwrite,
     )
     try:
         # a pipe gets its lines on stderr, whatever stdout is for
@@ -126,6 +131,17 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
         said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
         found.append(f"{name} for {', '.join(said)}")
     return found
+
+
+def _refuse_number(program: Path) -> None:
+    """Raise `InputError` if a program begins as a Fanuc's do, and nobody has said whose it is."""
+    with ncprogram.opened(program) as lines:
+        first = list(islice(lines, FIRST))
+    if number := program_number(first):
+        raise InputError(
+            f"{program}: line {number}: {first[number - 1].strip()[:40]!r} is how a Fanuc's or Haas's programs "
+            "begin: say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc"
+        )
 
 
 def _refuse_optional(program: Path) -> None:

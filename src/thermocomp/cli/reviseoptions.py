@@ -274,7 +274,8 @@ class Controller:
     Parameters
     ----------
     controller : str
-        Whose habits the program has; the ISO programs of most machining centres are like Fanuc's.
+        Whose habits the program has: linuxcnc (if not given), or fanuc, for Haas and the ISO programs of most machining
+        centres too. It has to be said of a program that begins with a number (O1234).
     units : str
         Unit when the program starts; without it the program has to say G20 or G21.
     startup : str
@@ -304,10 +305,10 @@ class Controller:
         on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused. With
         --expand it has to be said: off writes them out as plain lines.
     harmless : list of str
-        M codes of the machine's maker that move no axis, such as M88.
+        M codes of the machine's maker that move no axis and leave the spindle as it is, such as M88.
     """
 
-    controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
+    controller: Literal["linuxcnc", "fanuc"] | None = None
     units: Literal["mm", "inch"] | None = None
     startup: str | None = None
     speed: str | None = None
@@ -322,12 +323,17 @@ class Controller:
     block_delete: Literal["on", "off"] | None = None
     harmless: OptionalNames = None
 
+    @property
+    def whose(self) -> Literal["linuxcnc", "fanuc"]:
+        """Whose habits the program has."""
+        return self.controller or "linuxcnc"
+
     def setup(self, machine: Machine | None) -> Setup:
         """Return it as the follower wants it, with what the machine file tells."""
         return Setup(
-            controller=self.controller,
+            controller=self.whose,
             inch=None if self.units is None else self.units == "inch",
-            startup="" if self.startup is None else startup_of(self.startup, self.controller),
+            startup="" if self.startup is None else startup_of(self.startup, self.whose),
             speed=0.0 if self.speed is None else positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
             offsets=dict(origin_of(text) for text in self.origin or ()),
             tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
@@ -335,10 +341,10 @@ class Controller:
             rotations=rotations_of(self.rotation or ()),
             no_shift=self.no_g92,
             rotary={} if machine is None else dict(machine.structure.rotary),
-            integers=self.integers or ("whole" if self.controller == "linuxcnc" else "refuse"),
+            integers=self.integers or ("whole" if self.whose == "linuxcnc" else "refuse"),
             least=positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",
-            harmless=frozenset(m_code_of(text) for text in self.harmless or ()),
+            harmless=frozenset(m_code_of(text, self.whose) for text in self.harmless or ()),
         )
 
     def diameters(self, *, expand: bool) -> dict[int, float] | None:

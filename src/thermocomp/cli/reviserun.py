@@ -23,7 +23,7 @@ from thermocomp.compensation.nc.revising.offset import ending
 from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
-from thermocomp.files.draft import scratch
+from thermocomp.files.draft import publish, scratch
 
 #: what a program that cannot be proved is refused with
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"
@@ -84,6 +84,8 @@ class Job:
         Folders of subprograms, for the expansion.
     travel : Travel, optional
         Watches where the axes go.
+    overwrite : bool
+        Files that are there are replaced.
     """
 
     program: Path
@@ -99,6 +101,7 @@ class Job:
     diameters: Mapping[int, float] | None = None
     subroutines: Sequence[Path] = ()
     travel: Travel | None = None
+    overwrite: bool = False
 
     @property
     def begun(self) -> str:
@@ -168,8 +171,8 @@ def revise(job: Job, *, hidden: bool) -> Done:
 
             title = shown(f"{job.program.name}, {job.begun}")
             pictures.write(run, bounds, job.revision.tool_changes, title, drafts[paths.picture])
-        for path in reversed(paths.all()):  # the program comes last: where it is, all is
-            drafts[path].replace(path)
+        # the program comes last: where it is, all is
+        publish({path: drafts[path] for path in reversed(paths.all())}, overwrite=job.overwrite)
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 

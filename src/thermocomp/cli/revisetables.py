@@ -86,6 +86,8 @@ def warnings(job: Job, done: Done) -> list[str]:
         if done.written and b.model > b.without > 0
     ]
     found += [] if job.travel is None else job.travel.warnings()
+    if revision.standing:
+        found.append(f"the spindle stands at line {revision.standing}, and the tool moves in feed: is that right?")
     if revision.idle:
         found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
     if done.written and revision.method.leaves_mark:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from thermocomp.compensation.nc.following import startup
 from thermocomp.compensation.nc.following.block import Point
+from thermocomp.compensation.nc.following.codes import find
 from thermocomp.compensation.nc.reading.tokens import Controller
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import measured as with_unit
@@ -90,11 +91,13 @@ def startup_of(text: str, controller: Controller) -> str:
         raise InputError(f"--startup {e}") from e
 
 
-def m_code_of(text: str) -> int:
-    """Return the number of an M code."""
+def m_code_of(text: str, controller: Controller) -> int:
+    """Return the number of an M code whose meaning is not known."""
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
         raise InputError(f"--harmless {text!r}: want an M code, such as M88")
+    if (code := find("M", float(number), controller)) is not None:
+        raise InputError(f"--harmless {text!r}: {code.name} is known ({code.does}), and is followed as that")
     return int(number)
 
 

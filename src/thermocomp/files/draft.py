@@ -7,10 +7,12 @@ has made it, however that ends: whoever can lock one knows that its run is dead,
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
+
+from thermocomp.core.exceptions import InputError
 
 _PREFIX = ".thermocomp-"
 _NAME = re.compile(re.escape(_PREFIX) + "[0-9a-f]{32}")
@@ -62,6 +64,46 @@ def draft(target: Path) -> Iterator[Path]:
         path = folder / "draft"
         yield path
         path.replace(target)
+
+
+def publish(drafts: Mapping[Path, Path], *, overwrite: bool) -> None:
+    """Move drafts to where they belong, the last one last: all of them, or none.
+
+    Parameters
+    ----------
+    drafts : mapping of Path to Path
+        Drafts by target.
+    overwrite : bool
+        Files of these names are replaced.
+
+    Raises
+    ------
+    InputError
+        A file of such a name has come into being since somebody looked.
+    """
+    done: list[Path] = []
+    try:
+        for target, path in drafts.items():
+            if overwrite:
+                path.replace(target)
+            else:
+                _link(path, target)
+                done.append(target)
+    except FileExistsError as e:
+        for target in done:
+            target.unlink()
+        raise InputError(f"{target}: has come into being meanwhile; nothing was written: use --overwrite") from e
+
+
+def _link(path: Path, target: Path) -> None:
+    """Let a file have another name, unless there is one."""
+    try:
+        target.hardlink_to(path)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without links
+        with path.open("rb") as source, target.open("xb") as copy:
+            shutil.copyfileobj(source, copy)
 
 
 def _made(folder: Path) -> tuple[Path, int]:

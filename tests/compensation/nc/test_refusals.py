@@ -90,7 +90,10 @@ NOT_FOLLOWED = [
     ("G0 X#7", "unknown"),
     ("M98 P100", "subprogram"),
     ("M99", "subprogram"),
-    ("M101", "a code of the user): nobody knows what it does; if it moves nothing, name it with --harmless M101"),
+    (
+        "M101",
+        "a code of the user): nobody knows what it does; if it leaves axes and spindle as they are: --harmless M101",
+    ),
     ("M70", "M70"),
     ("G28.1", "G28"),
     ("G5.2 X1 Y1 L3 P1", "NURBS"),
@@ -180,12 +183,12 @@ def test_a_speed_that_was_never_told() -> None:
         ("G12.1", "polar interpolation"),
         ("G7.1 C10", "cylindrical"),
         ("G66 P9000", "G65 on every line"),
-        ("G76 X1 Z-1 R1", "G86"),
+        ("G76 X1 Z-1 R1", "G85"),
         ("M198 P1", "subprogram"),
         ("G28", "without axis words"),
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
-        ("M10", "if it moves nothing, name it with --harmless M10"),
+        ("M10", "if it leaves axes and spindle as they are: --harmless M10"),
         ("G999", "unknown (fanuc): nobody knows what it does; remove it"),
         ("T0101", "a lathe program: X is a diameter"),
         ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: a lathe program"),
@@ -239,6 +242,23 @@ def test_fanuc_refusals(text: str, reason: str) -> None:
 def test_fanuc_refusals_that_expand_helps_with(text: str) -> None:
     with pytest.raises(ProgramError, match=r"^line 2: .*--expand writes"):
         run(f"G21 G90\n{text}\n", Setup("fanuc", inch=False))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("G4 X2000", "G4 X2000 has no decimal point"),
+        ("G4 P600.", "P600. for a dwell: with a decimal point it counts seconds for a Haas"),
+        ("G0 Z5.\nG82 X1. Z-1. R1. P2. F100.", "P2. for a dwell"),
+    ],
+)
+def test_dwells_that_controls_read_in_two_ways(text: str, reason: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        run(f"G21 G90\n{text}\n", Setup("fanuc", inch=False, integers="refuse"))
+    assert reason in caught.value.reason
+    assert run("G4 X2.\n", Setup("fanuc", integers="refuse"))[0].pause == 2.0
+    assert run("G4 X2000\n", Setup("fanuc", integers="least"))[0].pause == 2.0
+    assert run("G4 P600\n", Setup("fanuc", integers="refuse"))[0].pause == 0.6
 
 
 def test_integers_can_be_refused() -> None:

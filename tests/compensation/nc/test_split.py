@@ -121,3 +121,41 @@ def test_a_piece_names_no_axis_that_stands_nobody_knows_where(tmp_path: Path) ->
     assert len(made) > 2
     assert not any("Z" in text for text in made)
     trial.proved()
+
+
+@dataclass
+class Humped(Growing):
+    """A hump over X, far steeper than a cut may follow."""
+
+    by_position = True
+    size: float = 90.0
+
+    def deviation(self, point: Point) -> Vector:
+        return 0.0, 0.0, 18.0 + self.size * max(0.0, 1.0 - abs(point[0] / 150.0 - 1.0))
+
+    def field(self) -> Field:
+        return self.deviation
+
+
+@pytest.mark.parametrize("size", [20.0, 90.0])
+def test_no_cut_ends_worse_for_being_split(size: float, tmp_path: Path) -> None:
+    path = tmp_path / "program.ngc"
+    path.write_text("G21 G90 G17 G94 G54\nS3000 M3\nG0 X0 Y0 Z2\nG1 X300 Z-30 F900\nX310\nX300\nG0 Z50\nM2\n")
+    ends = []
+    for split in (True, False):
+        run = revise(path, tmp_path, Humped(size=size), "coordinates", setup=PLACED, split=split)
+        rows = {row.text.strip(): row for row in run.rows}
+        row = rows["G1 X300 Z-30 F900"]
+        ends.append(abs(row.deviation[2] + row.carried[2]))
+        assert run.run.left.most[2] <= 18.0 + size
+    assert ends[0] <= ends[1] + 1.0
+
+
+@pytest.mark.usefixtures("interpreter")
+@pytest.mark.parametrize("text", ["G1 X200 Z-80 F600\nX0 Z150\n", "X60 Y-30 Z-30 F900\nX-100 Y-50 Z3\n"])
+def test_sloped_cuts_are_proved(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "program.ngc"
+    path.write_text(f"G21 G90 G17 G94 G54\nS3000 M3\nG0 X0 Y0 Z190\nG4 P3000\nG1 Z180 F600\n{text}G0 Z190\nM2\n")
+    trial = revise(path, tmp_path, Wavy(), "coordinates", setup=PLACED)
+    assert pieces(trial)
+    trial.proved()

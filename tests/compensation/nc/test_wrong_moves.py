@@ -204,3 +204,12 @@ def test_a_place_behind_a_tool_change_has_no_name(tmp_path: Path) -> None:
     """The changer moves the axes, and nobody knows any more what they carry."""
     with pytest.raises(ProgramError, match="line 5: names the place of X, and nobody knows"):
         tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X5 Y5 Z2\nT1 M6\nG92 X0\nG0 Z5\nM2\n")
+
+
+def test_an_offset_is_taken_up_by_rapids_alone(tmp_path: Path) -> None:
+    """X and Y of a renewed offset would move in the cuts that name them first: a square would become a wedge."""
+    text = f"{BEGIN}S6000 M3\nG0 X10 Y0 Z50\nG4 P100\nG0 Z2\nG1 Z-1 F300\nX100\nY50\nX10\nY0\nG0 Z50\nX0 Y0\nM2\n"
+    trial = tried(tmp_path, text, "offset", drift=Growing())
+    cuts = [row.carried[:2] for row in trial.rows if row.block and row.block.moves and not row.block.moves[-1].rapid]
+    assert len(set(cuts)) == 1
+    assert len({row.carried[2] for row in trial.rows}) > 2

@@ -216,7 +216,8 @@ class Setup:
     skip_optional : bool
         Block delete is on: lines that begin with ``/`` are not run.
     harmless : frozenset of int
-        M codes of the machine's maker or user that move no axis; known codes keep their meaning.
+        M codes of the machine's maker or user that move no axis and leave the spindle as it is; known codes keep their
+        meaning.
     """
 
     controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"

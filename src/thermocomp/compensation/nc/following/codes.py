@@ -148,7 +148,12 @@ _FANUC_G: Final = (
     Code("G68", "rotation", "rotation"),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
     Code("G69", "rotation", "rotation off"),
-    Code("G76", "motion", "fine boring", "it shifts the tool at the bottom by a parameter of the control; use G86"),
+    Code(
+        "G76",
+        "motion",
+        "fine boring",
+        "it shifts the tool by a parameter of the control; use G85, or write it out",
+    ),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
     Code("G103", "look ahead", "limits how far the control looks ahead"),

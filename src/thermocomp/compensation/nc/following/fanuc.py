@@ -148,6 +148,35 @@ def check_place(state: State, orders: Orders, code: str) -> None:
     state.turned_anew = ""
 
 
+def check_dwell(orders: Orders) -> None:
+    """Refuse a dwell in P with a decimal point: it counts seconds for a Haas, and a Fanuc does not take it."""
+    word = orders.words.get("P")
+    if word is not None and word.number is not None and "." in word.value:
+        raise orders.error(
+            f"P{word.value.strip()} for a dwell: with a decimal point it counts seconds for a Haas, and a Fanuc does "
+            "not take it; write milliseconds without a point"
+        )
+
+
+def dwell_of_x(state: State, orders: Orders) -> float:
+    """Return the time of G4 X [s].
+
+    Raises
+    ------
+    ProgramError
+        It has no decimal point, and what it counts then is not said.
+    """
+    word = orders.words["X"]
+    if word.number is None or "." in word.value or not word.number:
+        return orders.values["X"]
+    if state.setup.integers == "refuse":
+        raise orders.error(
+            f"G4 X{word.value.strip()} has no decimal point: whether it counts seconds or milliseconds depends on the "
+            "control; say which with --integers, or write the point"
+        )
+    return orders.values["X"] / (1000.0 if state.setup.integers == "least" else 1.0)
+
+
 def drills(state: State, orders: Orders) -> bool:
     """Return whether a line of a cycle drills: with K0 or L0 it stores its words only.
 

@@ -278,11 +278,11 @@ class Follower:
         state, values = self.state, orders.values
         if once == "G4":
             if "P" in values:
+                if state.fanuc:
+                    fanuc.check_dwell(orders)
                 seconds = motion.dwell_seconds(state, values["P"])
             elif state.fanuc and "X" in values:
-                seconds = values["X"]
-                if state.setup.integers == "least" and "." not in orders.words["X"].value:
-                    seconds /= 1000.0
+                seconds = fanuc.dwell_of_x(state, orders)
             else:
                 raise orders.error("G4 needs P, the time")
             if seconds < 0.0:

@@ -214,6 +214,8 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     modal, values = state.modal, orders.values
     code, scale = modal.motion, state.scale
     _may_drill(state, orders)
+    if state.fanuc:
+        fanuc.check_dwell(orders)
     across = PLANES[modal.plane][2]
     letter = "XYZ"[across]
     axes = {"XYZ"[i]: v / scale for i, v in state.axis_values(orders).items()}

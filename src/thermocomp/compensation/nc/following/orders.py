@@ -111,7 +111,9 @@ class Reader:
             if letter in "PQ" and not self._harmless.isdisjoint(orders.codes):
                 continue
             if letter == "P" and "G54" in orders.codes and self._controller == "fanuc":
-                raise orders.error("G54 with P: write G54.1 P1 for an additional coordinate system")
+                raise orders.error(
+                    f"G54 with P: write G54.1 P{orders.values['P']:g} for an additional coordinate system"
+                )
             if motion not in users and users.isdisjoint(orders.codes):
                 raise orders.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
 
@@ -128,7 +130,7 @@ class Reader:
             code = Code(name, name, "moves nothing")
         if code is None:
             user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
-            remedy = f"if it moves nothing, name it with --harmless {name}; else" if letter == "M" else ""
+            remedy = f"if it leaves axes and spindle as they are: --harmless {name}; else" if letter == "M" else ""
             raise ProgramError(
                 line.number,
                 f"{name} is unknown ({'a code of the user' if user else self._controller}): nobody knows what it does; "

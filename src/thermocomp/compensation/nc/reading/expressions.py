@@ -78,6 +78,13 @@ def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
     return cut
 
 
+def _sure_half(a: float) -> float:
+    rest = abs(a) % 1.0
+    if rest != 0.5 and abs(rest - 0.5) <= _ROUNDED * max(abs(a), 1.0):
+        raise ValueError(f"ROUND of {a:.12g}, which is a half but for rounding")
+    return math.copysign(math.floor(abs(a) + 0.5), a)
+
+
 def _bits(what: Callable[[int, int], int]) -> Binary:
     def on_integers(a: float, b: float) -> float:
         if a != int(a) or b != int(b) or min(a, b) < 0:
@@ -136,6 +143,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 _FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
     "fix": _sure_whole(math.trunc),
     "fup": _sure_whole(lambda a: math.copysign(math.ceil(abs(a)), a)),
+    "round": _sure_half,
 }
 _REFUSED_BY_FANUC = {
     "round": "ROUND in a word rounds to the control's least increment, which the program does not tell",
@@ -186,7 +194,7 @@ class Parameters:
                 raise InputError(
                     f"{target} is set, which changes the machine: {meaning}; set it at the control instead"
                 )
-            known[key] = evaluate(value, self)
+            known[key] = evaluate(value, self, word=False)
         self._values.update(known)
 
     def forget(self, target: str, reason: str) -> None:
@@ -205,7 +213,7 @@ class Parameters:
         return key
 
 
-def evaluate(text: str, parameters: Parameters) -> float:
+def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
     """Return the value of a word or of an assignment.
 
     Parameters
@@ -213,13 +221,15 @@ def evaluate(text: str, parameters: Parameters) -> float:
     text : str
         As written, such as ``[#1 + 2]``, ``-#<depth>``, ``sin[30]``, ``12.5``; for Fanuc also ``#1 + 2``.
     parameters : Parameters
+    word : bool
+        It is the value of a word: there a Fanuc's ROUND gives no whole number.
 
     Raises
     ------
     InputError
         The expression is wrong, has no value (1 / 0), or needs a parameter that is unknown.
     """
-    reader = _Reader(text, parameters)
+    reader = _Reader(text, parameters, word=word)
     try:
         value = reader.expression() if parameters.controller == "fanuc" else reader.value()
         reader.end()
@@ -233,7 +243,8 @@ def evaluate(text: str, parameters: Parameters) -> float:
 class _Reader:
     """Reads a squeezed, lower case text from left to right."""
 
-    def __init__(self, text: str, parameters: Parameters) -> None:
+    def __init__(self, text: str, parameters: Parameters, *, word: bool = True) -> None:
+        self.word = word
         self.written = text.strip()
         self.text = _BLANKS.sub("", text).lower()
         self.place = 0
@@ -332,7 +343,7 @@ class _Reader:
 
     def function(self, name: str) -> float:
         fanuc = self.parameters.controller == "fanuc"
-        if fanuc and name in _REFUSED_BY_FANUC:
+        if fanuc and name in _REFUSED_BY_FANUC and (self.word or name != "round"):
             raise InputError(f"in '{self.written}': {_REFUSED_BY_FANUC[name]}")
         if name == "exists":
             return self._exists()

@@ -149,6 +149,7 @@ class Coordinates(Method):
                 block.line.number, "G87 has levels that are not shifted; --method offset, or --expand writes it out"
             )
         axis = PLANES[block.modal.plane][2]
+        self._refuse_mixed_levels(block, axis)
         goal = frame.words(demand)
         new, shifts, added = list(old), dict[str, float](), dict[str, float]()
         repeats = block.values.get("L", block.values.get("K", 1.0))
@@ -171,6 +172,20 @@ class Coordinates(Method):
         if block.modal.absolute:
             self._levels(block, axis, frame, goal[axis], shifts, added)
         return shifted(block, shifts, added, frame.digits)
+
+    def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
+        """Raise `ProgramError` if levels that were shifted as places go on as distances in G91."""
+        if block.modal.absolute:
+            return
+        if any(word not in block.words for word in (AXES[axis], "R")):
+            if self._cycle:
+                raise ProgramError(
+                    block.line.number,
+                    f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted places: write "
+                    "G80 before, and the cycle with all its words; or --expand",
+                )
+        else:
+            self._cycle = 0.0
 
     def _store(self, block: Block, axis: int, frame: Frame, old: Vector, goal: float) -> str:
         carried, before = self.carried, (self.fixed[axis], self.doubtful[axis])

@@ -56,7 +56,10 @@ class Offset(Method):
         frame = self.frame(block)
         before: tuple[str, ...] = ()
         if self._safe(block):
-            before = self._update(block, frame, demand)
+            # in its plane the others would take it up later, in a cut; across it the tool comes down first
+            named = {*self.named(block), PLANES[block.modal.plane][2]}
+            x, y, z = (demand[i] if i in named else self._shift[i] for i in range(3))
+            before = self._update(block, frame, (x, y, z))
         elif self._begun and self.stands(block):
             before = self._stay(block, frame)
         elif block.ends and self._begun:

@@ -25,7 +25,7 @@ from thermocomp.compensation.nc.revising.elsewhere import Elsewhere
 from thermocomp.compensation.nc.revising.frame import Vector
 from thermocomp.compensation.nc.revising.method import Change, Method
 from thermocomp.compensation.nc.revising.offset import ending
-from thermocomp.compensation.nc.revising.split import Sample, axes_to_split, bow, may_split, pieces, shares
+from thermocomp.compensation.nc.revising.split import Sample, axes_to_split, may_split, pieces, shares
 from thermocomp.compensation.nc.revising.way import at, length
 from thermocomp.compensation.nc.timing.timeline import Kinematics, timed
 from thermocomp.core.exceptions import InputError, ProgramError
@@ -56,7 +56,7 @@ class Revised(NamedTuple):
     cut: Cut | None = None  #: what was met in it, if the tool cuts
     other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
     placed: bool = True  #: it is known where the axes stood that it names: if they do not move, they may not
-    bow: float = 0.0  #: by how much corrections inside it go beyond those at its ends, where it is split [um]
+    knots: tuple[Vector, ...] = ()  #: what the axes carry at the inner ends of its pieces, where it is split [um]
 
 
 @dataclass
@@ -94,6 +94,8 @@ class Revision:
         Spindle speeds met [1/min].
     held : dict of str to (float, int)
         What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
+    standing : int
+        First line that cuts while the spindle stands; 0: none does.
     idle : int
         Lines behind the end of the program that have words: nothing is corrected there.
     """
@@ -115,6 +117,7 @@ class Revision:
     slowest: float = field(default=float("inf"), init=False)
     fastest: float = field(default=0.0, init=False)
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
+    standing: int = field(default=0, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
     _why: str = field(default="", init=False)  # what has held the correction in the cut before
@@ -191,7 +194,10 @@ class Revision:
                 headed = True
             known.refuse(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
-            samples = self._advance(block, end - self.seconds, steered.speed(block), point, cutting)
+            speed = steered.speed(block)
+            if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
+                self.standing = line.number
+            samples = self._advance(block, end - self.seconds, speed, point, cutting)
             self.seconds = end
             if block.tool_change is not None:
                 self.tool_changes.append(start)
@@ -229,7 +235,7 @@ class Revision:
                     cut,
                     change.other,
                     change.placed,
-                    bow([carried for _, carried in knots]) if len(knots) > 2 else 0.0,
+                    tuple(carried for _, carried in knots[1:-1]),
                 )
             )
         if not headed:
@@ -262,6 +268,8 @@ class Revision:
         if len(samples) > 2 and samples[1].demand is not None:
             axes = axes_to_split(block, before)
             parts = shares(samples, begun, axes, method.step, length(block.moves[0]))
+        if len(parts) > 1 and not self._worth(block, samples, parts):
+            parts = [1.0]
         if len(parts) == 1:
             change = method.revise(block, samples[-1].demand or begun)
             check.check(block, change)
@@ -275,6 +283,20 @@ class Revision:
         knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
         texts = tuple(text for c in changes for text in c.texts)
         return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other, changes[0].placed), knots
+
+    def _worth(self, block: Block, samples: list[Sample], parts: list[float]) -> bool:
+        """Return whether less is left in a cut that is split, and at its end not more than a step more."""
+        found = []
+        for ends in ([1.0], parts):
+            method = copy.deepcopy(self.method)
+            demands = {s.share: s.demand or method.carried for s in samples}
+            knots = [(0.0, method.carried)]
+            for piece, share in zip(pieces(block, ends, method.before, self.setup.controller), ends, strict=True):
+                knots.append((share, method.revise(piece, demands[share]).after))
+            left = [max(map(abs, map(add, *pair))) for pair in _beside(samples, knots)]
+            found.append((max(left), left[-1]))
+        (whole, at_end), (split, at_its_end) = found
+        return bool(split < whole and at_its_end <= at_end + self.method.step)
 
     def _demanded(self, line: int, end: float, point: Point) -> Vector:
         try:

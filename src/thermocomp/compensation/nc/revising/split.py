@@ -209,16 +209,3 @@ def _written(block: Block, values: dict[str, float], drop: str) -> str:
         elif word.letter in values:
             text = text[: word.start + 1] + number(values[word.letter], DIGITS) + text[word.end :]
     return text
-
-
-def bow(knots: Sequence[Vector]) -> float:
-    """Return by how much the corrections inside a cut go beyond those at its ends [um]."""
-    first, last = knots[0], knots[-1]
-    return max(
-        (
-            max(min(a, b) - v, v - max(a, b), 0.0)
-            for knot in knots[1:-1]
-            for a, b, v in zip(first, last, knot, strict=True)
-        ),
-        default=0.0,
-    )

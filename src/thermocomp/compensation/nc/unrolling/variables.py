@@ -69,7 +69,7 @@ class Variables:
         except InputError as error:
             raise ProgramError(line, f"a variable: {error}") from None
 
-    def value(self, line: int, text: str, what: str) -> float:
+    def value(self, line: int, text: str, what: str, *, word: bool = True) -> float:
         """Return the value of an expression.
 
         Raises
@@ -78,7 +78,7 @@ class Variables:
             It is not certain.
         """
         try:
-            return evaluate(text, self._parameters)
+            return evaluate(text, self._parameters, word=word)
         except InputError as error:
             raise ProgramError(line, f"{what}: {error}") from None
 
@@ -87,7 +87,7 @@ class Variables:
         found = _EMPTY.fullmatch(condition)
         if found:
             return self._empty(int(found.group(1)), line) == (found.group(2) == "EQ")
-        return self.value(line, condition, "the condition") != 0.0
+        return self.value(line, condition, "the condition", word=False) != 0.0
 
     def leaves_out(self, line: int, word: Word) -> bool:
         """Return whether a word is ignored because its variable is empty, such as ``X#24``."""
