@@ -1,5 +1,6 @@
 """Revised programs of a Fanuc, proved in eight states of a LinuxCNC; what is wrong with one is found in its line."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,12 @@ def trial(tmp_path: Path) -> Trial:
 
 def test_the_program_is_proved(trial: Trial) -> None:
     assert proved(trial)[0] == 8
+
+
+def test_a_cycle_that_goes_up_in_a_line_of_its_own_is_not_divided(trial: Trial) -> None:
+    """In G61 LinuxCNC tells of nothing between a cycle and the line behind it."""
+    setup = replace(SETUP, startup="G61")
+    assert prove(trial.original, trial.revised, trial.ledger, setup).states == 8
 
 
 @pytest.mark.parametrize(

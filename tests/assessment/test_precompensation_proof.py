@@ -32,6 +32,7 @@ def ledger(
     header: int = 0,
     texts: Mapping[int, int] | None = None,
     knots: Mapping[int, tuple[Vector, ...]] | None = None,
+    placed: bool = True,
 ) -> Ledger:
     """Return what lines 1, 2, ... carry at their end, and on the way; and how many lines they have become."""
     made = Ledger()
@@ -42,7 +43,7 @@ def ledger(
         written = ("",) * (texts or {}).get(number, 1)
         block = Block(Line(number, ""), modal)
         inside = (knots or {}).get(number, ())
-        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, knots=inside))
+        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, placed=placed, knots=inside))
     return made
 
 
@@ -199,6 +200,9 @@ AT = "G21 G0 X0 Y0 Z0 A0\n"
         ("G21\nG0 X1\nM2\n", "G21\nG0 X1\nG0 X1\nM2\n", 3, "makes a 'rapid' in place of"),
         ("G21\nG4 P1\nM2\n", "G21\nG4 P2\nM2\n", 2, "gives 'dwell'"),
         ("%\nG21\nG0 X1\nG0 X2\n%\n", "%\nG21\nG0 X1\n%\n", 4, "in the original only|in place of"),
+        ("%\nG21\nG0 X1\n%\n", "%\nG21\nG0 X1\nG0 X2\n%\n", 4, "in the revised program only|in place of"),
+        (f"{AT}S9 M3\nG33.1 Z-5 K1\nM2\n", f"{AT}S9 M3\nG33.1 Z-5.01 K1\nM2\n", 3, "makes another tap"),
+        (f"{AT}G5 X9 Y9 I5 J0 P0 Q-5 F9\nM2\n", f"{AT}G5 X9 Y9 I5.01 J0 P0 Q-5 F9\nM2\n", 2, "makes another curve"),
         ("G21\nG0 A1\nM2\n", "G21\nG0 A2\nM2\n", 2, "moves another axis"),
         (f"{AT}G2 X2 I1 F9\nM2\n", f"{AT}G3 X2 I1 F9\nM2\n", 2, "turns another way"),
         (f"{AT}G2 X2 R2 F9\nM2\n", f"{AT}G2 X2 R2.1 F9\nM2\n", 2, r"moves Y of an arc's centre by -?\d+"),

@@ -43,6 +43,28 @@ def test_a_rotary_axis_that_turns_alone_turns_alone(tmp_path: Path) -> None:
     assert "please report" in e.value.reason
 
 
+def test_a_rapid_that_moves_nothing_moves_nothing(tmp_path: Path) -> None:
+    """It may take a correction in only if nobody knows where it started."""
+    original = HEAD + "G0 X0 Y0 Z20\nG0 X0\nM2\n"
+    revised, rows = original.replace("G0 X0\n", "G0 X0.01\n"), [shift(), shift(), shift(10)]
+    with pytest.raises(ProgramError, match=r"line 3: .*by 10\.00 um where the original moves nothing"):
+        judge(tmp_path, original, revised, rows)
+    judge(tmp_path, original, revised, rows, placed=False)
+
+
+def test_a_circle_stays_one(tmp_path: Path) -> None:
+    """So small and fast a one that its time does not tell."""
+    original = HEAD + "G0 X0.05 Y0 Z0\nG2 X0.05 Y0 I-0.05 J0 F6000\nM2\n"
+    with pytest.raises(ProgramError, match=r"line 3: .*turns another angle"):
+        judge(tmp_path, original, original.replace("G2 X0.05 Y0", "G2 X0.05 Y-0.00005"), [shift()] * 4)
+
+
+def test_a_call_belongs_to_its_line(tmp_path: Path) -> None:
+    original = HEAD + "G0 X0 Y0 Z20\nM8\n\nM2\n"
+    with pytest.raises(ProgramError, match=r"line 3: .*makes a 'flood' that belongs to line 4"):
+        judge(tmp_path, original, original.replace("M8\n\n", "\nM8\n"), [shift()] * 5)
+
+
 def test_a_move_takes_as_long(tmp_path: Path) -> None:
     """A hair's breadth of a linear axis beside a rotary one: twice the way is half the feed of the rotary axis."""
     original = HEAD + "G0 X0 Y0 Z0 A0\nG1 X0.1 A90 F1\nM2\n"
@@ -51,6 +73,13 @@ def test_a_move_takes_as_long(tmp_path: Path) -> None:
         judge(tmp_path, original, revised, [shift(), shift(), shift(10)])
     proof = judge(tmp_path, original, original.replace("X0.1", "X0.101"), [shift(), shift(), shift(1)])
     assert proof.slower == pytest.approx(1.0)
+
+
+def test_a_short_move_takes_as_long(tmp_path: Path) -> None:
+    original = HEAD + "G0 X0 Y0 Z0\nG1 X0.1 F60\nM2\n"
+    with pytest.raises(ProgramError, match=r"line 3: .* it takes 0\.11 s for a move of 0\.1 s"):
+        judge(tmp_path, original, original.replace("X0.1", "X0.11"), [shift(), shift(), shift(10)])
+    judge(tmp_path, original, original.replace("X0.1", "X0.104"), [shift(), shift(), shift(4)])
 
 
 def test_a_feed_that_is_another_for_a_rotary_axis_is_found(tmp_path: Path) -> None:
@@ -134,6 +163,12 @@ def test_an_arc_from_where_the_machine_happens_to_stand(tmp_path: Path) -> None:
         judge(tmp_path, original, original, [shift()] * 3)
 
 
+def test_an_arc_from_a_place_in_another_system(tmp_path: Path) -> None:
+    original = HEAD + "G0 X0 Y0 Z5\nG55\nG2 X2 Y0 I1 J0 F100\nM2\n"
+    with pytest.raises(Unprovable, match=r"line 4: where the tool stands depends on .*\(origins\).*--origin"):
+        judge(tmp_path, original, original, [shift()] * 5)
+
+
 def test_what_does_not_run_with_a_drawn_tool_is_proved_without_one(tmp_path: Path) -> None:
     original = HEAD + "T1 M6\nG0 X0 Y0 Z0\nG41 G1 X5 F100\nX10\nG3 X10 Y0.02 I0 J0.01\nG1 X5\nG40 X0\nM2\n"
     proof = judge(tmp_path, original, original, [shift()] * 9)
@@ -170,6 +205,11 @@ def test_the_states_are_extreme_and_hold_what_is_stated() -> None:
         assert one.stored.origins[1] != other.stored.origins[1]
         assert one.stored.lengths[1] != other.stored.lengths[1]
         assert one.stored.home30 != other.stored.home30
+        assert one.stored.diameters[1] != other.stored.diameters[1]
+        assert one.stored.parameters[100] != other.stored.parameters[100]
+        assert one.stored.start != other.stored.start
+        assert one.stored.active_length != other.stored.active_length
+        assert one.stored.spindle != other.stored.spindle
     held = replace(setup, inch=True, skip_optional=True, no_shift=True, startup="G98", rotations=PLAIN.rotations)
     for number in range(states.STATES):
         s = states.state(held, number, set(states.free(held)))
@@ -259,6 +299,34 @@ def test_a_piece_beside_its_way_is_found(tmp_path: Path, pieces: tuple[str, ...]
         judge(tmp_path, LONG, divided(*pieces), RAMP, texts={3: 3}, knots={3: ((0.0, 0.0, 5.0), (0.0, 0.0, 10.0))})
 
 
+@pytest.mark.parametrize(
+    "ends",
+    [("X50 Y25", "X49.9 Y24.95"), ("X-0.4 Y-0.2", "X50 Y25"), ("X50 Y25", "X100.4 Y50.2"), ("X50 Y25", "X50 Y25")],
+)
+def test_pieces_go_on(tmp_path: Path, ends: tuple[str, str]) -> None:
+    """The way of those that go back, or begin before the start, is longer by less than what time tells."""
+    pieces = divided(f"G1 {ends[0]} Z0.01 F1000", f"{ends[1]} Z0.01", "X100 Y50 Z0.02")
+    with pytest.raises(ProgramError, match=r"line 3: .*a piece of a divided move"):
+        judge(tmp_path, LONG, pieces, RAMP, texts={3: 3}, knots={3: ((0.0, 0.0, 10.0), (0.0, 0.0, 10.0))})
+
+
+def test_no_other_pieces_than_were_asked_for(tmp_path: Path) -> None:
+    pieces = divided("G1 X50 Y25 F1000", "X100 Y50")
+    judge(tmp_path, LONG, pieces, [shift()] * 5, texts={3: 2}, knots={3: (NONE,)})
+    for knots in ({}, {3: (NONE, NONE)}):
+        with pytest.raises(ProgramError, match=r"line 3: .*other pieces than were asked for"):
+            judge(tmp_path, LONG, pieces, [shift()] * 5, texts={3: 2}, knots=knots)
+
+
+def test_pieces_turn_evenly(tmp_path: Path) -> None:
+    original = LONG.replace("Z0\n", "Z0 A0\n").replace("Y50 F", "Y50 A90 F")
+    pieces = original.replace("X100 Y50 A90 F1000\n", "X50 Y25 Z0.01 A45 F1000\nX100 Y50 Z0.02 A90\n")
+    knots = {3: ((0.0, 0.0, 10.0),)}
+    judge(tmp_path, original, pieces, RAMP, texts={3: 2}, knots=knots)
+    with pytest.raises(ProgramError, match=r"line 3: .*a piece of a divided move"):
+        judge(tmp_path, original, pieces.replace("A45", "A45.1"), RAMP, texts={3: 2}, knots=knots)
+
+
 def test_pieces_may_bow(tmp_path: Path) -> None:
     pieces = divided("G1 X25 Y12.5 Z0.023 F1000", "X50 Y25 Z0.02", "X100 Y50 Z0.02")
     judge(tmp_path, LONG, pieces, RAMP, texts={3: 3}, knots={3: ((0.0, 0.0, 23.0), (0.0, 0.0, 20.0))})
@@ -315,3 +383,25 @@ def test_an_arc_may_be_divided(tmp_path: Path, plane: str) -> None:
     for was, now in (("8 ", "8.0004 "), ("-6 ", "-5.9996 "), ("0.024", "0.0264")):
         with pytest.raises(ProgramError, match=r"line 3: .*(piece of a divided move|moves|refuses)"):
             judge(tmp_path, original, pieces.replace(was, now), rows, texts={3: 3}, knots=knots)
+
+
+#: pieces that carry nothing
+FLAT_INSIDE = {3: (NONE,)}
+
+
+@pytest.mark.parametrize(("first", "second"), [("G3", "G2"), ("G2", "G3")])
+def test_an_arc_in_pieces_keeps_its_turn(first: str, second: str, tmp_path: Path) -> None:
+    """Half a circle takes as long either way."""
+    original = HEAD + "G0 X10 Y0 Z0\nG3 I-10 J0 F1000\nM2\n"
+    pieces = original.replace("G3 I-10 J0 F1000\n", f"{first} X-10 I-10 J0 F1000\n{second} X10 I10\n")
+    with pytest.raises(ProgramError, match=r"line 3: .*(turns another way|a piece of a divided move)"):
+        judge(tmp_path, original, pieces, [shift()] * 4, texts={3: 2}, knots=FLAT_INSIDE)
+
+
+def test_an_arc_in_pieces_keeps_its_centre(tmp_path: Path) -> None:
+    """Where a piece is nearly a circle its end hardly tells of another centre."""
+    original = HEAD + "G0 X10 Y0 Z0\nG3 I-10 J0 F1000\nM2\n"
+    pieces = original.replace("G3 I-10 J0 F1000\n", "G3 X9.998 Y-0.199987 I{} F1000\nX10 Y0 I-9.998 J0.199987\n")
+    judge(tmp_path, original, pieces.format("-10 J0"), [shift()] * 4, texts={3: 2}, knots=FLAT_INSIDE)
+    with pytest.raises(ProgramError, match=r"line 3: .*a piece of a divided move"):
+        judge(tmp_path, original, pieces.format("-9.998 J-0.00002"), [shift()] * 4, texts={3: 2}, knots=FLAT_INSIDE)

@@ -198,6 +198,12 @@ def test_under_cutter_compensation_the_tool_is_beside_the_contour_by_almost_noth
     assert all(min(math.dist(end, goal) for goal in ((10, 10), (10, 30), (30, 30), (40, 0))) < 0.02 for end in ends)
 
 
+def test_dwells_of_cycles_count_seconds() -> None:
+    text = "G21 G90 G17 S100 M3 F100\nG0 X0. Y0. Z9.\nG99 G82 X1. Z-3. R2. P500\nM30\n"
+    told = [line for line, _ in translate(split_lines(text), SETUP)]
+    assert told[-2] == "G99 G82 X1 Z-3 R2 P0.5\n"
+
+
 def test_every_line_tells_where_it_comes_from() -> None:
     text = "%\nO1 (A)\nG20\n\nG0 G91 G28 Z0.\nG90 G80\n(X)\nG68 X0. Y0. R90.\nG69\nM30\n%\nX1.\n"
     assert list(translate(split_lines(text), SETUP)) == [

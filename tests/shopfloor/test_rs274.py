@@ -275,12 +275,14 @@ def test_what_cannot_be_read_is_told_with_its_line(tmp_path: Path, head: str) ->
 
 def test_comments_of_any_bytes_are_read(run: Run, tmp_path: Path) -> None:
     """The interpreter's module cannot tell of a comment that is not ASCII, in the program or in a subprogram."""
-    (tmp_path / "far.ngc").write_bytes("o<far> sub\n(Fräser 6 mm)\nG0 Y1\no<far> endsub\nM2\n".encode())
+    (tmp_path / "far.ngc").write_bytes("o<far> sub\n(Fräser 6 mm)\nG0 Y1\no<far> endsub\nM2\n".encode("latin-1"))
     calls = run("G21\n(ge\xe4ndert \xb5m)\n(MSG,\xe4)\nG0 X1\no<far> call\nM2\n")
     assert [c.text for c in calls if c.kind in ("comment", "message")][:2] == ["ge?ndert ?m", "?"]
     assert [(c.line, c.kind) for c in calls if c.kind == "rapid"] == [(4, "rapid"), (3, "rapid")]
     with pytest.raises(ProgramError, match="line 2: the interpreter refuses it"):
         run("G21\nG0 X1\xe4\nM2\n")
+    with pytest.raises(ProgramError, match=r"line 2: the interpreter refuses it: .*o<fr\?sen>"):
+        run("G21\no<fr\xe4sen> call\nM2\n")
 
 
 def test_nothing_beside_a_program_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,6 +48,9 @@ def test_where_a_cycle_ends_is_certain_if_the_level_is_or_by_g99(codes: str) -> 
     below = run(f"F100 {codes}\nG0 Z1\nG81 X1 Y1 Z-1 R2\n")[-1]
     assert below.known[2]
     assert not run(f"F100 {codes}\nG0 Z5\nG91 G81 X1 Y1 Z-1 R2\nM0\n")[-1].known[2]
+    for stop in ("M0", "M6 T1"):  # the level is where the axes stood before
+        assert run(f"F100 {codes}\nG0 Z5\nG81 X1 Y1 Z-1 R2\n{stop}\nX2\n")[-1].known[2] is (codes == "G99")
+    assert not run(f"F100 {codes}\nG91 G81 X1 Y1 Z-1 R2\n")[-1].known[2]  # R counts from there
 
 
 def test_the_tool_goes_up_to_r_first() -> None:

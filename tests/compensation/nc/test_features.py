@@ -32,6 +32,7 @@ FEATURES = [
     Feature("absolute", "G1 Z-1\nX50\nY20 Z-2\nG0 Z10\n"),
     Feature("lines without Z", "G1 Z-1\nX50\nY20\nX0\nG0 Z10\n"),
     Feature("incremental", "G1 Z-1\nG91\nX5\nY5 Z-0.5\nX-5\nG90\nG0 Z10\n"),
+    Feature("incremental rapids up there", "G4 P60\nG91\nG0 X5\nX5 Y2\nG90\nX0\nG1 Z-1\nG0 Z10\n"),
     Feature("inches", "G20\nG0 Z0.5\nG1 Z-0.05\nX1.5 Y0.25\nG0 Z0.5\n"),
     Feature("numbers with spaces", "G1 Z - 1 . 5\nX + 5 0\nG 0 Z 1 0\n"),
     Feature("parameters", "#1=-1.5\n#<deep>=[#1*2]\nG1 Z#1\nX20 Z#<deep>\nZ-#1\nG0 Z10\n"),

@@ -76,12 +76,13 @@ def test_what_stands_beside_a_cut_stays_beside_its_first_piece(tmp_path: Path) -
         "G91 G1 X500\nG90\n",
         "G61\nX500\n",
         "G61.1\nX500\n",
-        "G93 G1 X500 F1\nG94 F100\n",
+        "G93\nG1 X500 F1\nG94 F100\n",
         "/X500\nX500\n",
         "X[500]\n",
         "G2 X0 Y0 I200 P2\n",
         "G0 X500\n",
         "X500 A360\n",
+        "M0\nX500 Z-1\n",
     ],
 )
 def test_what_is_not_a_plain_cut_stays_whole(text: str, tmp_path: Path) -> None:
@@ -99,6 +100,27 @@ def test_the_ends_of_lines_stay(tmp_path: Path) -> None:
     assert not any(
         len(row.texts) > 1 and "G52" not in row.texts[0] for row in tried(tmp_path, "X500\n", way="offset").rows[1:]
     )
+
+
+class Slanting(Wavy):
+    """X drifts as Z does."""
+
+    def deviation(self, point: Point) -> Vector:
+        z = Wavy(self.time).deviation(point)[2]
+        return z, 0.0, z
+
+    def field(self) -> Field:
+        return Slanting(self.time).deviation
+
+
+def test_a_piece_names_no_axis_that_stands_nobody_knows_where(tmp_path: Path) -> None:
+    path = tmp_path / "program.ngc"
+    path.write_text("G21 G90 G17 G94 G54\nS3000 M3\nG0 X0 Y0\nG1 X500 F3000\nM2\n")
+    trial = revise(path, tmp_path, Slanting(), "coordinates", setup=PLACED)
+    made = pieces(trial)["G1 X500 F3000"]
+    assert len(made) > 2
+    assert not any("Z" in text for text in made)
+    trial.proved()
 
 
 @dataclass

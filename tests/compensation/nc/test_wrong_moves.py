@@ -75,7 +75,14 @@ TABLE = replace(STATED, rotary={"A": "table", "B": "table"})
 
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 @pytest.mark.parametrize(
-    "turn", ["G1 X10 Y0 Z-1 A{} F720", "G95 G1 X10 Y0 Z-1 A{} F0.5", "G0 X10 Y0 Z-1 A{}", "G1 A{} Z-1 F720"]
+    "turn",
+    [
+        "G1 X10 Y0 Z-1 A{} F720",
+        "G95 G1 X10 Y0 Z-1 A{} F0.5",
+        "G0 X10 Y0 Z-1 A{}",
+        "G1 A{} Z-1 F720",
+        "G0 Z20\nG4 P60\nG0 X{0}\nG4 P60\nG0 X{0} Z20 A{0}\nG0 X10",
+    ],
 )
 def test_a_turn_of_the_table_stays_one(way: str, turn: str, tmp_path: Path) -> None:
     """F counts degrees only while X, Y and Z stand still: a micrometre of Z makes 3.6 s of 30 s."""
@@ -103,6 +110,15 @@ def test_a_turn_from_a_place_that_nobody_knows_is_refused(tmp_path: Path) -> Non
 def test_where_a_cycle_ends_nobody_dives(cycle: str, tmp_path: Path) -> None:
     trial = tried(tmp_path, f"{BEGIN}G53 G0 Z0\nT1 M6\nG43 H1\nS12000 M3\nG0 X10 Y0\n{cycle}M30\n")
     assert 0.01 < farthest(trial) < 1.0
+
+
+@pytest.mark.parametrize("before", ["", "G0 Z5\nG55\n", "G0 Z5\nG43 H2\n", "G0 Z5\nG10 L2 P1 Z0\n"])
+def test_no_word_is_added_where_nobody_knows(before: str, tmp_path: Path) -> None:
+    """At the start, and where an origin or a length changes that the program does not tell."""
+    trial = tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X0 Y0\n{before}G4 P200\nG0 X50\nG1 X60 F100\nG0 Z5\nG1 Z-1\nM2\n")
+    rows = {row.text.strip(): row for row in trial.rows}
+    assert not any("Z" in rows[line].texts[-1] for line in ("G0 X50", "G1 X60 F100"))
+    assert rows["G1 Z-1"].texts != ("G1 Z-1\n",)
 
 
 @pytest.mark.parametrize("stop", ["M0", "M1", "M60"])
@@ -182,6 +198,12 @@ def test_a_stop_comes_after_the_move_of_its_line(stop: str, tmp_path: Path) -> N
     """The operator moves the axes, and nobody knows any more what they carry: their place cannot be named."""
     with pytest.raises(ProgramError, match="line 4: names the place of X, and nobody knows"):
         tried(tmp_path, f"{BEGIN}S1000 M3\nX5 Y5 Z2 F100 G1 {stop}\nG92 X0\nG0 Z5\nM2\n")
+
+
+def test_a_place_behind_a_tool_change_has_no_name(tmp_path: Path) -> None:
+    """The changer moves the axes, and nobody knows any more what they carry."""
+    with pytest.raises(ProgramError, match="line 5: names the place of X, and nobody knows"):
+        tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X5 Y5 Z2\nT1 M6\nG92 X0\nG0 Z5\nM2\n")
 
 
 def test_an_offset_is_taken_up_by_rapids_alone(tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def plain(text: str) -> str:
 
 def wrapped(text: str, lines: int) -> list[str]:
     """Return a text in so many lines of a header; dots stand for what does not fit."""
-    return textwrap.wrap(plain(text), ROOM, max_lines=lines, placeholder=" ...")
+    return textwrap.wrap(text, ROOM, max_lines=lines, placeholder=" ...")
 
 
 def refuse_revised(line: Line) -> None:
