@@ -207,7 +207,7 @@ def _show(
             where = " ".join(part for part in (r.test.axis, r.test.state) if part)
             _console.print(f"[yellow]note[/] {escape(f'{where}: {note}' if where else note)}")
     if page is not None:
-        _console.print(f"Page: {page}")
+        _console.print(f"Page: {page}", soft_wrap=True)
 
 
 def _print_json(

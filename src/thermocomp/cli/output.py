@@ -94,7 +94,7 @@ def show_choices(
             f"[bold green]{escape(c.target)}: {escape(', '.join(c.sensors)) or 'no sensor'}[/]: {escape(c.reason)}"
         )
     if page is not None:
-        console.print(f"Page: {page}")
+        console.print(f"Page: {page}", soft_wrap=True)
 
 
 def print_table(t: ChoiceTable, console: Console) -> None:
@@ -146,7 +146,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     for m in fitted.models:
         if m.honest_error is not None and not m.accepted:
             console.print(f"[red]refused[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
-    console.print(f"Model file: {path}")
+    console.print(f"Model file: {path}", soft_wrap=True)
 
 
 def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:

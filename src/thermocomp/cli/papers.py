@@ -121,7 +121,7 @@ def papers(
             from thermocomp.report import papers as pages
         pages.write([study for study, _ in done], output, seed=seed)
         if not json:
-            _console.print(f"Page: {output}")
+            _console.print(f"Page: {output}", soft_wrap=True)
     if json:
         print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]}, _console)
     return 0

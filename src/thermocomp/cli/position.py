@@ -177,7 +177,7 @@ def position(
         else:
             told.show(found[0], tests[0], left_open, _console)
         if output is not None:
-            _console.print(f"Model file: {output}")
+            _console.print(f"Model file: {output}", soft_wrap=True)
     return 0 if all(f.assessment.accepted for f in found) else 1
 
 

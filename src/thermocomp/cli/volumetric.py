@@ -105,7 +105,7 @@ def volumetric(
     else:
         _show(result, point=at is not None or grid is None, volume=grid is not None or at is None)
         if output is not None:
-            _console.print(f"Page: {output}")
+            _console.print(f"Page: {output}", soft_wrap=True)
     return 0
 
 

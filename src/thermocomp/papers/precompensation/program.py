@@ -35,8 +35,8 @@ TOOL = 120.0
 #: what stands at the controller
 SETUP = Setup(offsets={1: (0.0, 0.0, -TOOL)}, tools={1: TOOL})
 KINEMATICS = Kinematics()
-#: the tool is up [mm]
-UP = 600.0
+#: the tool is up, above the highest face [mm]
+UP = 650.0
 #: a face is so many passes of X, from left to right and back [mm], so far apart [mm], at this feed [mm/min]
 PASSES, LENGTH, APART, FEED = 5, 240.0, 25.0, 1200.0
 #: where the faces that are milled cold, and after the hour, begin in X; where the first position's does in Y [mm]
