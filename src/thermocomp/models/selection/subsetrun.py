@@ -1,7 +1,10 @@
 """A run of the searches of `best_subsets`: threads, clock, and what is safe to say when it has ended."""
 
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Literal
 
 import numpy as np
@@ -130,19 +133,20 @@ def run(
                     break
                 now = time.monotonic()
                 if nodes is not None and result.looked >= nodes:
-                    result.stopped = "nodes"
+                    result.stopped = result.stopped or "nodes"
                 elif seconds is not None and now - began >= seconds:
-                    result.stopped = "seconds"
+                    result.stopped = result.stopped or "seconds"
                 if progress is not None and now - said >= 1:
                     said = now
                     progress(f"best subsets: {result.looked:,} sets looked at in {now - began:.0f} s")
 
     try:
-        if whole:
-            work(result.parts[0])
-        else:
-            Parallel(n_jobs=jobs, prefer="threads")(delayed(work)(part) for part in result.parts[:jobs])
-    except KeyboardInterrupt:
+        with _interrupts(result):
+            if whole:
+                work(result.parts[0])
+            else:
+                Parallel(n_jobs=jobs, prefer="threads")(delayed(work)(part) for part in result.parts[:jobs])
+    except KeyboardInterrupt:  # before the search could take it, or from `progress`
         result.stopped = "interrupted"
     for part in result.parts:
         result.leave_open(part.open_from())
@@ -151,3 +155,21 @@ def run(
         part.start(task, task + 1)
         result.leave_open(part.open_from())
     return result
+
+
+@contextmanager
+def _interrupts(result: Result) -> Iterator[None]:
+    """Let the keyboard stop a search: raised, an interrupt may get lost in a callback of the threads that search."""
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def stop(*_: object) -> None:
+        result.stopped = "interrupted"
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
