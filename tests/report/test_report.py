@@ -11,7 +11,8 @@ import pytest
 
 from smallmachine import small_machine
 from thermocomp.assessment import splits
-from thermocomp.assessment.compare import Comparison, compare
+from thermocomp.assessment.compare import compare
+from thermocomp.assessment.results import Comparison
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.report import html

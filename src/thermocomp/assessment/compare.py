@@ -1,18 +1,21 @@
 """Compare methods on unseen blocks: train, replay, judge."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
-from thermocomp.assessment.diagnostics import Collinearity, collinearity
+from thermocomp.assessment.diagnostics import collinearity
+from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.robustness import Robustness, pooled, stress
+from thermocomp.assessment.results import Assessment, Comparison, Rules
+from thermocomp.assessment.robustness import pooled, stress
 from thermocomp.assessment.splits import Judging, Split, called, stretches
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
@@ -27,115 +30,12 @@ IntArray = NDArray[np.intp]
 ALL = "all unseen cycles"
 
 
-@dataclass(frozen=True, eq=False)
-class Assessment:
-    """How one model did for one target on one unseen block.
-
-    Parameters
-    ----------
-    model, target, block : str
-    measured, predicted : ndarray of shape (n_judged,)
-        Deviations [um].
-    row, test, cycle : ndarray of int of shape (n_judged,)
-        Where the rows stand in their file, which file, which thermal cycle.
-    verdict : Verdict
-        Of the do-no-harm gate.
-    sensors : tuple of str
-        Inputs with an influence; those of all models, if several were trained.
-    fit_s : float
-        The fits took [s].
-    n_effective : float
-        Independent rows the residual is worth.
-    robustness : Robustness or None
-    frozen : ErrorModel or None
-        The model that was replayed; None for several blocks together, or if it could not be fitted.
-    failure : str
-        Why the method could not be fitted; empty if it could.
-    caveat : str
-        Why this is no honest test, whatever the figures say; empty if it is one.
-    overall : bool
-        It is the last word on this model and target: all that was judged, not one cycle of it.
-    n_sensors : tuple of (int, int)
-        Fewest and most inputs with an influence in one model.
-    """
-
-    model: str
-    target: str
-    block: str
-    measured: FloatArray
-    predicted: FloatArray
-    row: IntArray
-    test: IntArray
-    cycle: IntArray
-    verdict: harm.Verdict
-    sensors: tuple[str, ...]
-    fit_s: float
-    n_effective: float
-    robustness: Robustness | None = None
-    frozen: ErrorModel | None = None
-    failure: str = ""
-    caveat: str = ""
-    overall: bool = False
-    n_sensors: tuple[int, int] = (0, 0)
-
-    def metric(self, name: str) -> float:
-        """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
-        return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
-
-    def none_metric(self, name: str) -> float:
-        """Return the metric without compensation."""
-        return (
-            metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
-        )
-
-    @property
-    def accepted(self) -> bool:
-        """True if the gate let it pass."""
-        return not self.failure and not self.caveat and self.verdict.accepted
-
-    @property
-    def reason(self) -> str:
-        """Why it was accepted or refused."""
-        if self.failure:
-            return f"could not be judged: {self.failure}"
-        return self.caveat or self.verdict.reason
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Several methods on the same unseen blocks.
-
-    Parameters
-    ----------
-    judging : Judging
-    assessments : tuple of Assessment
-        Per target, method and block; with several blocks also one for all of them together.
-    collinearity : Collinearity
-        Of the temperatures.
-    left : int
-        Pairs of method and target that were not judged, because the work was stopped.
-    """
-
-    judging: Judging
-    assessments: tuple[Assessment, ...]
-    collinearity: Collinearity
-    left: int = 0
-
-    def overall(self) -> tuple[Assessment, ...]:
-        """Return one assessment per target and method: over all its blocks."""
-        return tuple(a for a in self.assessments if a.overall)
-
-    def best(self, target: str) -> Assessment | None:
-        """Return the accepted assessment with the smallest RMS for a target, of the methods that can be deployed."""
-        fit = [a for a in self.overall() if a.target == target and a.accepted and deployable(a.model)]
-        return min(fit, key=lambda a: a.metric("rms"), default=None)
-
-
 def compare(
     samples: Samples,
     methods: Sequence[str],
     judging: Judging,
     *,
+    rules: Rules = Rules(),
     support: Support = Support(),
     robustness: bool = True,
     jobs: int = 1,
@@ -152,6 +52,8 @@ def compare(
         ``all`` stands for all of them.
     judging : Judging
         What is learned from and what is judged.
+    rules : Rules
+        What is stated before judging.
     support : Support
         What the models do outside their trained range.
     robustness : bool
@@ -164,37 +66,96 @@ def compare(
     Returns
     -------
     Comparison
+
+    Raises
+    ------
+    InputError
+        A method is unknown, or the primary one is not among them.
     """
     names = expand(methods)
-    pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in judging.splits]
+    rules.check(names)
+    targets, n = range(len(samples.targets)), len(judging.splits)
+    pieces = [(k, name, split) for k in targets for name in names for split in judging.splits]
     done: list[Assessment] = []
-    work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
+    work = (delayed(_assess_method)(samples, name, k, split, rules, support, robustness) for k, name, split in pieces)
+    scores: dict[int, dict[str, list[list[float]]]] = {}
+    inners = _inners(names, judging, rules)
     try:
         for a in Parallel(n_jobs=jobs, return_as="generator")(work):
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
+        scores = _scores(samples, names, judging, inners, jobs, progress)
     except KeyboardInterrupt:
-        if len(done) < len(judging.splits):
+        if len(done) < n:
             raise
+    whole = len(done) // n  # a method that was judged on some of the blocks only is left out
+    parts = [done[k * n : (k + 1) * n] for k in range(whole)]
     found: list[Assessment] = []
-    whole = len(done) // len(judging.splits)  # a method that was judged on some of the blocks only is left out
-    for k in range(whole):
-        parts = done[k * len(judging.splits) : (k + 1) * len(judging.splits)]
-        found += parts if len(parts) > 1 else []
-        found.append(_together(parts))
+    recommended: list[Recommendation] = []
+    for k in targets:
+        mine = {p[0].model: p for p in parts if p[0].target == samples.targets[k].name}
+        if not mine:
+            continue
+        verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
+        best = recommend(samples.targets[k].name, list(scores[k]), verdicts, scores[k], inners) if k in scores else None
+        recommended += [best] if best else []
+        after = corrected({name: harm.together(v) for name, v in verdicts.items()}, rules.primary, best)
+        for name, p in mine.items():
+            found += p if len(p) > 1 else []
+            found.append(replace(_together(p), verdict=after[name]))
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
-    return Comparison(judging, tuple(found), heat, left=len(pieces) // len(judging.splits) - whole)
+    return Comparison(judging, tuple(found), heat, left=len(pieces) // n - whole, recommended=tuple(recommended))
 
 
-def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging) -> int:
+def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
+    """Return the training parts that a recommendation needs; none if there is nothing to choose."""
+    choices = sum(deployable(name) for name in names)
+    return inner_splits(judging) if choices > 1 and rules.primary is None else []
+
+
+def _scores(
+    samples: Samples,
+    names: Sequence[str],
+    judging: Judging,
+    inners: Sequence[Inner],
+    jobs: int,
+    progress: Callable[[str], None],
+) -> dict[int, dict[str, list[list[float]]]]:
+    """Return the inner scores per target and method that may be chosen."""
+    if not inners:
+        return {}
+    kept = [name for name in names if deployable(name)]
+    pieces = [(k, name, inner) for k in range(len(samples.targets)) for name in kept for inner in inners]
+    work = (delayed(score)(samples, name, k, judging, inner) for k, name, inner in pieces)
+    found: dict[int, dict[str, list[list[float]]]] = {
+        k: {name: [] for name in kept} for k in range(len(samples.targets))
+    }
+    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    for (k, name, inner), values in zip(pieces, results, strict=True):
+        progress(f"{samples.targets[k].name} {name} without {inner.split.block}")
+        found[k][name].append(values)
+    return found
+
+
+def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging, rules: Rules = Rules()) -> int:
     """Return the number of pieces of work of `compare`."""
-    return len(samples.targets) * len(expand(methods)) * len(judging.splits)
+    names = expand(methods)
+    inner = len(_inners(names, judging, rules)) * sum(deployable(n) for n in names)
+    return len(samples.targets) * (len(names) * len(judging.splits) + inner)
 
 
 def judge(
-    name: str, model: ErrorModel, samples: Samples, split: Split, *, fit_s: float = 0.0, robustness: bool = True
+    name: str,
+    model: ErrorModel,
+    samples: Samples,
+    split: Split,
+    *,
+    learned: Learned | None = None,
+    rules: Rules = Rules(),
+    fit_s: float = 0.0,
+    robustness: bool = True,
 ) -> Assessment:
     """Judge a frozen model on a block.
 
@@ -207,6 +168,10 @@ def judge(
         With all of the model's inputs, and its target.
     split : Split
         Only its block is looked at.
+    learned : Learned, optional
+        What the model is held against; what it learned itself if not given.
+    rules : Rules
+        What was stated before judging.
     fit_s : float
         The fit took [s].
     robustness : bool
@@ -222,6 +187,8 @@ def judge(
     if not rows.any():
         return _failed(samples, name, target, split, f"{model.target} has no number in {split.block} to judge against")
     measured = samples.deviations[rows, target]
+    if learned is None and model.provenance is not None:
+        learned = model.provenance.learned
     stressed = stress(model, samples, measured, rows) if robustness else None
     predicted = stressed.predicted if stressed else replay(model, samples, rows)[0]
     if not np.isfinite(metrics.rms(measured, predicted)):
@@ -235,8 +202,23 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.judge(
-            measured, predicted, [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
+        verdict=harm.Verdict(
+            units=tuple(
+                harm.measure(
+                    unit,
+                    measured[mine],
+                    predicted[mine],
+                    learned or samples.learned(target, rows),
+                    unit=model.unit,
+                    margin=rules.margin,
+                    stretch=split.stretch,
+                )
+                for unit, mine in ([(split.name, rows[rows])] if split.whole else _segments(samples, rows))
+                if mine.sum() >= harm.MIN_ROWS
+            ),
+            unit=model.unit,
+            caps=_caps(split, learned),
+            refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
         ),
         sensors=model.sensors,
         n_sensors=(len(model.sensors), len(model.sensors)),
@@ -247,22 +229,33 @@ def judge(
     )
 
 
+def _caps(split: Split, learned: Learned | None) -> tuple[str, ...]:
+    """Return what keeps a model from being accepted, whatever its errors."""
+    found = []
+    if split.stretch:
+        found.append("judged on one stretch that goes on from what was learned")
+    if learned is None:
+        found.append("the model does not say what it learned, so that it cannot be held against that")
+    return tuple(found)
+
+
 def per_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
-    for verdict, block in zip(whole.verdict.cycles, stretches(whole.cycle, whole.test), strict=True):
+    blocks = [b for b in stretches(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= harm.MIN_ROWS]
+    for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]
         found.append(
             replace(
                 whole,
-                block=f"cycle {verdict.cycle}",
+                block=f"cycle {unit.name}",
                 measured=measured,
                 predicted=predicted,
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],
-                verdict=harm.Verdict((verdict,), whole.verdict.level),
+                verdict=replace(whole.verdict, units=(unit,)),
                 n_effective=effective_sample_size(measured - predicted),
                 robustness=None,
                 overall=False,
@@ -272,13 +265,24 @@ def per_cycle(whole: Assessment) -> list[Assessment]:
 
 
 def _assess_method(
-    samples: Samples, name: str, target: int, split: Split, support: Support, robustness: bool
+    samples: Samples, name: str, target: int, split: Split, rules: Rules, support: Support, robustness: bool
 ) -> Assessment:
     try:
         trained = train(name, samples, target, split.learn, support=support)
     except FitError as e:
         return _failed(samples, name, target, split, str(e))
-    return judge(name, trained.model, samples, split, fit_s=trained.seconds, robustness=robustness)
+    first = int(np.argmax(split.judge))
+    learned = samples.learned(target, split.learn & samples.valid, before=first)
+    return judge(
+        name,
+        trained.model,
+        samples,
+        split,
+        learned=learned,
+        rules=rules,
+        fit_s=trained.seconds,
+        robustness=robustness,
+    )
 
 
 def _failed(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
@@ -294,7 +298,7 @@ def _failed(samples: Samples, name: str, target: int, split: Split, why: str) ->
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.Verdict((), harm.LEVEL),
+        verdict=harm.Verdict(()),
         sensors=(),
         fit_s=0.0,
         n_effective=float("nan"),
@@ -323,7 +327,7 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         row=np.concatenate([a.row for a in parts]),
         test=np.concatenate([a.test for a in parts]),
         cycle=np.concatenate([a.cycle for a in parts]),
-        verdict=harm.Verdict(tuple(c for a in parts for c in a.verdict.cycles), first.verdict.level),
+        verdict=harm.together([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
         n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),
         fit_s=sum(a.fit_s for a in parts),

@@ -1,179 +1,351 @@
-"""The do-no-harm gate: a model that is not surely better than no compensation is refused."""
+"""The do-no-harm gate: accepted, unproven or refused, by independent units.
+
+A unit is a thermal cycle or a file that the model has not seen: rows of a drift depend on each other, units do not. A
+model is better if the logarithm of its error over that of every baseline is below zero by a one-sided t-test over
+units; it is harmful if it does much worse than none in a single one. ``docs/decisions/0020-verdict.md`` says why.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from thermocomp.core.learned import Learned
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Word = Literal["accepted", "unproven", "refused"]
 
-#: a stretch shorter than this says nothing about a cycle
+#: rows below which a stretch says nothing about a cycle
 MIN_ROWS = 20
-#: confidence of the bound
-LEVEL = 0.95
+#: units below which nothing is shown: two of them agree too easily
+MIN_UNITS = 3
+#: noise that a probe has at least [um]
+NO_NOISE = 1e-3
+#: of the one-sided test
+LEVEL = 0.05
+#: what a model is held against
+BASELINES = ("no compensation", "the learned mean", "the last learned value")
+#: a fourth one, where one stretch is judged: both are counted from its first rows, so many of them
+NAMES = (*BASELINES, "none, both re-zeroed where the block begins")
+REZERO_ROWS = 5
+#: harm that is let pass at most, unless the user states another [um], [urad]: 10 urad are 2 um at 200 mm
+MOST_MARGIN = {"um": 2.0, "urad": 10.0}
+#: a margin is so many times the probe's noise, and such a share of the largest drift learned
+TIMES_NOISE, SHARE = 3.0, 0.05
+#: a unit that moves by less than this share of the largest drift learned shows nothing
+MOVES = 0.1
 
 
 @dataclass(frozen=True)
-class CycleVerdict:
-    """What the gate found in one thermal cycle, or in the part of it that was judged.
+class Unit:
+    """What was found in one unseen cycle or file.
 
     Parameters
     ----------
-    cycle : str
-    rms, none_rms : float
-        Of the residual, and without compensation [um].
-    ratio : float
-        RMS over RMS without compensation.
-    ratio_bound : float
-        Upper bound of the ratio by block bootstrap.
+    name : str
+    rows : int
+    rms, largest : float
+        Of the residual [um].
+    baselines : tuple of float
+        RMS left by each of `BASELINES` [um].
+    none_largest : float
+        Largest deviation without compensation [um].
+    noise : float
+        Of the probe: smaller errors are taken as being of this size [um].
+    margin : float
+        Harm that is let pass [um].
+    moves : bool
+        The deviation changes enough to tell a model from a constant.
+    rezeroed : tuple of (float, float) or None
+        RMS with and without the model, both counted from where the unit begins [um].
     """
 
-    cycle: str
+    name: str
+    rows: int
     rms: float
-    none_rms: float
-    ratio: float
-    ratio_bound: float
+    largest: float
+    baselines: tuple[float, ...]
+    none_largest: float
+    noise: float
+    margin: float
+    moves: bool
+    rezeroed: tuple[float, float] | None = None
 
     @property
-    def passed(self) -> bool:
-        """True if the model is better than none even at the bound."""
-        return self.ratio_bound < 1.0
+    def none_rms(self) -> float:
+        """RMS without compensation [um]."""
+        return self.baselines[0]
+
+    @property
+    def harm(self) -> float:
+        """By how much RMS or largest error are above those without compensation, whichever is more [um]."""
+        return max(self.rms - self.none_rms, self.largest - self.none_largest)
+
+    @property
+    def harmful(self) -> bool:
+        """True if that is more than the margin."""
+        return self.harm > self.margin
+
+    @property
+    def log_ratios(self) -> tuple[float, ...]:
+        """Logarithm of the error over that of each baseline; what lies below the noise counts as noise."""
+        least = max(self.noise, NO_NOISE)
+        pairs = [(self.rms, b) for b in self.baselines] + ([self.rezeroed] if self.rezeroed else [])
+        return tuple(float(np.log(max(model, least) / max(other, least))) for model, other in pairs)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The gate's decision over several cycles.
+    """The gate's decision over several units.
 
     Parameters
     ----------
-    cycles : tuple of CycleVerdict
-    level : float
-        Confidence of the bounds.
+    units : tuple of Unit
     unit : str
         Of the deviations.
-    least : int
-        Rows that a cycle must have.
+    caps : tuple of str
+        What keeps the model from being accepted, whatever the figures say: one stretch, trouble in the data.
+    refusal : str
+        What refuses it, whatever the figures say: no sensor.
+    tried : int
+        Methods that were tried for this target.
+    p : float or None
+        Of the test, corrected for their number; that of the units if None.
+    about : str
+        Why it is not corrected for that number, if it is not.
+    names : tuple of str
+        Of the baselines.
     """
 
-    cycles: tuple[CycleVerdict, ...]
-    level: float
+    units: tuple[Unit, ...]
     unit: str = "um"
-    least: int = MIN_ROWS
+    caps: tuple[str, ...] = ()
+    refusal: str = ""
+    tried: int = 1
+    p: float | None = None
+    about: str = ""
+    names: tuple[str, ...] = NAMES
+
+    @cached_property
+    def p_values(self) -> tuple[float, ...]:
+        """One-sided p-value beside each baseline; 1 with fewer than `MIN_UNITS` units."""
+        if len(self.units) < MIN_UNITS:
+            return (1.0,)
+        ratios = np.array([u.log_ratios for u in self.units])
+        mean, error = ratios.mean(axis=0), stats.sem(ratios, axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.where(error > 0, mean / error, np.sign(mean) * np.inf)
+        found = np.where(mean == 0, 1.0, stats.t.cdf(t, len(self.units) - 1))
+        return tuple(found.tolist())
+
+    @property
+    def worst(self) -> int:
+        """Index of the baseline that is hardest to beat."""
+        return int(np.argmax(self.p_values)) if len(self.units) >= MIN_UNITS else int(np.argmax(self._mean_ratios))
+
+    @property
+    def p_value(self) -> float:
+        """The p-value that decides."""
+        return self.p_values[self.worst] if self.p is None else self.p
+
+    @property
+    def _mean_ratios(self) -> FloatArray:
+        found: FloatArray = np.array([u.log_ratios for u in self.units]).mean(axis=0)
+        return found
+
+    @cached_property
+    def word(self) -> Word:
+        """Whether the model may run, may run in shadow only, or may not."""
+        if self.refusal or any(u.harmful for u in self.units):
+            return "refused"
+        if not self.units or not self._moving:
+            return "unproven"
+        if (self._mean_ratios >= 0).any():
+            return "refused"
+        enough = len(self.units) >= MIN_UNITS and self._moving >= MIN_UNITS - 1
+        return "accepted" if enough and not self.caps and self.p_value <= LEVEL else "unproven"
 
     @property
     def accepted(self) -> bool:
-        """True if every cycle passed."""
-        return bool(self.cycles) and all(c.passed for c in self.cycles)
+        """True if the model may run."""
+        return self.word == "accepted"
 
     @property
-    def word(self) -> str:
-        """``accepted`` or ``refused``."""
-        return "accepted" if self.accepted else "refused"
+    def _moving(self) -> int:
+        return sum(u.moves for u in self.units)
 
     @property
     def reason(self) -> str:
-        """Why, in one sentence, by the worst cycle."""
-        if not self.cycles:
-            return "nothing was judged"
-        worst = max(self.cycles, key=lambda c: c.ratio_bound)
-        if not np.isfinite(worst.ratio_bound) and not np.isfinite(worst.rms):
-            return f"fewer than {self.least} rows of {worst.cycle} to judge on"
-        figures = f"RMS {worst.rms:.2f} {self.unit}, {worst.none_rms:.2f} {self.unit} without compensation"
-        if self.accepted:
-            return f"better than none wherever it was judged; least in {worst.cycle}: {figures}"
-        if worst.ratio >= 1:
-            return f"worse than none in {worst.cycle}: {figures}"
-        return (
-            f"not surely better than none in {worst.cycle}: {figures}, "
-            f"ratio up to {worst.ratio_bound:.2f} at about {self.level:.0%}"
-        )
+        """Why, in one sentence, by the unit or baseline that decided."""
+        if self.refusal or not self.units:
+            return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
+        if any(u.harmful for u in self.units):
+            worst = max(self.units, key=lambda u: u.harm - u.margin)
+            return f"does harm in {worst.name}: {self._figures(worst)} (margin {worst.margin:.2g} {self.unit})"
+        if self._moving and (self._mean_ratios >= 0).any():
+            k = int(np.argmax(self._mean_ratios))
+            return f"no better than {self.names[k]}: {self._pooled(k)}"
+        return self._why_accepted() if self.accepted else self._why_unproven()
+
+    def _why_accepted(self) -> str:
+        least = max(self.units, key=lambda u: u.harm)
+        others = f"better than {self.names[self.worst]} and the other baselines"
+        return f"{others}, {self._tested()}; least in {least.name}: {self._figures(least)}"
+
+    def _why_unproven(self) -> str:
+        n, moving = len(self.units), self._moving
+        if not moving:
+            return f"the judged part does not move: {self._figures(self.units[0])} in {self.units[0].name}"
+        if self.caps:
+            return "; ".join(self.caps)
+        if n < MIN_UNITS:
+            return f"judged on {_count(n, 'unit')}, at least {MIN_UNITS} are needed"
+        if moving < MIN_UNITS - 1:
+            return f"only {moving} of {n} units move"
+        return f"not shown to be better than {self.names[self.worst]}: {self._pooled(self.worst)}, {self._tested()}"
+
+    def _tested(self) -> str:
+        tried = f", {self.tried} methods tried" if self.tried > 1 else ""
+        return f"p = {self.p_value:.2g} over {len(self.units)} units{tried}{', ' if self.about else ''}{self.about}"
+
+    @property
+    def told(self) -> str:
+        """Return the reason, and for what is unproven which test would decide it."""
+        return f"{self.reason}; {self.advice}" if self.advice else self.reason
+
+    @property
+    def advice(self) -> str:
+        """Which test would decide an unproven verdict; empty for the other words."""
+        if self.word != "unproven":
+            return ""
+        if self.caps:
+            return "judge it by leave-one-cycle-out or leave-one-file-out, on recordings without trouble"
+        n = len(self.units)
+        if n < MIN_UNITS:
+            return f"record {MIN_UNITS - n} more thermal cycles, at other speeds or on other days"
+        if self._moving < MIN_UNITS - 1:
+            return "record cycles with a warm-up or a change of speed"
+        more = self._units_for(LEVEL if self.p is None else LEVEL / max(self.tried, 1))
+        return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
+
+    def _units_for(self, level: float) -> int | None:
+        """Return how many units of this kind would show it; None if there are over 50."""
+        ratios = np.array([u.log_ratios[self.worst] for u in self.units])
+        effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
+        for n in range(len(ratios) + 1, 51):
+            if stats.t.sf(effect * np.sqrt(n), n - 1) <= level / 2:  # half the level: they must not just touch it
+                return n
+        return None
+
+    def _figures(self, u: Unit) -> str:
+        text = f"RMS {u.rms:.2f} {self.unit}, {u.none_rms:.2f} {self.unit} without compensation"
+        if u.rms - u.none_rms < u.harm:
+            text += f", largest {u.largest:.2f} and {u.none_largest:.2f} {self.unit}"
+        return text
+
+    def _pooled(self, k: int) -> str:
+        pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
+        mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
+        return f"RMS {mine:.2f} {self.unit} beside {other:.2f} {self.unit} over the units"
 
 
-def judge(
+def measure(
+    name: str,
     measured: FloatArray,
     predicted: FloatArray,
-    segments: Sequence[tuple[str, BoolArray]],
+    learned: Learned,
     *,
-    level: float = LEVEL,
-    draws: int = 1000,
-    seed: int = 0,
-    least: int = MIN_ROWS,
     unit: str = "um",
-) -> Verdict:
-    """Decide whether a model may be used.
-
-    In every segment the ratio of the RMS with and without compensation is bounded from above by a circular block
-    bootstrap (Politis, Romano 1992): rows of a thermal cycle depend on each other, so whole stretches are drawn. They
-    are four times as long as the correlation time of the squared residual or drift, at most a quarter of the segment;
-    few stretches widen the bound as few degrees of freedom do (Student's t).
+    margin: float | None = None,
+    stretch: bool = False,
+) -> Unit:
+    """Measure one unit.
 
     Parameters
     ----------
+    name : str
     measured, predicted : ndarray of shape (n_rows,)
-        Deviations [um].
-    segments : sequence of (name, ndarray of bool of shape (n_rows,))
-        The unseen cycles.
-    level : float
-        Confidence of the bound.
-    draws : int
-        Number of bootstrap draws.
-    seed : int
-        Of the draws.
-    least : int
-        Fewer rows than this say nothing about a cycle.
+        Deviations of one unseen cycle or file [um].
+    learned : Learned
+        What the training part showed.
     unit : str
         Of the deviations.
+    margin : float, optional
+        Harm that is let pass [um], stated before judging; see `margin_of`.
+    stretch : bool
+        It goes on from what was learned: compare also with both re-zeroed where it begins.
 
     Returns
     -------
-    Verdict
+    Unit
     """
-    found = []
-    for name, rows in segments:
-        if rows.sum() < least:
-            # said, not skipped: so short a stretch proves nothing, and what is not proven is refused
-            found.append(CycleVerdict(name, float("nan"), float("nan"), float("nan"), float("inf")))
-            continue
-        residual, none = (measured - predicted)[rows] ** 2, measured[rows] ** 2
-        bound = _ratio_bound(residual, none, level, draws, np.random.default_rng(seed))
-        rms, none_rms = float(np.sqrt(residual.mean())), float(np.sqrt(none.mean()))
-        found.append(CycleVerdict(name, rms, none_rms, rms / none_rms if none_rms > 0 else np.inf, bound))
-    return Verdict(tuple(found), level, unit, least)
+    residual = measured - predicted
+    allowed = margin_of(learned, unit) if margin is None else margin
+    baselines = (0.0, learned.mean, learned.last)
+    span = float(np.ptp(measured)) - 4 * learned.noise  # what noise alone would span
+    return Unit(
+        name=name,
+        rows=len(measured),
+        rms=_rms(residual),
+        largest=float(np.abs(residual).max()),
+        baselines=tuple(_rms(measured - b) for b in baselines),
+        none_largest=float(np.abs(measured).max()),
+        noise=learned.noise,
+        margin=allowed,
+        moves=span > max(TIMES_NOISE * learned.noise, MOVES * learned.largest),
+        rezeroed=(_rms(residual - _start(residual)), _rms(measured - _start(measured))) if stretch else None,
+    )
 
 
-def _ratio_bound(residual: FloatArray, none: FloatArray, level: float, draws: int, rng: np.random.Generator) -> float:
-    n = len(residual)
-    if not residual.any():
-        return 0.0 if none.any() else np.inf
-    if not none.any():
-        return np.inf
-    length = max(_block_length(residual), _block_length(none))
-    blocks = -(-n // length)
-    starts = rng.integers(0, n, (draws, blocks))
-    sums = []
-    for squares in (residual, none):
-        running = np.concatenate([[0.0], np.cumsum(np.concatenate([squares, squares[:length]]))])
-        sums.append((running[starts + length] - running[starts]).sum(axis=1))
-    with np.errstate(divide="ignore"):
-        ratios = 0.5 * (np.log(sums[0]) - np.log(sums[1]))
-    found = 0.5 * np.log(residual.sum() / none.sum())
-    excess = float(np.quantile(ratios, level, method="higher")) - found
-    freedom = n / length - 1
-    few = stats.t.ppf(level, freedom) / stats.norm.ppf(level) * np.sqrt((freedom + 1) / freedom)
-    return float(np.exp(found + few * max(excess, 0.0)))
+def together(parts: Sequence[Verdict], about: str = "") -> Verdict:
+    """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
+    return Verdict(
+        units=tuple(u for v in parts for u in v.units),
+        unit=parts[0].unit,
+        caps=tuple(dict.fromkeys(c for v in parts for c in v.caps)),
+        refusal=next((v.refusal for v in parts if v.refusal), ""),
+        about=about,
+    )
 
 
-def _block_length(squares: FloatArray) -> int:
-    """Return four times the lag at which the autocorrelation falls below 1/e, at most a quarter of the rows."""
-    n = len(squares)
-    centred = squares - squares.mean()
-    longest = max(1, n // 4)
-    power = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    correlation = np.fft.irfft(power)[: longest + 1]
-    if correlation[0] <= 0:
-        return longest
-    below = np.flatnonzero(correlation < correlation[0] / np.e)
-    return min(longest, 4 * int(below[0])) if below.size else longest
+def margin_of(learned: Learned, unit: str = "um") -> float:
+    """Return the harm in a single unit that is let pass, unless the user states another [unit]."""
+    return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
+
+
+def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Correct the verdicts on several methods for their number (Holm 1979).
+
+    Parameters
+    ----------
+    verdicts : sequence of Verdict
+        Of every method that was tried for one target.
+
+    Returns
+    -------
+    list of Verdict
+        With their corrected p-values.
+    """
+    n = len(verdicts)
+    raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])
+    order = np.argsort(raw, kind="stable")
+    corrected = np.empty(n)
+    corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (n - np.arange(n))), 1.0)
+    return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]
+
+
+def _start(x: FloatArray) -> float:
+    return float(x[:REZERO_ROWS].mean())
+
+
+def _rms(x: FloatArray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
-from thermocomp.assessment.compare import ALL
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import HonestError
+from thermocomp.core.learned import Learned
+from thermocomp.core.model import RULES, HonestError
 from thermocomp.core.size import Size
 from thermocomp.models.position import PositionFit, fit_position, slope_samples
 from thermocomp.models.positionoptions import PositionOptions, Setting, reference_position, suited
@@ -27,6 +27,8 @@ BoolArray = NDArray[np.bool_]
 FEWEST = 4
 #: fewer profiles of a cycle than this say nothing about it; each has many points, and they are far apart in time
 MIN_STATES = 8
+#: what a position model is held against
+BESIDE = ("no compensation", "the cold profile alone")
 
 
 @dataclass(frozen=True)
@@ -64,11 +66,9 @@ class PositionAssessment:
     cycles : tuple of CycleErrors
     overall : CycleErrors
         Of all of them together.
-    harmless : Verdict
-    useful : Verdict or None
-        The do-no-harm gate: beside no compensation, in each cycle or, if files were left out, in each of these; and,
-        over all of them together, beside the cold profile alone, which tells whether the thermal part is of use. None
-        if there is none.
+    verdict : Verdict
+        Of the do-no-harm gate: beside no compensation and, if there is a thermal part, beside the cold profile alone;
+        by cycles or, if files were left out, by these.
     factors : tuple of HonestError
         Of each factor's model on the same states [unit/m^i]; verdict and reason are those of the whole.
     unit : {'um', 'urad'}
@@ -77,20 +77,19 @@ class PositionAssessment:
     protocol: str
     cycles: tuple[CycleErrors, ...]
     overall: CycleErrors
-    harmless: harm.Verdict
-    useful: harm.Verdict | None
+    verdict: harm.Verdict
     factors: tuple[HonestError, ...]
     unit: str
 
     @property
     def accepted(self) -> bool:
-        """True if it is surely better than none wherever it was judged, and over all than its cold profile alone."""
-        return self.harmless.accepted and (self.useful is None or self.useful.accepted)
+        """True if it may run."""
+        return self.verdict.accepted
 
     @property
     def reason(self) -> str:
-        """Why it is accepted or refused."""
-        return _reason(self.harmless, self.useful)
+        """Why, and what would decide it."""
+        return self.verdict.told
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,12 +333,17 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
         else:
             cycle = samples.cycle[rows]
             segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
-    none, geometric, left = rms.T
-    # The gate looks at residual and drift of each row; those of a profile are its RMS.
-    harmless = harm.judge(none, none - left, segments, least=MIN_STATES, unit=unit)
-    useful = harm.judge(geometric, geometric - left, [(ALL, filled)], least=MIN_STATES, unit=unit)
+    verdict = harm.Verdict(
+        units=tuple(
+            _unit(name, rms[mine], unit, thermal=bool(options.powers))
+            for name, mine in segments
+            if mine.sum() >= MIN_STATES
+        ),
+        unit=unit,
+        names=BESIDE,
+        caps=("judged on one stretch that goes on from what was learned",) if one.judging.splits[0].stretch else (),
+    )
     measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
-    verdict: Literal["accepted", "refused"] = "accepted" if harmless.accepted and useful.accepted else "refused"
     factors = []
     for j in range(measured.shape[1]):
         m, p = measured[:, j], predicted[:, j]
@@ -355,18 +359,36 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
                 none_mae=metrics.mae(m_there, 0 * m_there),
                 none_rms=metrics.rms(m_there, 0 * m_there),
                 cycles={name: metrics.rms(m[mine], p[mine]) for name, mine in known},
-                verdict=verdict,
-                reason=_reason(harmless, useful),
+                verdict=verdict.word,
+                reason=verdict.told,
+                units=len(verdict.units),
+                rules=RULES,
             )
         )
     return PositionAssessment(
         protocol=protocol,
         cycles=tuple(_errors(name, triples, mine) for name, mine in segments if mine.any()),
         overall=_errors("all", triples, filled),
-        harmless=harmless,
-        useful=useful if options.powers else None,
+        verdict=verdict,
         factors=tuple(factors),
         unit=unit,
+    )
+
+
+def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> harm.Unit:
+    """Measure a cycle by the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
+    none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
+    largest = float(rms[:, 0].max())
+    return harm.Unit(
+        name=name,
+        rows=len(rms),
+        rms=left,
+        largest=float(rms[:, 2].max()),
+        baselines=(none, geometric) if thermal else (none,),
+        none_largest=largest,
+        noise=0.0,
+        margin=harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
+        moves=True,
     )
 
 
@@ -383,9 +405,3 @@ def _errors(name: str, triples: Sequence[tuple[FloatArray, FloatArray, FloatArra
         none_max=none.largest,
         model_max=left.largest,
     )
-
-
-def _reason(harmless: harm.Verdict, useful: harm.Verdict | None) -> str:
-    if harmless.accepted and useful is not None and not useful.accepted:
-        return f"beside its cold profile alone: {useful.reason.replace('without compensation', 'with that alone')}"
-    return harmless.reason

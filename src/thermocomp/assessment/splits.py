@@ -24,12 +24,15 @@ class Split:
     learn, judge : ndarray of bool of shape (n_rows,)
     whole : bool
         The gate judges the block as one; without it, each thermal cycle in it.
+    stretch : bool
+        It goes on from what was learned: its cycles are not independent of that.
     """
 
     block: str
     learn: BoolArray
     judge: BoolArray
     whole: bool = False
+    stretch: bool = False
 
     @property
     def name(self) -> str:
@@ -204,4 +207,6 @@ def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
     rows = np.arange(n)
     if first < 1 or stop <= first:
         raise InputError(f"{name}: leaves no row to learn from or none to judge on ({n} rows in all)")
-    return Judging(name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop)),))
+    return Judging(
+        name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop), stretch=True),)
+    )

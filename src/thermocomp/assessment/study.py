@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
+from thermocomp.assessment.compare import compare, judge, per_cycle
+from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, HonestError, Support
+from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
@@ -47,6 +48,7 @@ def fit(
     method: str,
     judging: Judging,
     *,
+    rules: Rules = Rules(),
     support: Support = Support(),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
@@ -58,6 +60,8 @@ def fit(
     samples : Samples
     method : str
     judging : Judging
+    rules : Rules
+        What is stated before judging.
     support : Support
         For the models.
     jobs : int
@@ -76,7 +80,7 @@ def fit(
     """
     if not find(method).kind.freezable:
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
-    comparison = compare(samples, [method], judging, support=support, robustness=False, jobs=jobs, progress=progress)
+    comparison = compare(samples, [method], judging, rules=rules, support=support, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
@@ -105,9 +109,12 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         max_abs=overall.metric("max_abs"),
         none_mae=overall.none_metric("mae"),
         none_rms=overall.none_metric("rms"),
-        cycles={c.cycle: c.rms for c in overall.verdict.cycles if np.isfinite(c.rms)},
-        verdict="accepted" if overall.accepted else "refused",
+        cycles={u.name: u.rms for u in overall.verdict.units},
+        verdict=overall.word,
         reason=overall.reason,
+        units=len(overall.verdict.units),
+        tried=overall.verdict.tried,
+        rules=RULES,
     )
 
 
@@ -134,7 +141,11 @@ class Judged:
 
 
 def assess(
-    models: Sequence[ErrorModel], recordings: Sequence[Recording], *, progress: Callable[[str], None] = _silent
+    models: Sequence[ErrorModel],
+    recordings: Sequence[Recording],
+    *,
+    rules: Rules = Rules(),
+    progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
 
@@ -143,6 +154,8 @@ def assess(
     models : sequence of ErrorModel
     recordings : sequence of Recording
         With the models' inputs and targets.
+    rules : Rules
+        What is stated before judging.
     progress : callable
         Called with a line of text per model.
 
@@ -165,7 +178,7 @@ def assess(
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
         everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
         name = model.provenance.method if model.provenance else model.family
-        overall = replace(judge(name, model, samples, everything), overall=True, caveat=caveat)
+        overall = replace(judge(name, model, samples, everything, rules=rules), overall=True, caveat=caveat)
         cut = per_cycle(overall)
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen)

@@ -12,10 +12,11 @@ from rich.table import Table
 
 from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.choice import Table as ChoiceTable
-from thermocomp.assessment.compare import Assessment, Comparison
-from thermocomp.assessment.harm import CycleVerdict
+from thermocomp.assessment.harm import Unit
+from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.jsonoutput import print_json
+from thermocomp.cli.shown import mark
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
@@ -36,6 +37,16 @@ def show_comparison(
             "trouble": trouble,
             "not_judged": comparison.left,
             "cautions": cautions(comparison),
+            "recommended": [
+                {
+                    "target": r.target,
+                    "model": r.method,
+                    "chosen_per_unit": r.chosen,
+                    "verdict": r.verdict.word,
+                    "reason": r.verdict.told,
+                }
+                for r in comparison.recommended
+            ],
             "results": [_result(a) for a in comparison.assessments],
         }
         print_json(content, console)
@@ -45,15 +56,17 @@ def show_comparison(
     console.print(_cycle_table(comparison.assessments))
     for a in comparison.overall():
         if not a.accepted:
-            console.print(f"[red]refused[/] {a.model} for {escape(a.target)}: {escape(a.reason)}")
+            console.print(f"{mark(a.word)} {a.model} for {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
     for target in dict.fromkeys(a.target for a in comparison.assessments):
         best = comparison.best(target)
         if best is None:
-            console.print(f"[bold red]{escape(target)}: no model may be used[/]")
+            console.print(f"[bold red]{escape(target)}: no model may run yet[/]")
         else:
             console.print(
                 f"[bold green]{escape(target)}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
-                f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less)"
+                f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less): "
+                f"{escape(best.reason)}",
+                soft_wrap=True,
             )
     for caution in cautions(comparison):
         console.print(f"[yellow]but[/] {escape(caution)}")
@@ -140,12 +153,14 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
             f"{r2:.4f}",
             f"{honest.rms:.2f}",
             f"{honest.none_rms:.2f}",
-            _verdict(honest.verdict),
+            mark(honest.word),
         )
     console.print(table)
     for m in fitted.models:
-        if m.honest_error is not None and not m.accepted:
-            console.print(f"[red]refused[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
+        if m.honest_error is not None:
+            console.print(
+                f"{mark(m.honest_error.word)} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True
+            )
     console.print(f"Model file: {path}", soft_wrap=True)
 
 
@@ -154,7 +169,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     if as_json:
         content = {
             "seen_in_training": judged.seen,
-            "verdict_when_fitted": {m.target: m.honest_error.verdict for m in judged.models if m.honest_error},
+            "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "trouble": trouble,
             "results": [_result(a) for a in judged.assessments],
         }
@@ -177,13 +192,14 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             )
     console.print(table)
     for a in judged.overall():
-        console.print(f"{_verdict(_word(a))} {escape(a.target)}: {escape(a.reason)}")
+        console.print(f"{mark(a.word)} {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
-            console.print(f"[red]refused when it was fitted[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
+            word = mark(f"{m.honest_error.word} when it was fitted")
+            console.print(f"{word} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True)
 
 
 def show_check(
@@ -251,23 +267,23 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Table:
         for a in mine:
             figures = (_number(a.metric(m)) for m in ("mae", "rms", "max_abs"))
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
-            table.add_row(a.model, *figures, less, _span(a.n_sensors), _verdict(_word(a)))
+            table.add_row(a.model, *figures, less, _span(a.n_sensors), mark(a.word))
     return table
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Table:
     """Return the RMS in every unseen cycle, a section per target; whatever there is more of goes down the page."""
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
-    cycles = list(dict.fromkeys(c.cycle for a in assessments for c in a.verdict.cycles))
+    cycles = list(dict.fromkeys(c.name for a in assessments for c in a.verdict.units))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
     space = " " if down is models else ""  # where others have their mark
-    table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = refused")
+    table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = harmful")
     table.add_column("", no_wrap=True)
     for heading in across:
         table.add_column(escape(heading), justify="right", no_wrap=across is models)
     for mine in _by_target(assessments):
-        cells = {(a.model, c.cycle): _passed(c) for a in mine for c in a.verdict.cycles}
-        cells |= {("none", c.cycle): f"{c.none_rms:.2f}{space}" for a in mine for c in a.verdict.cycles}
+        cells = {(a.model, c.name): _passed(c) for a in mine for c in a.verdict.units}
+        cells |= {("none", c.name): f"{c.none_rms:.2f}{space}" for a in mine for c in a.verdict.units}
         table.add_section()
         table.add_row(f"[bold]{escape(mine[0].target)}[/]")
         for name in down:
@@ -277,8 +293,8 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Table:
     return table
 
 
-def _passed(cycle: CycleVerdict) -> str:
-    return f"{cycle.rms:.2f} " if cycle.passed else f"[red]{cycle.rms:.2f}![/]"
+def _passed(cycle: Unit) -> str:
+    return f"[red]{cycle.rms:.2f}![/]" if cycle.harmful else f"{cycle.rms:.2f} "
 
 
 def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:
@@ -294,14 +310,6 @@ def _number(value: float) -> str:
     return f"{value:.2f}" if math.isfinite(value) else ""
 
 
-def _word(a: Assessment) -> str:
-    return "accepted" if a.accepted else "refused"
-
-
-def _verdict(word: str) -> str:
-    return f"[green]{word}[/]" if word == "accepted" else f"[red]{word}[/]"
-
-
 def _result(a: Assessment) -> dict[str, Any]:
     content: dict[str, Any] = {
         "model": a.model,
@@ -315,8 +323,21 @@ def _result(a: Assessment) -> dict[str, Any]:
         "none_rms_um": a.none_metric("rms"),
         "none_peak_to_peak_um": a.none_metric("peak_to_peak"),
         "reduction_pct": a.metric("reduction"),
-        "verdict": _word(a),
+        "verdict": a.word,
         "reason": a.reason,
+        "p_value": a.verdict.p_value if a.verdict.units else None,
+        "tried": a.verdict.tried,
+        "units": [
+            {
+                "name": u.name,
+                "rms_um": u.rms,
+                "none_rms_um": u.none_rms,
+                "baselines_rms_um": dict(zip(a.verdict.names, u.baselines, strict=False)),
+                "margin_um": u.margin,
+                "harmful": u.harmful,
+            }
+            for u in a.verdict.units
+        ],
         "sensors": list(a.sensors),
         "n_sensors": a.n_sensors[1],
         "n_sensors_least": a.n_sensors[0],
@@ -349,8 +370,8 @@ def _model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
         "sensors": list(m.sensors),
         "unseen_rms_um": honest.rms if honest else None,
         "none_rms_um": honest.none_rms if honest else None,
-        "verdict": honest.verdict if honest else None,
-        "reason": honest.reason if honest else None,
+        "verdict": honest.word if honest else None,
+        "reason": honest.why if honest else None,
     }
 
 

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.assessment.position import CycleErrors, PositionStudy
+from thermocomp.cli.shown import mark
 from thermocomp.files.profiles import NOT_TAKEN
 from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles
@@ -100,7 +101,9 @@ def show_all(
     _show_judging(found[0], left_open, console)
     for f in found:
         if not f.assessment.accepted:
-            console.print(f"[red]refused[/] {f.fit.model.target}: {escape(f.assessment.reason)}")
+            console.print(
+                f"{mark(f.assessment.verdict.word)} {f.fit.model.target}: {escape(f.assessment.reason)}", soft_wrap=True
+            )
         elif f.dropped:
             console.print(f"[yellow]cold profile alone[/] {f.fit.model.target}: thermal part: {escape(f.dropped)}")
 
@@ -149,7 +152,7 @@ def content(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any
         "judging": judged.protocol,
         "cycles": [_cycle(c) for c in judged.cycles],
         "overall": _cycle(judged.overall),
-        "verdict": "accepted" if judged.accepted else "refused",
+        "verdict": judged.verdict.word,
         "reason": judged.reason,
         "thermal_part_left_out": found.dropped or None,
     }
@@ -202,9 +205,8 @@ def _shortened(formula: str) -> str:
 
 
 def _verdict(found: PositionStudy) -> str:
-    if not found.assessment.accepted:
-        return "[red]refused[/]"
-    return "[yellow]cold profile[/]" if found.dropped else "[green]accepted[/]"
+    accepted = found.assessment.accepted
+    return "[yellow]cold profile[/]" if accepted and found.dropped else mark(found.assessment.verdict.word)
 
 
 def _cycle(c: CycleErrors) -> dict[str, Any]:

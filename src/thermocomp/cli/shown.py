@@ -4,3 +4,9 @@
 def shown(text: object) -> str:
     """Return a text with a question mark for all that cannot be printed."""
     return "".join(c if c.isprintable() else "?" for c in str(text))
+
+
+def mark(verdict: str) -> str:
+    """Return a verdict in its colour."""
+    colour = {"accepted": "green", "unproven": "yellow"}.get(verdict.partition(" ")[0], "red")
+    return f"[{colour}]{verdict}[/]"

@@ -67,7 +67,7 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
     for m in models:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
-        m.check_not_refused()
+        m.check_may_run()
     return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.learned import Learned
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -100,6 +101,8 @@ class Provenance:
         thermocomp version that fitted it.
     source : str
         A publication, for models taken from one.
+    learned : Learned or None
+        What those rows showed of the target.
     """
 
     method: str
@@ -109,6 +112,11 @@ class Provenance:
     rows: int = 0
     version: str = ""
     source: str = ""
+    learned: Learned | None = None
+
+
+#: version of the rules that a verdict is given by; files that do not say were judged by older ones
+RULES = 1
 
 
 @dataclass(frozen=True)
@@ -125,10 +133,18 @@ class HonestError:
         The same without compensation.
     cycles : dict of str to float
         RMS of the residual per unseen cycle.
-    verdict : {'accepted', 'refused'}
+    verdict : {'accepted', 'unproven', 'refused'}
         Of the do-no-harm gate.
     reason : str
         Why, in words.
+    units : int
+        Independent cycles or files it was judged on.
+    tried : int
+        Methods that were tried for the target.
+    rules : int
+        By which it was judged, see `RULES`; older ones prove nothing.
+    taken : str
+        Who takes an unproven model all the same, and why; empty without that.
     """
 
     protocol: str
@@ -138,8 +154,22 @@ class HonestError:
     none_mae: float
     none_rms: float
     cycles: dict[str, float]
-    verdict: Literal["accepted", "refused"]
+    verdict: Literal["accepted", "unproven", "refused"]
     reason: str
+    units: int = 0
+    tried: int = 1
+    rules: int = 0
+    taken: str = ""
+
+    @property
+    def word(self) -> Literal["accepted", "unproven", "refused"]:
+        """The verdict as it counts today: accepted by older rules is unproven."""
+        return "unproven" if self.verdict == "accepted" and self.rules < RULES else self.verdict
+
+    @property
+    def why(self) -> str:
+        """The reason as it counts today."""
+        return f"judged by older rules: {self.reason}" if self.word != self.verdict else self.reason
 
 
 class State(NamedTuple):
@@ -312,12 +342,20 @@ class ErrorModel(ABC):
     @property
     def accepted(self) -> bool:
         """True if the do-no-harm gate has let this model pass."""
-        return self.honest_error is not None and self.honest_error.verdict == "accepted"
+        return self.honest_error is not None and self.honest_error.word == "accepted"
 
-    def check_not_refused(self) -> None:
-        """Raise `InputError` if the do-no-harm gate has refused this model: then it does not run."""
-        if self.honest_error is not None and not self.accepted:
-            raise InputError(f"model of {self.target} was refused and will not run: {self.honest_error.reason}")
+    def check_may_run(self) -> None:
+        """Raise `InputError` if the do-no-harm gate did not let this model pass, and nobody takes it all the same."""
+        found = self.honest_error
+        if found is None or found.word == "accepted":
+            return
+        if found.word == "refused":
+            raise InputError(f"model of {self.target} was refused and will not run: {found.reason}")
+        if not found.taken:
+            raise InputError(
+                f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "
+                '--accept-unproven "NAME, REASON"'
+            )
 
 
 def check_finite(owner: str, **numbers: Any) -> None:

@@ -19,6 +19,7 @@ from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Trained:
         The fit took [s].
     r_squared : float
         In-sample, about the mean.
+    predicted : ndarray of shape (n_rows,)
+        What the estimator says of every row; nan where an input is missing.
     """
 
     method: str
@@ -42,6 +45,7 @@ class Trained:
     model: ErrorModel
     seconds: float
     r_squared: float
+    predicted: FloatArray
 
 
 def train(
@@ -95,19 +99,22 @@ def train(
     except ValueError as e:  # what scikit-learn raises for data it cannot use
         raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
     seconds = time.perf_counter() - begin
-    r_squared = float(r2_score(y[learned], estimator.predict(X, **clock)[learned]))
+    everywhere = {"dt": samples.take(samples.valid).dt()} if "dt" in how.takes else {}
+    predicted = np.full(len(samples), np.nan)
+    predicted[samples.valid] = estimator.predict(samples.frame().iloc[samples.valid, columns], **everywhere)
+    r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))
     freeze = estimator.unfrozen if isinstance(estimator, UnfrozenRegressor) else estimator.freeze
     model = freeze(
         target=channel.name,
         unit=channel.unit,
         inputs=samples.model_inputs(columns, seen),
         support=support,
-        provenance=_provenance(how, estimator, samples, seen),
+        provenance=_provenance(how, estimator, samples, target, seen),
     )
-    return Trained(how.name, estimator, model, seconds, r_squared)
+    return Trained(how.name, estimator, model, seconds, r_squared, predicted)
 
 
-def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen: BoolArray) -> Provenance:
+def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, target: int, seen: BoolArray) -> Provenance:
     cycles: Sequence[int] = np.unique(samples.cycle[seen]).tolist()
     tests: Sequence[int] = np.unique(samples.test[seen]).tolist()
     return Provenance(
@@ -117,4 +124,5 @@ def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen
         cycles=tuple(samples.cycle_names[c] for c in cycles),
         rows=int(seen.sum()),
         version=__version__,
+        learned=samples.learned(target, seen),
     )

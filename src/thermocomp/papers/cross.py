@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from thermocomp.assessment.compare import Assessment, compare, n_pieces
+from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.assessment.replay import replay
+from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand

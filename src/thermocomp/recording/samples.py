@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input
 from thermocomp.recording.recording import Recording
@@ -103,6 +104,34 @@ class Samples:
         steps = np.diff(self.time, prepend=np.inf)
         steps[np.flatnonzero(np.diff(self.test, prepend=-1))] = np.inf
         return steps
+
+    def learned(self, target: int, rows: BoolArray, before: int | None = None) -> Learned:
+        """Return what some rows show of a target.
+
+        Parameters
+        ----------
+        target : int
+            Index into `targets`.
+        rows : ndarray of bool of shape (n_rows,)
+            Learned from; those without a number are passed over.
+        before : int, optional
+            The last value is that of the last row before this one in its test, 0 without any; without it, that of the
+            last row of all.
+
+        Returns
+        -------
+        Learned
+        """
+        y = self.deviations[:, target]
+        known = rows & np.isfinite(y)
+        if not known.any():
+            return Learned(0.0, 0.0, 0.0, 0.0)
+        noise = [probe_noise(y[known & (self.test == k)]) for k in np.unique(self.test[known])]
+        candidates = np.flatnonzero(known)
+        if before is not None:
+            candidates = candidates[(candidates < before) & (self.test[candidates] == self.test[before])]
+        last = float(y[candidates[-1]]) if candidates.size else 0.0
+        return Learned(float(y[known].mean()), last, float(np.median(noise)), float(np.abs(y[known]).max()))
 
     def take(self, rows: BoolArray | IntArray) -> "Samples":
         """Return some of the rows, in their order."""

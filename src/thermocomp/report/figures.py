@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thermocomp.assessment.compare import Assessment, Comparison
+from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -19,6 +19,8 @@ FloatArray = NDArray[np.float64]
 #: colour-blind safe (Okabe, Ito 2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
+#: how a dot is filled
+FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
 POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
 
@@ -97,19 +99,16 @@ def overview(comparison: Comparison) -> str:
             ax.axvline(mine[0].none_metric("rms"), color=NONE, lw=2.5, zorder=2)
             for a in mine:
                 if not a.failure:
-                    face = PREDICTED if a.accepted else "white"
+                    face = FILLED[a.word]
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
             ax.set_yticks(range(len(models)), models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
             ax.set_ylabel(target, fontweight="bold")
             ax.set_xscale("log")
-        for label, style in (
-            ("no compensation", {"color": NONE, "lw": 2.5}),
-            ("accepted", {"marker": "o", "ls": "", "color": PREDICTED}),
-            ("refused", {"marker": "o", "ls": "", "color": PREDICTED, "mfc": "white"}),
-        ):
-            panels[0].plot([], [], label=label, **style)
-        figure.legend(loc="outside upper right", ncols=3)
+        panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
+        for word, face in FILLED.items():
+            panels[0].plot([], [], "o", color=PREDICTED, mfc=face, label=word)
+        figure.legend(loc="outside upper right", ncols=4)
         panels[-1].xaxis.set_major_formatter("{x:g}")
         panels[-1].xaxis.set_minor_formatter("{x:g}")
         panels[-1].tick_params(axis="x", which="minor", labelsize=7)
@@ -150,11 +149,12 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             ax.plot(
                 *thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
             )
-            mark = "" if block.accepted else "  REFUSED"
+            harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
+            mark = "  HARMFUL" if harmful else ""
             ax.set_title(
                 f"{block.block}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
                 fontsize=8,
-                color="#222" if block.accepted else "#b00020",
+                color="#b00020" if harmful else "#222",
             )
             ax.set_xlabel("time [h]")
         for ax in axes[:, 0]:

@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 
 from thermocomp import __version__
 from thermocomp.assessment.choice import Choice, written
-from thermocomp.assessment.compare import Comparison
+from thermocomp.assessment.results import Comparison
 from thermocomp.recording.recording import Recording
 from thermocomp.report import figures, selections
 from thermocomp.report.summary import summarise

@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from thermocomp import __version__
-from thermocomp.assessment.compare import Assessment, Comparison
 from thermocomp.assessment.metrics import METRICS
+from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import METHODS
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 
-#: methods beyond which the best is suspected of luck
-MANY = 6
 #: metrics of the big table, in its order
 TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
@@ -52,10 +50,10 @@ def verdict(comparison: Comparison) -> str:
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     best = {t: comparison.best(t) for t in targets}
     usable = {t: a for t, a in best.items() if a is not None}
-    refused = [t for t in targets if t not in usable]
+    left = [t for t in targets if t not in usable]
     if not usable:
         return (
-            f"No model may be used for {_list(targets)}: on unseen cycles none is surely better than no compensation."
+            f"No model may run yet for {_list(targets)}: none was shown to be better than constants on unseen cycles."
         )
     by_model: dict[str, list[str]] = {}
     for t, a in usable.items():
@@ -63,8 +61,8 @@ def verdict(comparison: Comparison) -> str:
     who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
     text = f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
-    if refused:
-        text += f"; no model passed for {_list(refused)}, where at least one cycle might be worse than without"
+    if left:
+        text += f"; no model passed for {_list(left)}"
     return text + "."
 
 
@@ -75,11 +73,6 @@ def cautions(comparison: Comparison) -> list[str]:
     found = []
     if comparison.left:
         found.append(f"the work was stopped: {comparison.left} pairs of method and target were not judged.")
-    if len(_models(comparison)) > MANY:
-        found.append(
-            f"{len(_models(comparison))} methods were judged on the same cycles, so the best of them is partly luck: "
-            "judge it on another recording."
-        )
     harmful = [f"{a.target} ({r.worst_lost[0]})" for a, r in known if r.worst_lost[1] >= a.none_metric("rms")]
     if harmful:
         found.append(f"a sensor that is cut off unnoticed makes it worse than none for {_list(harmful)}.")
@@ -102,14 +95,14 @@ def _target(comparison: Comparison, target: str) -> dict[str, Any]:
     overall = [a for a in comparison.overall() if a.target == target]
     none = overall[0]
     best = comparison.best(target)
-    cycles = [c.cycle for c in max((a.verdict.cycles for a in overall), key=len)]
+    cycles = [u.name for u in max((a.verdict.units for a in overall), key=len)]
     return {
         "name": target,
         "none": {m: none.none_metric(m) for m in TABLE if m != "reduction"},
         "rows": [_row(a, best) for a in overall],
         "cycles": cycles,
         "per_cycle": [
-            {"model": a.model, "cells": [{c.cycle: c for c in a.verdict.cycles}.get(name) for name in cycles]}
+            {"model": a.model, "cells": [{u.name: u for u in a.verdict.units}.get(name) for name in cycles]}
             for a in overall
         ],
         "best": best.model if best else None,
@@ -122,7 +115,7 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
     return {
         "model": a.model,
         "values": {m: a.metric(m) for m in TABLE},
-        "accepted": a.accepted,
+        "word": a.word,
         "reason": a.reason,
         "best": best is not None and a.model == best.model,
         "sensors": a.sensors,

@@ -59,7 +59,7 @@ class VolumetricModel:
                 self._constants[INDEX[code]] = source
         self._of_time = [k for k, _ in uniform], [m for _, m in uniform]
         for model in models:
-            model.check_not_refused()
+            model.check_may_run()
         self.stack = Stack(models)
 
     @property

@@ -52,7 +52,7 @@ class Station:
             )
         if not abs(self.at) < float("inf"):
             raise InputError(f"model of {self.model.target}: position {self.at} mm must be finite")
-        self.model.check_not_refused()
+        self.model.check_may_run()
 
     def __str__(self) -> str:
         return self.axis if self.along is None else f"{self.axis} at {self.along} {self.at:g} mm"

@@ -1,0 +1,172 @@
+"""How often the verdict is wrong: accepted on noise, accepted though harmful, not accepted though good.
+
+Run with ``python benchmarks/bench_verdict.py [--recordings 500] [--only WORDS]``. Everything goes through `compare`: the
+methods are trained, replayed and judged as they are on the command line. A case is printed with the share of its
+recordings in which any of the methods was accepted, its 95 % interval, and the goal.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy import stats
+
+from thermocomp.assessment import splits
+from thermocomp.assessment.compare import compare
+from thermocomp.core.machine import Channel
+from thermocomp.models.methods import METHODS, deployable
+from thermocomp.recording.cycles import Cycle
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+
+FIVE = ("dynamic", "ols", "mra", "ace", "pcr")
+ALL = tuple(name for name in METHODS if deployable(name) and name not in ("arx-free-run", "arx-net", "arx"))
+#: rows of a cycle, sensors
+ROWS, SENSORS = 60, 4
+#: spread of the logarithm of the error ratio between cycles
+SPREAD = 0.3
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of recording, how it is judged, and what is wanted of the verdict."""
+
+    name: str
+    make: Callable[[np.random.Generator], Samples]
+    judging: Callable[[Samples], splits.Judging]
+    methods: tuple[str, ...]
+    low: float = 0.0
+    high: float = 1.0
+    best: bool = False  # counted is the recommendation, not any method
+
+
+# -- recordings --------------------------------------------------------------------------------------------------------
+
+
+def recording(name: str, temperatures: FloatArray, drift: FloatArray, cycles: int) -> Recording:
+    table = pd.DataFrame(temperatures, columns=[f"t{k}_C" for k in range(temperatures.shape[1])])
+    table["z_um"] = drift
+    channels = tuple(
+        Channel(c, "displacement", "um", "") if c == "z_um" else Channel(c, "temperature", "degC", "")
+        for c in table.columns
+    )
+    rows = len(drift) // cycles
+    parts = tuple(Cycle(str(k + 1), k * rows, (k + 1) * rows) for k in range(cycles))
+    return Recording(name, 60.0 * np.arange(len(drift)), table, channels, parts)
+
+
+def noise(rng: np.random.Generator, kind: str, rows: int, columns: int) -> FloatArray:
+    white = rng.normal(size=(rows, columns))
+    walk = np.cumsum(white, axis=0)
+    return walk - walk[0] if kind == "random walk" else white
+
+
+def independent(kind: str, tests: int, cycles: int) -> Callable[[np.random.Generator], Samples]:
+    """Temperatures and drift that have nothing to do with each other."""
+
+    def make(rng: np.random.Generator) -> Samples:
+        found = []
+        for k in range(tests):
+            x = noise(rng, kind, cycles * ROWS, SENSORS + 1)
+            found.append(recording(f"test {k}", 20 + x[:, :-1], x[:, -1], cycles))
+        return stack(found, ["z_um"])
+
+    return make
+
+
+def real(left: float, cycles: int, harm: float = 0.0) -> Callable[[np.random.Generator], Samples]:
+    """Drift that follows the first sensor up to a share, which differs between cycles; one cycle may suffer harm [um]."""
+
+    def make(rng: np.random.Generator) -> Samples:
+        found = []
+        shape = 1 - np.exp(-np.linspace(0, 4, ROWS))
+        for k in range(cycles):
+            heat = rng.uniform(5, 15) * shape
+            ratio = left * np.exp(SPREAD * rng.normal())
+            other = np.sin(np.linspace(0, np.pi * rng.uniform(1.5, 3), ROWS) + rng.uniform(0, np.pi))
+            other -= shape * (other @ shape) / (shape @ shape)
+            told = 3 * heat
+            unknown = other / rms(other) * rms(told) * ratio / np.sqrt(max(1 - ratio**2, 0.05))
+            drift = told + unknown
+            if harm and k == cycles - 1:  # a cycle in which the machine drifts the other way than the sensor says
+                drift = -told * harm / (rms(told) * 1.0)
+            x = 0.02 * rng.normal(size=(ROWS, SENSORS)) + 20
+            x[:, 0] += heat
+            for j in range(1, SENSORS):
+                x[:, j] += heat * rng.uniform(0.3, 0.8) + noise(rng, "random walk", ROWS, 1)[:, 0] * 0.05
+            found.append(recording(f"test {k}", x, drift + 0.2 * rng.normal(size=ROWS), 1))
+        return stack(found, ["z_um"])
+
+    return make
+
+
+def rms(x: FloatArray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+# -- cases -------------------------------------------------------------------------------------------------------------
+
+
+def cases() -> Iterator[Case]:
+    for kind in ("random walk", "stationary noise"):
+        for n in (2, 4, 6, 10):
+            name = f"{kind}, {n} cycles"
+            yield Case(f"{name}, each cold", independent(kind, n, 1), splits.leave_one_cycle_out, FIVE, high=0.07)
+            yield Case(f"{name}, of one series", independent(kind, 1, n), splits.leave_one_cycle_out, FIVE, high=0.07)
+        for n in (3, 5, 10):
+            yield Case(f"{kind}, {n} files", independent(kind, n, 2), splits.leave_one_file_out, FIVE, high=0.07)
+        yield Case(f"{kind}, split", independent(kind, 1, 6), lambda s: splits.by_rows(s, 0.75, 0.25), FIVE, high=0.07)
+    yield Case("harmful in one of six", real(0.5, 6, harm=12.0), splits.leave_one_cycle_out, FIVE, high=0.05)
+    for who, methods in (("five methods", FIVE), (f"all {len(ALL)} methods", ALL)):
+        half, fifth = real(0.5, 6), real(0.2, 4)
+        yield Case(f"half left, six cycles, {who}", half, splits.leave_one_cycle_out, methods, low=0.9, best=True)
+        yield Case(f"a fifth left, four cycles, {who}", fifth, splits.leave_one_cycle_out, methods, low=0.98, best=True)
+
+
+def accepted(case: Case, seed: int) -> bool:
+    samples = case.make(np.random.default_rng(seed))
+    found = compare(samples, case.methods, case.judging(samples), robustness=False)
+    if case.best:
+        return found.best("z_um") is not None
+    return any(a.accepted for a in found.overall())
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--recordings", type=int, default=500)
+    parser.add_argument("--only", default="", help="cases whose name holds this")
+    parser.add_argument("--jobs", type=int, default=-1)
+    options = parser.parse_args()
+    missed, pool = [], []
+    print(f"{options.recordings} recordings each; share with an accepted model, its 95 % interval, goal")
+    for case in cases():
+        if options.only not in case.name:
+            continue
+        begin = time.perf_counter()
+        found = Parallel(n_jobs=options.jobs)(delayed(accepted)(case, k) for k in range(options.recordings))
+        n, k = len(found), sum(found)
+        low, high = stats.binomtest(k, n).proportion_ci(method="exact")
+        goal = f"<= {case.high:.0%}" if case.high < 1 else f">= {case.low:.0%}"
+        ok = case.low <= k / n <= case.high
+        missed += [] if ok else [case.name]
+        pool += found if case.high == 0.07 else []
+        took = time.perf_counter() - begin
+        print(f"{case.name:45} {k / n:6.1%}  {low:.1%}-{high:.1%}  {goal}  {'' if ok else 'MISSED'}  {took:.0f} s", flush=True)
+    if pool:
+        print(f"{'noise, pooled':45} {np.mean(pool):6.1%}  of {len(pool)}  <= 5%")
+        missed += ["pooled"] if np.mean(pool) > 0.05 else []
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parent))
+    sys.exit(main())

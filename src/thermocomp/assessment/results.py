@@ -1,0 +1,162 @@
+"""What judging needs to be told, and what it comes out as."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment import harm, metrics
+from thermocomp.assessment.diagnostics import Collinearity
+from thermocomp.assessment.recommend import Recommendation
+from thermocomp.assessment.robustness import Robustness
+from thermocomp.assessment.splits import Judging
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.models.methods import deployable
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is stated before judging.
+
+    Parameters
+    ----------
+    margin : float or None
+        Harm in a single unit that is let pass [unit of the target]; None takes that of `harm.margin_of`.
+    primary : str or None
+        Method that the judging is about: it is not corrected for the number of methods, all others are.
+    """
+
+    margin: float | None = None
+    primary: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.margin is not None and not 0 <= self.margin < np.inf:
+            raise InputError(f"margin {self.margin}: state a finite number that is not negative")
+
+    def check(self, names: Sequence[str]) -> None:
+        """Raise `InputError` if the primary method is not among those compared."""
+        if self.primary is not None and self.primary not in names:
+            raise InputError(f"primary method {self.primary!r} is not compared; compared are {', '.join(names)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How one model did for one target on one unseen block.
+
+    Parameters
+    ----------
+    model, target, block : str
+    measured, predicted : ndarray of shape (n_judged,)
+        Deviations [um].
+    row, test, cycle : ndarray of int of shape (n_judged,)
+        Where the rows stand in their file, which file, which thermal cycle.
+    verdict : Verdict
+        Of the do-no-harm gate.
+    sensors : tuple of str
+        Inputs with an influence; those of all models, if several were trained.
+    fit_s : float
+        The fits took [s].
+    n_effective : float
+        Independent rows the residual is worth.
+    robustness : Robustness or None
+    frozen : ErrorModel or None
+        The model that was replayed; None for several blocks together, or if it could not be fitted.
+    failure : str
+        Why the method could not be fitted; empty if it could.
+    caveat : str
+        Why this is no honest test, whatever the figures say; empty if it is one.
+    overall : bool
+        It is the last word on this model and target: all that was judged, not one cycle of it.
+    n_sensors : tuple of (int, int)
+        Fewest and most inputs with an influence in one model.
+    """
+
+    model: str
+    target: str
+    block: str
+    measured: FloatArray
+    predicted: FloatArray
+    row: IntArray
+    test: IntArray
+    cycle: IntArray
+    verdict: harm.Verdict
+    sensors: tuple[str, ...]
+    fit_s: float
+    n_effective: float
+    robustness: Robustness | None = None
+    frozen: ErrorModel | None = None
+    failure: str = ""
+    caveat: str = ""
+    overall: bool = False
+    n_sensors: tuple[int, int] = (0, 0)
+
+    def metric(self, name: str) -> float:
+        """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
+
+    def none_metric(self, name: str) -> float:
+        """Return the metric without compensation."""
+        return (
+            metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
+        )
+
+    @property
+    def accepted(self) -> bool:
+        """True if the model may run."""
+        return self.word == "accepted"
+
+    @property
+    def word(self) -> harm.Word:
+        """``accepted``, ``unproven`` or ``refused``."""
+        if self.failure:
+            return "refused"
+        return "unproven" if self.caveat and self.verdict.word == "accepted" else self.verdict.word
+
+    @property
+    def reason(self) -> str:
+        """Why, and for what is unproven which test would decide it."""
+        if self.failure:
+            return f"could not be judged: {self.failure}"
+        return self.caveat or self.verdict.told
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Several methods on the same unseen blocks.
+
+    Parameters
+    ----------
+    judging : Judging
+    assessments : tuple of Assessment
+        Per target, method and block; with several blocks also one for all of them together.
+    collinearity : Collinearity
+        Of the temperatures.
+    left : int
+        Pairs of method and target that were not judged, because the work was stopped.
+    recommended : tuple of Recommendation
+        Per target, where there was something to choose.
+    """
+
+    judging: Judging
+    assessments: tuple[Assessment, ...]
+    collinearity: Collinearity
+    left: int = 0
+    recommended: tuple[Recommendation, ...] = ()
+
+    def overall(self) -> tuple[Assessment, ...]:
+        """Return one assessment per target and method: over all its blocks."""
+        return tuple(a for a in self.assessments if a.overall)
+
+    def best(self, target: str) -> Assessment | None:
+        """Return the assessment of the method to take for a target: the recommended one if it was accepted.
+
+        Without one it is the accepted one with the smallest RMS, of the methods that can be deployed.
+        """
+        fit = [a for a in self.overall() if a.target == target and a.accepted and deployable(a.model)]
+        first = {r.method for r in self.recommended if r.target == target}
+        return min(fit, key=lambda a: (a.model not in first, a.metric("rms")), default=None)
