@@ -1,6 +1,6 @@
 """How often the verdict is wrong: accepted on noise, accepted though harmful, not accepted though good.
 
-Run with ``python benchmarks/bench_verdict.py [--recordings 500] [--only WORDS]``. Everything goes through `compare`: the
+Run with ``python benchmarks/bench_verdict.py [--recordings 500] [--only WORDS]``. All goes through `compare`: the
 methods are trained, replayed and judged as they are on the command line. A case is printed with the share of its
 recordings in which any of the methods was accepted, its 95 % interval, and the goal.
 """
@@ -61,7 +61,7 @@ def recording(name: str, temperatures: FloatArray, drift: FloatArray, cycles: in
     )
     rows = len(drift) // cycles
     parts = tuple(Cycle(str(k + 1), k * rows, (k + 1) * rows) for k in range(cycles))
-    return Recording(name, 60.0 * np.arange(len(drift)), table, channels, parts)
+    return Recording(name, 60.0 * np.arange(len(drift), dtype=np.float64), table, channels, parts)
 
 
 def noise(rng: np.random.Generator, kind: str, rows: int, columns: int) -> FloatArray:
@@ -109,7 +109,7 @@ def real(left: float, cycles: int, harm: float = 0.0) -> Callable[[np.random.Gen
 
 
 def smooth(rng: np.random.Generator) -> FloatArray:
-    """A temperature that wanders from 0, up or down, as slowly as a machine's."""
+    """Return a temperature that wanders from 0, up or down, as slowly as a machine's."""
     x = np.cumsum(np.cumsum(rng.normal(size=ROWS)) * 0.1 + rng.normal(size=ROWS))
     found: FloatArray = x - x[0]
     return found
@@ -152,7 +152,8 @@ def main() -> int:
     parser.add_argument("--only", default="", help="cases whose name holds this")
     parser.add_argument("--jobs", type=int, default=-1)
     options = parser.parse_args()
-    missed, pool = [], []
+    missed: list[str] = []
+    pool: list[bool] = []
     print(f"{options.recordings} recordings each; share with an accepted model, its 95 % interval, goal")
     for case in cases():
         if options.only not in case.name:
@@ -166,7 +167,10 @@ def main() -> int:
         missed += [] if ok else [case.name]
         pool += found if case.high == 0.07 else []
         took = time.perf_counter() - begin
-        print(f"{case.name:45} {k / n:6.1%}  {low:.1%}-{high:.1%}  {goal}  {'' if ok else 'MISSED'}  {took:.0f} s", flush=True)
+        print(
+            f"{case.name:45} {k / n:6.1%}  {low:.1%}-{high:.1%}  {goal}  {'' if ok else 'MISSED'}  {took:.0f} s",
+            flush=True,
+        )
     if pool:
         print(f"{'noise, pooled':45} {np.mean(pool):6.1%}  of {len(pool)}  <= 5%")
         missed += ["pooled"] if np.mean(pool) > 0.05 else []

@@ -5,7 +5,7 @@ from typing import Literal
 
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import ErrorModel, HonestError, Input, Support
+from thermocomp.core.model import RULES, ErrorModel, HonestError, Input, Support
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
@@ -62,7 +62,7 @@ def static(target: str = "z_um") -> Polynomial:
 
 def judged(model: ErrorModel, max_abs: float, verdict: Literal["accepted", "refused"] = "accepted") -> ErrorModel:
     """Return the model with an honest error."""
-    honest = HonestError("test", 1.0, 1.0, max_abs, 5.0, 5.0, {}, verdict, "worse than none on cycle 3")
+    honest = HonestError("test", 1.0, 1.0, max_abs, 5.0, 5.0, {}, verdict, "worse than none on cycle 3", rules=RULES)
     return replace(model, honest_error=honest)
 
 

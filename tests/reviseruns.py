@@ -9,10 +9,12 @@ import pytest
 
 from thermocomp.cli.app import run
 from thermocomp.compensation.nc.revising.header import MARK
-from thermocomp.core.model import ErrorModel, HonestError
+from thermocomp.core.model import RULES, ErrorModel, HonestError
 from thermocomp.files import modelfile
 
-HONEST = HonestError("leave one thermal cycle out", 0.8, 1.0, 2.0, 9.0, 11.0, {"a": 1.0}, "accepted", "fine")
+HONEST = HonestError(
+    "leave one thermal cycle out", 0.8, 1.0, 2.0, 9.0, 11.0, {"a": 1.0}, "accepted", "fine", rules=RULES
+)
 PLATE = """%
 (a plate)
 G21 G90 G17 G54

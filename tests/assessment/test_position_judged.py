@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from profilemachine import day, planted, profiles
-from thermocomp.assessment.position import MIN_STATES, n_pieces, study, study_all
+from thermocomp.assessment.position import n_pieces, study, study_all
 from thermocomp.assessment.splits import by_rows, leave_one_cycle_out, leave_one_file_out
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Support
@@ -73,12 +73,9 @@ def test_a_model_that_is_no_better_than_its_cold_profile_is_refused() -> None:
     made = profiles(noise=0.1)
     still = replace(made, values=made.values[0] + 0.3 * np.random.default_rng(0).normal(size=made.values.shape))
     judged = study(still, PositionOptions(method="ols")).assessment
-    assert judged.harmless.accepted
-    assert judged.useful is not None
-    assert not judged.useful.accepted
-    assert not judged.accepted
-    assert "beside its cold profile alone" in judged.reason
-    assert "with that alone" in judged.reason
+    assert all(u.rms < u.none_rms for u in judged.verdict.units)
+    assert judged.verdict.word == "refused"
+    assert judged.reason.startswith("no better than the cold profile alone: RMS ")
 
 
 def test_a_model_that_does_harm_is_refused() -> None:
@@ -99,7 +96,7 @@ def test_too_few_states_prove_nothing() -> None:
     judged = study(replace(made, values=values), OLS).assessment
     assert not judged.accepted
     assert judged.cycles[1].n_states == 6
-    assert judged.reason == f"fewer than {MIN_STATES} rows of day 2 to judge on"
+    assert judged.reason.startswith("judged on 2 units, at least 3 are needed; record 1 more")
     with pytest.raises(InputError, match="only one thermal cycle"):
         study(profiles(n_cycles=1), OLS)
     values[24:] = np.nan
@@ -200,7 +197,7 @@ def test_noise_has_no_thermal_part() -> None:
     noise = 0.3 * np.random.default_rng(0).normal(size=made.values.shape)
     found = study(replace(made, values=made.values[0] + noise), PositionOptions(method="ols"), left_open=SETTINGS)
     assert found.assessment.accepted
-    assert found.assessment.useful is None
+    assert len(found.assessment.verdict.units[0].baselines) == 1
     assert found.dropped == "it is noise"
     assert found.fit.model.models == ()
     assert found.assessment.overall.model == found.assessment.overall.geometric
@@ -220,7 +217,7 @@ def test_a_thermal_part_that_is_refused_leaves_the_cold_profile() -> None:
     found = study(wild, options, left_open=SETTINGS)
     assert found.assessment.accepted
     assert found.fit.model.models == ()
-    assert "beside its cold profile alone" in found.dropped
+    assert found.dropped.startswith("no better than the cold profile alone: RMS ")
     # one that is refused with its profile stays refused
     assert not study(replace(wild, values=wild.values - 1.5 * made.cold() - 20.0), options).assessment.accepted
 

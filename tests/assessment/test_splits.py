@@ -86,7 +86,7 @@ def test_a_file_is_judged_as_one(recording: Recording) -> None:
     two = stack([recording, small_machine((1500.0, 500.0), seed=1)], ["z_um"])
     fitted = study.fit(two, "ols", splits.leave_one_file_out(two))
     (whole,) = fitted.comparison.overall()
-    assert [c.cycle for c in whole.verdict.cycles] == ["small#1", "small#2"]
+    assert [u.name for u in whole.verdict.units] == ["small#1", "small#2"]
 
 
 @pytest.mark.parametrize("text", ["0.75", "a/b", "0.9/0.2", "0/1", "3h/x", "500h/3h", "0.75/0.25/0.1", "nan/0.1"])

@@ -13,7 +13,7 @@ from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import HonestError, Input
+from thermocomp.core.model import RULES, HonestError, Input
 from thermocomp.core.reading import Reading
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
@@ -149,7 +149,7 @@ def test_a_sensor_that_fails_within_what_sensors_can_say(value: float) -> None:
 
 
 def test_a_refused_model_does_not_start() -> None:
-    refused = HonestError("p", 1.0, 1.0, 1.0, 1.0, 1.0, {}, "refused", "worse than none")
+    refused = HonestError("p", 1.0, 1.0, 1.0, 1.0, 1.0, {}, "refused", "worse than none", rules=RULES)
     with pytest.raises(InputError, match="was refused and will not run: worse than none"):
         online.start([replace(model(), honest_error=refused)])
     assert online.start([replace(model(), honest_error=replace(refused, verdict="accepted"))])

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Axis, Source
-from thermocomp.core.model import ErrorModel, HonestError, Input
+from thermocomp.core.model import RULES, ErrorModel, HonestError, Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
@@ -48,8 +49,10 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-def drift(target: str, unit: str = "um", verdict: str = "") -> Polynomial:
-    judged = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, verdict, "worse than none") if verdict else None  # type: ignore[arg-type]
+def drift(target: str, unit: str = "um", verdict: Word = "") -> Polynomial:
+    judged = None
+    if verdict:
+        judged = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, verdict, "worse than none", rules=RULES)
     return Polynomial(
         target=target,
         unit=unit,
@@ -61,7 +64,7 @@ def drift(target: str, unit: str = "um", verdict: str = "") -> Polynomial:
     )
 
 
-def along(target: str, unit: str = "um", axis: str = "Y", verdict: str = "") -> PositionModel:
+def along(target: str, unit: str = "um", axis: str = "Y", verdict: Word = "") -> PositionModel:
     return PositionModel(
         target=target,
         unit=unit,  # type: ignore[arg-type]

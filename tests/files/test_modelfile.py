@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import HonestError, Input, Provenance, Support
+from thermocomp.core.model import RULES, HonestError, Input, Provenance, Support
 from thermocomp.files import jsonfile, modelfile
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -28,7 +28,9 @@ def model(coefficient: float = 1 / 3) -> LinearDynamic:
         lagged=(1e-7,),
         support=Support("fade", 0.05, 0.3),
         provenance=Provenance("dynamic", {"copies": "'lagged'"}, ("ab12",), ("1 (600 1/min)",), 810, "0.1.0"),
-        honest_error=HonestError("leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none"),
+        honest_error=HonestError(
+            "leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none", rules=RULES
+        ),
     )
 
 
@@ -138,3 +140,45 @@ def test_nan_is_never_written() -> None:
     honest = HonestError("p", float("nan"), 2.0, 3.0, 4.0, 5.0, {}, "refused", "")
     with pytest.raises(ValueError, match="Out of range float"):
         modelfile.dumps([replace(model(), honest_error=honest)])
+
+
+def test_a_verdict_by_older_rules_proves_nothing_today() -> None:
+    """A file of a former release has no rules in it: it loads, is shown as unproven, and does not run."""
+    honest = HonestError("leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none")
+    mine = replace(model(), honest_error=honest)
+    text = modelfile.dumps([mine])
+    for line in (' "rules": 0,', ' "units": 0,', ' "tried": 1,', ' "taken": ""'):
+        assert line.strip(" ,") in text
+    body = json.loads(text)["models"]
+    for name in ("rules", "units", "tried", "taken"):
+        del body[0]["honest_error"][name]
+    (read,) = modelfile.loads(jsonfile.pack(jsonfile.MODELS, body))
+    assert read.honest_error == honest
+    assert not read.accepted
+    assert read.honest_error is not None
+    assert read.honest_error.word == "unproven"
+    assert read.honest_error.why == "judged by older rules: better than none"
+    with pytest.raises(InputError, match="unproven and runs in shadow only: judged by older rules"):
+        read.check_may_run()
+
+
+@pytest.mark.parametrize("by", ["M. Weber", ",trial", "M. Weber, ", " , "])
+def test_who_takes_an_unproven_model_gives_name_and_reason(by: str) -> None:
+    with pytest.raises(InputError, match="want a name and a reason"):
+        model().taken(by)
+
+
+def test_an_unproven_model_that_is_taken_says_so_for_ever() -> None:
+    honest = HonestError("p", 1.0, 2.0, 3.0, 4.0, 5.0, {}, "unproven", "judged on 2 units", rules=RULES)
+    mine = replace(model(), honest_error=honest)
+    with pytest.raises(InputError, match="accept-unproven"):
+        mine.check_may_run()
+    (read,) = modelfile.loads(modelfile.dumps([mine.taken("M. Weber, trial on machine 7")]))
+    read.check_may_run()
+    assert not read.accepted
+    assert read.honest_error is not None
+    assert read.honest_error.why == "judged on 2 units. Taken by M. Weber, trial on machine 7"
+    refused = replace(mine, honest_error=replace(honest, verdict="refused")).taken("M. Weber, trial")
+    with pytest.raises(InputError, match="was refused and will not run"):
+        refused.check_may_run()
+    assert mine.taken("") == mine

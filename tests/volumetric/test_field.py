@@ -11,7 +11,7 @@ from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Machine, Source
-from thermocomp.core.model import HonestError
+from thermocomp.core.model import RULES, HonestError
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
 from thermocomp.volumetric.field import ErrorField
@@ -221,7 +221,7 @@ def test_numbers_that_are_none_are_refused(bad: float) -> None:
 
 
 def test_a_refused_model_does_not_run() -> None:
-    refused = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, "refused", "worse than none")
+    refused = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, "refused", "worse than none", rules=RULES)
     slope = replace(line("EYY", "um/m", {"T1": 1.0}), honest_error=refused)
     sources: tuple[Source, ...] = (
         replace(line("EYY", "um", {"T1": 1.0}), honest_error=refused),

@@ -135,7 +135,7 @@ class Verdict:
     def p_values(self) -> tuple[float, ...]:
         """One-sided p-value beside each baseline; 1 with fewer than `MIN_UNITS` units."""
         if len(self.units) < MIN_UNITS:
-            return (1.0,)
+            return (1.0,) * len(self.names)
         ratios = np.array([u.log_ratios for u in self.units])
         mean, error = ratios.mean(axis=0), stats.sem(ratios, axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -113,9 +113,7 @@ class Assessment:
     @property
     def word(self) -> harm.Word:
         """``accepted``, ``unproven`` or ``refused``."""
-        if self.failure:
-            return "refused"
-        return "unproven" if self.caveat and self.verdict.word == "accepted" else self.verdict.word
+        return "refused" if self.failure or self.caveat else self.verdict.word
 
     @property
     def reason(self) -> str:

@@ -229,6 +229,7 @@ def fit(
     output: Output,
     support: Policy = "clip",
     margin: float = 0.25,
+    accept_unproven: str | None = None,
     overwrite: Flag = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -236,7 +237,7 @@ def fit(
     """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
 
     The method is first judged on unseen cycles, then fitted to everything. A refused model is written too, with the
-    refusal inside: nothing will run it.
+    refusal inside: nothing will run it. An unproven one runs in shadow only.
 
     Parameters
     ----------
@@ -255,6 +256,9 @@ def fit(
         What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
     margin : float
         Share of each input's trained span by which its range is widened.
+    accept_unproven : str
+        Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file and said
+        wherever the model is shown. A refused one is never taken.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -280,15 +284,16 @@ def fit(
     refuse_existing([output], overwrite, recordings, ".json")
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
-    judging = study.judging(samples)
+    judging, how = study.judging(samples), Support(support, margin)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
-            samples, model, judging, support=Support(support, margin), jobs=study.jobs, progress=progress
+            samples, model, judging, rules=study.rules(), support=how, jobs=study.jobs, progress=progress
         )
+    result = replace(result, models=tuple(m.taken(accept_unproven or "") for m in result.models))
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
         out.show_fit(result, output, trouble, _console, as_json=json)
-    return 0 if all(m.accepted for m in result.models) else 1
+    return 1 if any(a.word == "refused" for a in result.comparison.overall()) else 0
 
 
 def assess(
@@ -297,6 +302,7 @@ def assess(
     /,
     *,
     mapping: Path | None = None,
+    harm_margin: float | None = None,
     json: Json = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
@@ -309,25 +315,28 @@ def assess(
         CSV, XLSX or Parquet files; each is one test.
     mapping : Path
         TOML file that says what the columns are.
+    harm_margin : float
+        Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
     json : bool
         Print results for a machine instead of a table.
 
     Returns
     -------
     int
-        0 every model accepted, 1 one was refused or a recording was used to fit it, 2 unusable input.
+        0 no model refused, 1 one was refused, 2 unusable input.
     """
     tests = read_recordings(recordings, mapping)
     with needs("study"):
         from thermocomp.assessment import study as studies
+        from thermocomp.assessment.results import Rules
         from thermocomp.cli import output as out
         from thermocomp.files import modelfile
     models = modelfile.read(model)
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
-        judged = studies.assess(models, tests, progress=progress)
+        judged = studies.assess(models, tests, rules=Rules(harm_margin), progress=progress)
     out.show_assess(judged, trouble, _console, as_json=json)
-    return 0 if all(a.accepted for a in judged.assessments) else 1
+    return 1 if any(a.word == "refused" for a in judged.overall()) else 0
 
 
 def compare(
@@ -336,6 +345,7 @@ def compare(
     *,
     study: Study,
     models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
+    primary: str | None = None,
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -351,6 +361,9 @@ def compare(
     models : list of str
         Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
         mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+    primary : str
+        Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
+        number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
     output : Path
         Report to write (.html).
     overwrite : bool
@@ -361,7 +374,7 @@ def compare(
     Returns
     -------
     int
-        0 every target has a model that may be used, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
+        0 every target has a model that may run, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
         (what was judged until then is shown).
     """
     tests = read_recordings(recordings, study.mapping)
@@ -372,9 +385,9 @@ def compare(
         refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
     samples = study.samples(tests)
-    judging = study.judging(samples)
-    with by_steps(comparing.n_pieces(samples, models, judging), hidden=json) as progress:
-        comparison = comparing.compare(samples, models, judging, jobs=study.jobs, progress=progress)
+    judging, rules = study.judging(samples), study.rules(primary)
+    with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
+        comparison = comparing.compare(samples, models, judging, rules=rules, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html

@@ -14,6 +14,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
+    from thermocomp.assessment.results import Rules
     from thermocomp.assessment.splits import Judging
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
@@ -50,6 +51,9 @@ class Study:
         Judge on each recording in turn.
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
+    harm_margin : float
+        Harm in a single cycle or file that is let pass [um]. If not given: three times the probe's noise or 5 % of the
+        largest drift, at most 2 um.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     """
@@ -61,6 +65,7 @@ class Study:
     leave_one_cycle_out: Flag = False
     leave_one_file_out: Flag = False
     absolute: Flag = False
+    harm_margin: float | None = None
     jobs: int = -1
 
     def samples(self, tests: "list[Recording]") -> "Samples":
@@ -82,6 +87,12 @@ class Study:
         if self.leave_one_file_out:
             return splits.leave_one_file_out(samples)
         return splits.leave_one_cycle_out(samples)
+
+    def rules(self, primary: str | None = None) -> "Rules":
+        """Return what is stated before judging."""
+        from thermocomp.assessment.results import Rules
+
+        return Rules(self.harm_margin, primary)
 
 
 @Parameter(name="*")

@@ -58,6 +58,7 @@ def position(
     leave_one_file_out: Flag = False,
     absolute: Flag = False,
     jobs: int = -1,
+    accept_unproven: str | None = None,
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -111,6 +112,8 @@ def position(
         not the same every morning. Without it each test counts from its own.
     jobs : int
         Processes to share the work among; -1 takes all cores.
+    accept_unproven : str
+        Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file.
     output : Path
         File to write the models to (.json).
     overwrite : bool
@@ -165,7 +168,7 @@ def position(
     with progress.by_steps(assessing.n_pieces(tests, how, asked.judging), hidden=json) as tell:
         found = assessing.study_all(tests, how, left_open=left_open, judging=asked.judging, jobs=jobs, progress=tell)
     if output is not None:
-        positionfile.write([f.fit.model for f in found], output, overwrite=overwrite)
+        positionfile.write([f.fit.model.taken(accept_unproven or "") for f in found], output, overwrite=overwrite)
     if json:
         entries = [told.content(f, left_open) for f in found]
         content = {"components": entries} if several else entries[0]
@@ -178,7 +181,7 @@ def position(
             told.show(found[0], tests[0], left_open, _console)
         if output is not None:
             _console.print(f"Model file: {output}", soft_wrap=True)
-    return 0 if all(f.assessment.accepted for f in found) else 1
+    return 1 if any(f.assessment.verdict.word == "refused" for f in found) else 0
 
 
 def _read(

@@ -129,7 +129,8 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
         mine = [s for s in stations if hashes[s.model.target] == name]
         places = {a: [s.along for s in mine if s.axis == a] for a in dict.fromkeys(s.axis for s in mine)}
         said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
-        found.append(f"{name} for {', '.join(said)}")
+        unproven = any((h := s.model.honest_error) is not None and h.taken for s in mine)
+        found.append(f"{name} for {', '.join(said)}{' UNPROVEN' if unproven else ''}")
     return found
 
 

@@ -68,16 +68,20 @@ class Drifting:
         Inputs that the program does not tell, such as "ambient=22 degC".
     forecast : Path
         CSV file with such inputs over the time since the start of the program (columns such as time_min, ambient_C).
+    accept_unproven : str
+        Who takes unproven models all the same, and why: "NAME, REASON".
     """
 
     model: Models
     axis: OptionalNames = None
     constant: OptionalNames = None
     forecast: Path | None = None
+    accept_unproven: str | None = None
 
     def stations(self) -> list[Station]:
         """Return which model stands for which axis."""
-        return stations([m for path in self.model for m in modelfile.read(path)], self.axis or ())
+        models = [m.taken(self.accept_unproven or "") for path in self.model for m in modelfile.read(path)]
+        return stations(models, self.axis or ())
 
     def others(self, found: Sequence[Station]) -> tuple[dict[str, Signal], list[str]]:
         """Return the inputs that the program does not tell, and what was not read of them."""

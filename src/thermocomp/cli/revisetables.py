@@ -95,6 +95,11 @@ def warnings(job: Job, done: Done) -> list[str]:
     for b in done.bounds:
         if math.isnan(b.model):
             found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")
+    found += [
+        f"the model of {s.axis} is unproven: {honest.why}"
+        for s in drift.stations
+        if (honest := s.model.honest_error) is not None and honest.taken
+    ]
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append("the models know the spindle speed alone: a change of the room is in no bound")
     if done.written and done.proof is None:

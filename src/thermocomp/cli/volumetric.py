@@ -111,7 +111,7 @@ def volumetric(
 
 def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
     with needs("study"):
-        from thermocomp.report.volumetric import headline, said, untested
+        from thermocomp.report.volumetric import headline, said, unproven, untested
     machine, recording = study.machine, study.recording
     replayed = "reference state: constants and profiles alone"
     if recording is not None:
@@ -126,9 +126,9 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
     _console.print(_lines(study))
     if volume:
         _console.print(_volume(study))
-    never = untested(study)
-    if never:
-        _console.print(f"[yellow]but[/] never judged on unseen cycles: {escape(', '.join(never))}", soft_wrap=True)
+    for what, codes in (("never judged on unseen cycles", untested(study)), ("unproven", unproven(study))):
+        if codes:
+            _console.print(f"[yellow]but[/] {what}: {escape('; '.join(codes))}", soft_wrap=True)
     if study.missing:
         _console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
     for note in study.notes:
@@ -233,7 +233,7 @@ def _volume(study: "Volumetric") -> Table:
 
 def _content(study: "Volumetric") -> dict[str, Any]:
     with needs("study"):
-        from thermocomp.report.volumetric import listed, untested
+        from thermocomp.report.volumetric import listed, unproven, untested
     course, recording = study.course, study.recording
     return {
         "machine": study.machine.name,
@@ -243,6 +243,7 @@ def _content(study: "Volumetric") -> dict[str, Any]:
         "point_mm": course.point,
         "tool_mm": course.tool,
         "never_judged": untested(study),
+        "unproven": unproven(study),
         "notes": study.notes,
         "components": listed(study),
         "states": [

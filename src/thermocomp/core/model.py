@@ -5,9 +5,9 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -169,7 +169,8 @@ class HonestError:
     @property
     def why(self) -> str:
         """The reason as it counts today."""
-        return f"judged by older rules: {self.reason}" if self.word != self.verdict else self.reason
+        why = f"judged by older rules: {self.reason}" if self.word != self.verdict else self.reason
+        return f"{why}. Taken by {self.taken}" if self.taken else why
 
 
 class State(NamedTuple):
@@ -343,6 +344,29 @@ class ErrorModel(ABC):
     def accepted(self) -> bool:
         """True if the do-no-harm gate has let this model pass."""
         return self.honest_error is not None and self.honest_error.word == "accepted"
+
+    def taken(self, by: str) -> Self:
+        """Return this model as one that somebody takes although it is unproven; as it is, if it is not.
+
+        Parameters
+        ----------
+        by : str
+            Who, and why, such as ``"M. Weber, trial on machine 7"``; the empty string is nobody.
+
+        Raises
+        ------
+        InputError
+            It has no name or no reason.
+        """
+        if not by:
+            return self
+        name, _, reason = by.partition(",")
+        if not (name.strip() and reason.strip()):
+            raise InputError(f"{by!r} takes an unproven model: want a name and a reason, such as 'M. Weber, trial'")
+        found = self.honest_error
+        if found is None or found.word != "unproven":
+            return self
+        return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
 
     def check_may_run(self) -> None:
         """Raise `InputError` if the do-no-harm gate did not let this model pass, and nobody takes it all the same."""

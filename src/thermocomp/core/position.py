@@ -1,7 +1,7 @@
 """`PositionModel`: an error that varies along an axis and with the thermal state (Chen 1996, Eq. 2 and 3)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -75,6 +75,11 @@ class PositionModel:
     def models(self) -> tuple[ErrorModel, ...]:
         """The models of time: the offset, if there is one, then the slopes."""
         return tuple(m for _, m in self._by_power)
+
+    def taken(self, by: str) -> "PositionModel":
+        """Return this model as one that somebody takes although it is unproven; see `ErrorModel.taken`."""
+        offset = None if self.offset is None else self.offset.taken(by)
+        return replace(self, offset=offset, slopes=tuple(m.taken(by) for m in self.slopes))
 
     @property
     def powers(self) -> tuple[int, ...]:

@@ -65,6 +65,7 @@ def render(study: Volumetric) -> str:
             ],
             components=listed(study),
             untested=untested(study),
+            unproven=unproven(study),
             boxes=space.boxes(study) if n_axes == 3 else "",
             sections=space.sections(study, study.worst) if n_axes > 1 else "",
             over_time=figures.over_time(study) if over_time else "",
@@ -103,6 +104,15 @@ def untested(study: Volumetric) -> list[str]:
         for code, source in study.machine.components.items()
         if any(m.honest_error is None for m in models_of(source))
     ]
+
+
+def unproven(study: Volumetric) -> list[str]:
+    """Return the components whose models are taken although they are unproven, and by whom."""
+    found = {
+        code: next((m.honest_error.taken for m in models_of(source) if m.honest_error and m.honest_error.taken), "")
+        for code, source in study.machine.components.items()
+    }
+    return [f"{code}, taken by {by}" for code, by in found.items() if by]
 
 
 def said(point: Vector) -> str:
