@@ -42,6 +42,8 @@ measured_tool = {ZERO}""",
     HEAD,
 ).replace("[components]", f"[spindle]\nmeasured_tool = {ZERO}\n[components]")
 
+Word = Literal["", "accepted", "refused"]
+
 
 def written(folder: Path, text: str) -> Path:
     path = folder / "mill.toml"
