@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
+from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Judging, Split, called, stretches
@@ -57,6 +58,8 @@ class Assessment:
         It is the last word on this model and target: all that was judged, not one cycle of it.
     n_sensors : tuple of (int, int)
         Fewest and most inputs with an influence in one model.
+    learned : int
+        Rows that were left out because the model had learned from them.
     """
 
     model: str
@@ -77,6 +80,7 @@ class Assessment:
     caveat: str = ""
     overall: bool = False
     n_sensors: tuple[int, int] = (0, 0)
+    learned: int = 0
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
@@ -98,7 +102,14 @@ class Assessment:
         """Why it was accepted or refused."""
         if self.failure:
             return f"could not be judged: {self.failure}"
-        return self.caveat or self.verdict.reason
+        told = self.caveat or self.verdict.reason
+        return f"{told}; {self.left_out}" if self.learned else told
+
+    @property
+    def left_out(self) -> str:
+        """How many rows were left out because the model had learned from them, in words; empty if none was."""
+        of = len(self.measured) + self.learned
+        return f"{self.learned:,} of {of:,} rows were learned from: left out" if self.learned else ""
 
 
 @dataclass(frozen=True)
@@ -164,7 +175,13 @@ def compare(
     Returns
     -------
     Comparison
+
+    Raises
+    ------
+    InputError
+        Rows stand in the samples twice and would be learned from and judged on at once.
     """
+    refuse_leaks(samples, judging)
     names = expand(methods)
     pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in judging.splits]
     done: list[Assessment] = []

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
+from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
@@ -80,7 +81,7 @@ def fit(
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
-        trained = train(method, samples, k, everything, support=support)
+        trained = train(method, samples, k, everything, support=support, prints=True)
         progress(f"{overall.target} {method} all rows")
         models.append(replace(trained.model, honest_error=honest_error(overall, judging)))
         estimators.append(trained.estimator)
@@ -121,7 +122,7 @@ class Judged:
     assessments : tuple of Assessment
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
-        Names of recordings that a model was fitted to: no honest test.
+        Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
     """
 
     models: tuple[ErrorModel, ...]
@@ -137,6 +138,9 @@ def assess(
     models: Sequence[ErrorModel], recordings: Sequence[Recording], *, progress: Callable[[str], None] = _silent
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
+
+    Rows that a model has learned from are left out and counted, whatever file they stand in; if no others are there,
+    the model is refused: see `thermocomp.recording.prints`.
 
     Parameters
     ----------
@@ -156,16 +160,36 @@ def assess(
         A channel the models need is not in the recordings.
     """
     found: list[Assessment] = []
-    hashes = {h for m in models if m.provenance for h in m.provenance.data_sha256}
+    hashes = {h for m in models for h in _hashes(m)}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
-    caveat = f"no honest test: fitted to {', '.join(seen)}; judge it on another recording" if seen else ""
     for model in models:
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
-        everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
-        name = model.provenance.method if model.provenance else model.family
-        overall = replace(judge(name, model, samples, everything), overall=True, caveat=caveat)
-        cut = per_cycle(overall)
+        overall = _assess(model, samples)
+        cut = [replace(a, learned=0) for a in per_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen)
+
+
+def _hashes(model: ErrorModel) -> tuple[str, ...]:
+    return model.provenance.data_sha256 if model.provenance else ()
+
+
+def _assess(model: ErrorModel, samples: Samples) -> Assessment:
+    """Judge a model on what it has not learned from; on everything if there is nothing else, and say so."""
+    known = learned_from(model, samples)
+    judged = np.isfinite(samples.deviations[:, 0])
+    n, of = int((known & judged).sum()), int(judged.sum())
+    caveat = ""
+    if 0 < n == of:
+        seen = [name for k, name in enumerate(samples.test_names) if samples.hashes[k] in _hashes(model)]
+        why = (
+            f"fitted to {', '.join(seen)}"
+            if len(seen) == len(samples.test_names)
+            else f"{n:,} of {of:,} rows were learned from"
+        )
+        caveat, n, known = f"no honest test: {why}; judge it on another recording", 0, np.zeros_like(known)
+    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
+    name = model.provenance.method if model.provenance else model.family
+    return replace(judge(name, model, samples, split), overall=True, caveat=caveat, learned=n)

@@ -301,6 +301,9 @@ def assess(
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
 
+    Rows that a model has learned from are known again by their fingerprints, whatever file they stand in: they are left
+    out and counted.
+
     Parameters
     ----------
     model : Path
@@ -315,7 +318,8 @@ def assess(
     Returns
     -------
     int
-        0 every model accepted, 1 one was refused or a recording was used to fit it, 2 unusable input.
+        0 every model accepted, 1 one was refused here or when it was fitted, or has learned from all there is to judge
+        it on, 2 unusable input.
     """
     tests = read_recordings(recordings, mapping)
     with needs("study"):
@@ -327,7 +331,8 @@ def assess(
     with by_steps(len(models), hidden=json) as progress:
         judged = studies.assess(models, tests, progress=progress)
     out.show_assess(judged, trouble, _console, as_json=json)
-    return 0 if all(a.accepted for a in judged.assessments) else 1
+    refused = any(m.honest_error is not None and not m.accepted for m in judged.models)
+    return 0 if all(a.accepted for a in judged.assessments) and not refused else 1
 
 
 def compare(

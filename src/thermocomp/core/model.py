@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.prints import Prints
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -100,6 +101,8 @@ class Provenance:
         thermocomp version that fitted it.
     source : str
         A publication, for models taken from one.
+    prints : Prints or None
+        Fingerprints of the rows it was fitted to: they are known again in another file.
     """
 
     method: str
@@ -109,6 +112,7 @@ class Provenance:
     rows: int = 0
     version: str = ""
     source: str = ""
+    prints: Prints | None = None
 
 
 @dataclass(frozen=True)
