@@ -166,10 +166,21 @@ def assess(
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
-        overall = _assess(model, samples)
+        overall = _assess(model, _called_as_in(model, samples))
         cut = [replace(a, learned=0) for a in per_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen)
+
+
+def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
+    """Return samples whose channels have the names of the model: a file may have others for them."""
+    (target,) = samples.targets
+    inputs = zip(samples.inputs, model.inputs, strict=True)
+    return replace(
+        samples,
+        targets=(replace(target, name=model.target),),
+        inputs=tuple(replace(channel, name=own.name) for channel, own in inputs),
+    )
 
 
 def _hashes(model: ErrorModel) -> tuple[str, ...]:

@@ -108,7 +108,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
         runs.append(_kept(windows, names, whole, stride, rows.at, most))
     if not any(run.rows for run in runs):
         return None
-    steps = {name: scales[name].step for name in names}
+    steps = {name: float(scales[name].step) for name in names}
     return Prints(_interval(samples), _stretches(samples, learn), steps, tuple(runs))
 
 
