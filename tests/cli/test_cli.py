@@ -4,10 +4,12 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from smallmachine import small_machine
@@ -17,6 +19,7 @@ from thermocomp.core.exceptions import MissingExtraError
 from thermocomp.core.machine import Channel
 from thermocomp.files import modelfile, recordings
 from thermocomp.models.methods import METHODS
+from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 
 RESULT_KEYS = {
@@ -128,6 +131,51 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file
     assert "fitted to copy" in capsys.readouterr().out
+
+
+def test_assess_leaves_out_what_was_learned_from(
+    drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, copy = tmp_path / "model.json", tmp_path / "copy.csv"
+    assert run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"]) == 0
+    capsys.readouterr()
+    lines = drift.read_text(encoding="utf-8").splitlines(keepends=True)
+    copy.write_text("".join(lines[:400] + lines[401:]), encoding="utf-8")
+    assert run(["assess", str(model), str(copy), "--json"]) == 1
+    found = printed(capsys)
+    assert found["seen_in_training"] == []
+    assert found["results"][-1]["verdict"] == "refused"
+    reason = "no honest test: 799 of 799 rows were learned from; judge it on another recording"
+    assert found["results"][-1]["reason"] == reason
+    first, day = small_machine(), small_machine((2200.0, 1200.0), seed=3)
+    table = pd.concat([first.table.drop(index=399), day.table], ignore_index=True)
+    time = 60.0 * np.arange(len(table), dtype=np.float64)
+    cycles = find_cycles(time, table["spindle_rpm"].to_numpy())
+    recordings.write(replace(first, time=time, table=table, cycles=cycles), copy, overwrite=True)
+    assert run(["assess", str(model), str(copy), "--json"]) == 0
+    found = printed(capsys)["results"][-1]
+    assert (found["n_rows"], found["n_rows_learned_from"]) == (400, 799)
+    run(["assess", str(model), str(copy)])
+    assert "799 of 1,199 rows were learned from: left out" in " ".join(capsys.readouterr().out.split())
+
+
+def test_what_fit_has_refused_assess_does_not_pass(
+    drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, other = tmp_path / "model.json", tmp_path / "other.csv"
+    recordings.write(small_machine((2200.0, 1200.0), seed=3), other)
+    run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"])
+    (fitted,) = modelfile.read(model)
+    assert fitted.honest_error is not None
+    refused = replace(fitted.honest_error, verdict="refused", reason="worse than none in cycle 2")
+    modelfile.write([fitted, replace(fitted, honest_error=refused)], model, overwrite=True)
+    capsys.readouterr()
+    assert run(["assess", str(model), str(other)]) == 1
+    out = " ".join(capsys.readouterr().out.split())
+    assert "accepted z_um" in out
+    assert "refused when it was fitted z_um: worse than none in cycle 2" in out
+    modelfile.write([fitted], model, overwrite=True)
+    assert run(["assess", str(model), str(other)]) == 0
 
 
 def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

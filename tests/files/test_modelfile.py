@@ -3,7 +3,9 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,22 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import RULES, HonestError, Input, Provenance, Support
+from thermocomp.core.prints import Prints, Runs, packed
 from thermocomp.files import jsonfile, modelfile
+
+PRINTS = Prints(
+    interval=15.0,
+    learned=((0, 700), (720, 810)),
+    steps={"z_um": 0.3, "t1_C": 1 / 3},
+    runs=(
+        Runs(
+            stride=1,
+            rows=packed(np.array([3, 40, 2**20], dtype=np.uint32) % 800),
+            moving=packed(np.array([1, 0, 1], dtype=np.uint32)),
+            marks={n: packed(np.array([7, 2**32 - 1, k], dtype=np.uint32)) for k, n in enumerate(("z_um", "t1_C"))},
+        ),
+    ),
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -27,7 +44,9 @@ def model(coefficient: float = 1 / 3) -> LinearDynamic:
         time_constants=(600.0,),
         lagged=(1e-7,),
         support=Support("fade", 0.05, 0.3),
-        provenance=Provenance("dynamic", {"copies": "'lagged'"}, ("ab12",), ("1 (600 1/min)",), 810, "0.1.0"),
+        provenance=Provenance(
+            "dynamic", {"copies": "'lagged'"}, ("ab12",), ("1 (600 1/min)",), 810, "0.1.0", prints=PRINTS
+        ),
         honest_error=HonestError(
             "leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none", rules=RULES
         ),
@@ -134,6 +153,49 @@ def altered(change: dict[str, object]) -> str:
 def test_wrong_content_is_refused_with_its_place(change: dict[str, object], message: str) -> None:
     with pytest.raises(ModelFileError, match=message):
         modelfile.loads(altered(change))
+
+
+def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
+    """Return a model file with other fingerprints and a checksum that fits."""
+    entry = json.loads(modelfile.dumps([model()]))["models"][0]
+    prints = {**entry["provenance"]["prints"], **change}
+    prints["runs"] = [{**prints["runs"][0], **run}]
+    return altered({"provenance": {**entry["provenance"], "prints": prints}})
+
+
+@pytest.mark.parametrize(
+    ("change", "run", "message"),
+    [
+        ({}, {"rows": "AA*="}, "not base64"),
+        ({}, {"rows": "Äöü="}, "not base64"),
+        ({}, {"rows": "AAAA"}, "3 bytes are no whole number of 32-bit numbers"),
+        ({}, {"rows": packed(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not rise"),
+        ({}, {"rows": packed(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
+        ({}, {"moving": "AAAAAA=="}, "1 of moving for 3 rows"),
+        ({}, {"marks": {"z_um": "AAAAAA=="}}, "of a target and of one input"),
+        ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 of z_um for 3 rows"),
+        ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: want those of z_um, t2_C"),
+        ({"steps": {"z_um": 0.0, "t1_C": 0.1}}, {}, "fingerprints of z_um: a resolution of 0.0"),
+        ({}, {"stride": 0}, "a stride of 0 rows"),
+        ({"interval": -1.0}, {}, "an interval of -1.0 s"),
+        ({"learned": [[0, 700], [600, 810]]}, {}, "no stretches of rows"),
+        ({"learned": []}, {}, "no stretches of rows"),
+        ({"surprise": 1}, {}, r"prints\.surprise"),
+        ({"steps": None}, {}, r"prints\.steps"),
+    ],
+)
+def test_wrong_fingerprints_are_refused(change: dict[str, Any], run: dict[str, Any], message: str) -> None:
+    assert modelfile.loads(with_prints({}, {})) == (model(),)
+    with pytest.raises(ModelFileError, match=message):
+        modelfile.loads(with_prints(change, run))
+
+
+def test_a_file_from_before_there_were_fingerprints_is_read() -> None:
+    entry = json.loads(modelfile.dumps([model()]))["models"][0]
+    del entry["provenance"]["prints"]
+    (found,) = modelfile.loads(altered({"provenance": entry["provenance"]}))
+    assert found.provenance is not None
+    assert found.provenance.prints is None
 
 
 def test_nan_is_never_written() -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.diagnostics import collinearity
+from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.results import Assessment, Comparison, Rules
@@ -71,7 +72,9 @@ def compare(
     ------
     InputError
         A method is unknown, or the primary one is not among them.
+        Rows stand in the samples twice and would be learned from and judged on at once.
     """
+    refuse_leaks(samples, judging)
     names = expand(methods)
     rules.check(names)
     targets, n = range(len(samples.targets)), len(judging.splits)

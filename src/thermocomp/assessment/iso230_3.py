@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.thermaltest import HOUR, Curve, Kind, Pair, Targets, ThermalTest, figures
 from thermocomp.assessment.timeconstants import MOVES, Phase, drive, find_phases, noise, settle
@@ -250,8 +251,12 @@ def _residuals(recording: Recording, models: Sequence[ErrorModel]) -> tuple[dict
         )
         predicted, outside = replay(model, samples, np.ones(len(samples), dtype=np.bool_))
         found[target] = samples.deviations[:, 0] - predicted
-        if model.provenance and recording.fingerprint in model.provenance.data_sha256:
+        known = learned_from(model, samples)
+        if known.all():
             notes.append(f"the model of {target} was fitted to this very recording: what it leaves is no honest test")
+        elif known.any():
+            told = f"{known.sum():,} of {len(known):,} rows were learned from"
+            notes.append(f"the model of {target}: {told}: what it leaves there is no honest test")
         if model.honest_error is not None and not model.accepted:
             notes.append(f"the model of {target} was refused when it was fitted: {model.honest_error.reason}")
         if outside.mean() > 0.1:

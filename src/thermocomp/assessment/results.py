@@ -74,6 +74,8 @@ class Assessment:
         It is the last word on this model and target: all that was judged, not one cycle of it.
     n_sensors : tuple of (int, int)
         Fewest and most inputs with an influence in one model.
+    learned : int
+        Rows that were left out because the model had learned from them.
     """
 
     model: str
@@ -94,6 +96,7 @@ class Assessment:
     caveat: str = ""
     overall: bool = False
     n_sensors: tuple[int, int] = (0, 0)
+    learned: int = 0
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
@@ -120,7 +123,14 @@ class Assessment:
         """Why, and for what is unproven which test would decide it."""
         if self.failure:
             return f"could not be judged: {self.failure}"
-        return self.caveat or self.verdict.told
+        told = self.caveat or self.verdict.told
+        return f"{told}; {self.left_out}" if self.learned else told
+
+    @property
+    def left_out(self) -> str:
+        """How many rows were left out because the model had learned from them, in words; empty if none was."""
+        of = len(self.measured) + self.learned
+        return f"{self.learned:,} of {of:,} rows were learned from: left out" if self.learned else ""
 
 
 @dataclass(frozen=True)

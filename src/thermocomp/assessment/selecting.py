@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
+from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
@@ -82,9 +83,15 @@ def select(
     -------
     tuple of Choice
         One per target; for ``ace`` one for all targets together.
+
+    Raises
+    ------
+    InputError
+        Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
     """
     targets = range(len(samples.targets))
     if method == "pareto":
+        refuse_leaks(samples, judging)
         return tuple(pareto.choose(samples, k, judging, settings, jobs=jobs, progress=progress) for k in targets)
     if method == "ace":
         return (_by_maximal_correlation(samples, settings, jobs=jobs, progress=progress),)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermocomp.assessment.compare import compare, judge, per_cycle
+from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import InputError
@@ -84,7 +85,7 @@ def fit(
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
-        trained = train(method, samples, k, everything, support=support)
+        trained = train(method, samples, k, everything, support=support, prints=True)
         progress(f"{overall.target} {method} all rows")
         models.append(replace(trained.model, honest_error=honest_error(overall, judging)))
         estimators.append(trained.estimator)
@@ -128,7 +129,7 @@ class Judged:
     assessments : tuple of Assessment
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
-        Names of recordings that a model was fitted to: no honest test.
+        Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
     """
 
     models: tuple[ErrorModel, ...]
@@ -148,6 +149,9 @@ def assess(
     progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
+
+    Rows that a model has learned from are left out and counted, whatever file they stand in; if no others are there,
+    the model is refused: see `thermocomp.recording.prints`.
 
     Parameters
     ----------
@@ -169,16 +173,47 @@ def assess(
         A channel the models need is not in the recordings.
     """
     found: list[Assessment] = []
-    hashes = {h for m in models if m.provenance for h in m.provenance.data_sha256}
+    hashes = {h for m in models for h in _hashes(m)}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
-    caveat = f"no honest test: fitted to {', '.join(seen)}; judge it on another recording" if seen else ""
     for model in models:
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
-        everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
-        name = model.provenance.method if model.provenance else model.family
-        overall = replace(judge(name, model, samples, everything, rules=rules), overall=True, caveat=caveat)
-        cut = per_cycle(overall)
+        overall = _assess(model, _called_as_in(model, samples), rules)
+        cut = [replace(a, learned=0) for a in per_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen)
+
+
+def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
+    """Return samples whose channels have the names of the model: a file may have others for them."""
+    (target,) = samples.targets
+    inputs = zip(samples.inputs, model.inputs, strict=True)
+    return replace(
+        samples,
+        targets=(replace(target, name=model.target),),
+        inputs=tuple(replace(channel, name=own.name) for channel, own in inputs),
+    )
+
+
+def _hashes(model: ErrorModel) -> tuple[str, ...]:
+    return model.provenance.data_sha256 if model.provenance else ()
+
+
+def _assess(model: ErrorModel, samples: Samples, rules: Rules) -> Assessment:
+    """Judge a model on what it has not learned from; on everything if there is nothing else, and say so."""
+    known = learned_from(model, samples)
+    judged = np.isfinite(samples.deviations[:, 0])
+    n, of = int((known & judged).sum()), int(judged.sum())
+    caveat = ""
+    if 0 < n == of:
+        seen = [name for k, name in enumerate(samples.test_names) if samples.hashes[k] in _hashes(model)]
+        why = (
+            f"fitted to {', '.join(seen)}"
+            if len(seen) == len(samples.test_names)
+            else f"{n:,} of {of:,} rows were learned from"
+        )
+        caveat, n, known = f"no honest test: {why}; judge it on another recording", 0, np.zeros_like(known)
+    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
+    name = model.provenance.method if model.provenance else model.family
+    return replace(judge(name, model, samples, split, rules=rules), overall=True, caveat=caveat, learned=n)

@@ -307,6 +307,9 @@ def assess(
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
 
+    Rows that a model has learned from are known again by their fingerprints, whatever file they stand in: they are left
+    out and counted.
+
     Parameters
     ----------
     model : Path
@@ -323,7 +326,8 @@ def assess(
     Returns
     -------
     int
-        0 no model refused, 1 one was refused, 2 unusable input.
+        0 no model refused, 1 one was refused here or when it was fitted, or has learned from all there is to judge it
+        on, 2 unusable input.
     """
     tests = read_recordings(recordings, mapping)
     with needs("study"):
@@ -336,7 +340,8 @@ def assess(
     with by_steps(len(models), hidden=json) as progress:
         judged = studies.assess(models, tests, rules=Rules(harm_margin), progress=progress)
     out.show_assess(judged, trouble, _console, as_json=json)
-    return 1 if any(a.word == "refused" for a in judged.overall()) else 0
+    before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
+    return 1 if "refused" in before | {a.word for a in judged.overall()} else 0
 
 
 def compare(

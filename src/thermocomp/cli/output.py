@@ -343,6 +343,7 @@ def _result(a: Assessment) -> dict[str, Any]:
         "n_sensors_least": a.n_sensors[0],
         "fit_s": a.fit_s,
         "n_rows": len(a.measured),
+        "n_rows_learned_from": a.learned,
         "n_effective": a.n_effective,
     }
     if a.robustness is not None:

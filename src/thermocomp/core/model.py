@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.learned import Learned
+from thermocomp.core.prints import Prints
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -103,6 +104,8 @@ class Provenance:
         A publication, for models taken from one.
     learned : Learned or None
         What those rows showed of the target.
+    prints : Prints or None
+        Fingerprints of the rows it was fitted to: they are known again in another file.
     """
 
     method: str
@@ -113,6 +116,7 @@ class Provenance:
     version: str = ""
     source: str = ""
     learned: Learned | None = None
+    prints: Prints | None = None
 
 
 #: version of the rules that a verdict is given by; files that do not say were judged by older ones

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import Method, given, method
 from thermocomp.models.unfrozen import UnfrozenRegressor
+from thermocomp.recording.prints import fingerprint
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]
@@ -49,7 +50,13 @@ class Trained:
 
 
 def train(
-    name: str | ThermalRegressor, samples: Samples, target: int, learn: BoolArray, *, support: Support = Support()
+    name: str | ThermalRegressor,
+    samples: Samples,
+    target: int,
+    learn: BoolArray,
+    *,
+    support: Support = Support(),
+    prints: bool = False,
 ) -> Trained:
     """Fit a method to some of the rows and freeze it.
 
@@ -65,6 +72,8 @@ def train(
         rows: they are what the machine has gone through in between.
     support : Support
         For the frozen model.
+    prints : bool
+        The model is kept: fingerprints of the rows go into its provenance.
 
     Returns
     -------
@@ -111,6 +120,10 @@ def train(
         support=support,
         provenance=_provenance(how, estimator, samples, target, seen),
     )
+    if prints and model.provenance is not None:
+        # of what the model needs: no file can be judged that has not got it
+        inputs = samples.only([i.name for i in model.inputs])
+        model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
     return Trained(how.name, estimator, model, seconds, r_squared, predicted)
 
 
