@@ -10,7 +10,7 @@ from smallmachine import small_machine
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import ALL, compare, n_pieces
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.robustness import stress
+from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.compensation import online
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
@@ -171,6 +171,40 @@ def test_stress_finds_the_sensor_that_matters(samples: Samples) -> None:
     gain = np.sqrt((np.array(model.coefficients) ** 2).sum())
     reference = 1 + 1  # the first reading is the zero, so its noise stays in every later change
     assert r.noise_rms["uniform"][0] ** 2 - clean_rms**2 == pytest.approx(reference * (0.4**2 / 3) * gain**2, rel=0.5)
+
+
+def test_what_makes_a_model_worse_than_none_is_named() -> None:
+    def found(noise: float, lost: float, none: float = 3.0) -> Robustness:
+        return Robustness(
+            0.4, {"uniform": (1.0, 9.0), "normal": (noise, 9.0)}, {"a": 1.0, "b": lost}, 0.0, np.nan, none
+        )
+
+    assert found(2.9, 2.9).worse_than_none == ()
+    assert found(2.9, 2.9).harm == ""
+    assert found(3.1, 2.9).worse_than_none == ("noise of 0.4 degC",)
+    assert found(2.9, 3.1).worse_than_none == ("loss of b",)
+    both = found(3.1, 4.5)
+    assert both.worse_than_none == ("noise of 0.4 degC", "loss of b")
+    assert both.harm == "worse than none (3.00 um RMS) with noise of 0.4 degC (3.10 um), loss of b (4.50 um)"
+    # several blocks: of all their rows together
+    together = pooled([(found(3.1, 2.0), 100), (found(1.0, 1.0, 9.0), 100)])
+    assert together is not None
+    assert together.none_rms == pytest.approx(np.sqrt((9 + 81) / 2))
+    assert together.worse_than_none == ()
+
+
+def test_a_model_of_large_opposed_gains_is_called_harmful(samples: Samples) -> None:
+    """Two thermometers whose difference makes the drift: good when clean, worse than none with noise or without one."""
+    everything = np.ones(len(samples), np.bool_)
+    model = train("ols", samples, 0, everything).model
+    assert isinstance(model, Polynomial)
+    measured = samples.deviations[:, 0]
+    calm = stress(model, samples, measured, everything, draws=10).robustness
+    assert calm.none_rms == pytest.approx(np.sqrt(np.mean(measured**2)))
+    wild = replace(model, coefficients=(300.0, -300.0, 0.0))
+    found = stress(wild, samples, measured, everything, draws=10).robustness
+    assert {"noise of 0.4 degC", "loss of t1_C", "loss of t2_C"} <= set(found.worse_than_none)
+    assert "noise of 0.4 degC" not in calm.worse_than_none
 
 
 def test_fit_writes_its_honest_error_into_the_models(samples: Samples) -> None:

@@ -1,6 +1,7 @@
 """The sensor budget: nothing of an unseen block in the choice, and figures that add up."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -8,9 +9,15 @@ import pytest
 
 from smallmachine import crowded_machine, small_machine
 from thermocomp.assessment import pareto, splits
+from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.metrics import rms
+from thermocomp.core import lagbank
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.machine import Channel
+from thermocomp.files.recordings import read
+from thermocomp.recording.cycles import find_cycles
+from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
 
@@ -79,6 +86,76 @@ def test_enough_is_the_smallest_within_one_standard_error() -> None:
     one = np.concatenate([errors, errors])
     one[1, 0] = errors[0, 2]  # dynamic is as good with one sensor
     assert replace(two, rms=one).recommended() == ("dynamic", 0)
+
+
+def test_one_block_alone_does_not_mean_all_sensors() -> None:
+    """No standard error: then what a sensor has to gain is 0.5 um, or 5 % of a small drift."""
+    errors = np.array([[[2.3], [1.95], [1.8], [1.5]]])
+    budget = pareto.Budget(
+        target="x_um",
+        candidates=("a", "b", "c", "d"),
+        sensors=(("a",), ("a", "b"), ("a", "b", "c"), ("a", "b", "c", "d")),
+        models=("ols",),
+        blocks=("1",),
+        rms=errors,
+        rows=np.array([10]),
+        none=np.array([20.0]),
+        frequency=np.ones((4, 4)),
+        condition=np.ones(4),
+    )
+    assert budget.margin() == (0.5, 0.0, 0.5)
+    assert budget.enough("ols") == 2
+    small = replace(budget, none=np.array([4.0]))
+    assert small.margin() == (0.2, 0.0, 0.2)
+    assert small.enough("ols") == 4  # nothing less is near: then it is all of them, and said so
+    assert pareto._trade_off(small, "ols", 3) == "fewer cost more than the rule allows"
+    assert pareto._trade_off(budget, "ols", 1) == "2 sensors cost 0.45 um more than 4, the best of the table"
+    assert pareto._trade_off(budget, "ols", 0) == "1 sensor costs 0.8 um more than 4, the best of the table"
+    other = replace(budget, rms=np.array([[[2.3], [1.95], [1.4], [1.5]]]))
+    assert pareto._trade_off(other, "ols", 1) == (
+        "2 sensors cost 0.55 um more than 3, the best of the table and 0.45 um more than 4"
+    )
+
+
+def two_that_matter(seed: int) -> Recording:
+    """Return six cycles in which two of eight sensors make the drift; the others feel a little of all, and the room."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 6 * 200 * 60.0, 60.0)
+    speed = np.concatenate([np.r_[np.full(100, n), np.zeros(100)] for n in rng.uniform(500, 3000, 6)])
+    steps = np.full(len(time), 60.0)
+    heat = np.column_stack([speed**2 / 1e6, speed / 1e3])
+    fast, slow = lagbank.run(heat, steps, np.array([1200.0, 5400.0])).T
+    columns = {"t1_C": 20 + 3 * fast, "t2_C": 20 + 2 * slow}
+    room = np.cumsum(0.01 * rng.normal(size=len(time)))
+    columns |= {f"t{k}_C": 20 + rng.uniform(0, 0.4) * fast + rng.uniform(0, 0.4) * slow + room for k in range(3, 9)}
+    table = pd.DataFrame(columns) + 0.03 * rng.normal(size=(len(time), 8))
+    table["spindle_rpm"] = speed
+    table["x_um"] = 6 * fast + 8 * slow + 0.3 * rng.normal(size=len(time))
+    quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
+    channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
+    return Recording("two", time, table, channels, find_cycles(time, speed))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_two_matter_two_are_recommended(seed: int) -> None:
+    samples = stack([two_that_matter(seed)], ["x_um"])
+    for judging in (splits.leave_one_cycle_out(samples), splits.by_rows(samples, 0.75, 0.25)):
+        settings = Settings(models=["ols"], max_sensors=4)
+        choice = pareto.choose(samples, 0, judging, settings, jobs=1, progress=lambda _, steps=1: None)  # noqa: ARG005
+        assert set(choice.sensors) == {"t1_C", "t2_C"}
+        assert "2 sensors cost " in choice.reason
+        assert choice.notes[0].startswith("Rule: the fewest sensors whose mean RMS over the unseen blocks is within 0.")
+
+
+def test_fl_thermal_does_not_need_sixteen_sensors(shared_data: Path) -> None:
+    """Of its 16 sensors the rule takes a few, also where one block is judged; the sentence tells what they cost."""
+    recording = read(shared_data / "fl_thermal" / "recording.csv")
+    samples = stack([recording], ["ch1_um"]).take(np.arange(0, len(recording), 24))
+    for judging in (splits.leave_one_cycle_out(samples), splits.by_rows(samples, 0.75, 0.25)):
+        settings = Settings(models=["dynamic"], max_sensors=3)
+        choice = pareto.choose(samples, 0, judging, settings, jobs=1, progress=lambda _, steps=1: None)  # noqa: ARG005
+        assert len(choice.sensors) < 4, choice.reason
+        assert " than 16" in choice.reason
 
 
 def test_a_block_without_the_target_is_left_out(crowd: Samples) -> None:

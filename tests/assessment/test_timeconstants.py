@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from smallmachine import small_machine
+from thermocomp.assessment.averaging import scatter
 from thermocomp.assessment.exponentials import fit
 from thermocomp.assessment.iso230_tables import settling_content, time_constant_tables
-from thermocomp.assessment.timeconstants import Phase, drive, find_phases, noise, settle, time_constants
+from thermocomp.assessment.timeconstants import Phase, drive, find_phases, settle, time_constants
 from thermocomp.core.machine import Channel
 from thermocomp.recording.cycles import whole
 from thermocomp.recording.recording import Recording
@@ -90,7 +91,7 @@ def test_noise_calls_for_no_second_exponential() -> None:
     rng = np.random.default_rng(5)
     found = [settle(TIME, 10 * rise(1800) + 0.1 * rng.normal(size=TIME.size), "z", "um", PHASE) for _ in range(20)]
     assert sum(s.two is not None for s in found) <= 2
-    assert noise(0.1 * rng.normal(size=4000)) == pytest.approx(0.1, rel=0.1)
+    assert scatter(0.1 * rng.normal(size=4000)) == pytest.approx(0.1, rel=0.1)
 
 
 def test_what_cannot_be_known_is_said() -> None:

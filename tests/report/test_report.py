@@ -1,18 +1,23 @@
 """The report: one offline page that a real browser shows."""
 
+import json
 import re
 import shutil
 import subprocess
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from smallmachine import small_machine
-from thermocomp.assessment import splits
+from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.results import Comparison
+from thermocomp.cli.output import show_comparison
+from thermocomp.files import modelfile
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.report import html
@@ -65,6 +70,47 @@ def test_summary_holds_what_was_measured(comparison: Comparison, recording: Reco
     assert [c["name"] for c in found["recordings"][0]["cycles"]] == [c.name for c in recording.cycles]
     assert [t["name"] for t in found["targets"]] == ["z_um", "x_um"]
     assert all(len(row["cells"]) == 4 for t in found["targets"] for row in t["per_cycle"])
+
+
+def test_the_formula_is_that_of_the_model_file(
+    comparison: Comparison, recording: Recording, samples: Samples, page: str, tmp_path: Path
+) -> None:
+    """What ``fit`` writes and ``compare`` shows is one model; without the rows the page says that it is one fold's."""
+    shown = unescape(html.render(comparison, [recording], samples))
+    assert "fitted to all rows, as thermocomp fit does" in shown
+    told = 0
+    for k, target in enumerate(c.name for c in samples.targets):
+        best = comparison.best(target)
+        if best is None:
+            continue
+        fitted = study.fit(samples, best.model, comparison.judging)
+        modelfile.write(fitted.models, tmp_path / f"{k}.json")
+        formula = modelfile.read(tmp_path / f"{k}.json")[k].formula()
+        assert f"{target} = {formula}</code>" in shown
+        assert f"{target} = {formula}</code>" not in unescape(page)
+        told += 1
+    assert told
+    assert "of one fold only, trained on" in page
+
+
+def test_what_disturbances_do_is_told_beside_the_verdict(
+    comparison: Comparison, recording: Recording, page: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (best,) = {a for a in comparison.overall() if a.target == "z_um" and a.model == "dynamic"}
+    assert best.robustness is not None
+    low = replace(best.robustness, none_rms=min(best.robustness.lost_rms.values()) / 2)
+    spoiled = tuple(replace(a, robustness=low) if a.overall else a for a in comparison.assessments)
+    bad = replace(comparison, assessments=spoiled)
+    told = [c for c in cautions(bad) if "worse than none (" in c]
+    assert told
+    assert all("loss of t1_C" in c for c in told)
+    assert "noise of 0.4 degC, loss of t1_C" in html.render(bad, [recording])
+    assert "worse than none with" in page
+    show_comparison(bad, None, [], Console(width=400), as_json=False)
+    assert all(c in capsys.readouterr().out for c in told[:1])
+    show_comparison(bad, None, [], Console(width=400), as_json=True)
+    results = [r for r in json.loads(capsys.readouterr().out)["results"] if "robustness" in r]
+    assert any("loss of t1_C" in r["robustness"]["worse_than_none"] for r in results)
 
 
 def test_the_page_needs_no_network(page: str) -> None:

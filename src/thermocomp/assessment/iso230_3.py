@@ -14,10 +14,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.averaging import WINDOW, course
 from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.thermaltest import HOUR, Curve, Kind, Pair, Targets, ThermalTest, figures
-from thermocomp.assessment.timeconstants import MOVES, Phase, drive, find_phases, noise, settle
+from thermocomp.assessment.thermaltest import HOUR, Curve, Kind, Pair, Targets, ThermalTest, figures_of
+from thermocomp.assessment.timeconstants import Phase, drive, find_phases, settle
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
@@ -151,8 +152,9 @@ def assess(
         cool = phases[k + 1] if k + 1 < len(phases) else None
         rows = (warm.start, warm.end, cool.end if cool is not None else warm.end)
         name = f"{recording.name}, {number}" if len(starts) > 1 else recording.name
-        more = [*notes, *_about_rows(recording, kind, rows, number)]
-        tests.append(_evaluate(recording, kind, name, rows, warm, pairs, air, residuals, more))
+        lead = _lead(recording, phases[k - 1].start if k else 0, warm.start)
+        more = [*notes, *_about_rows(recording, kind, rows, number, lead)]
+        tests.append(_evaluate(recording, kind, name, rows, (lead, k == 0), warm, pairs, air, residuals, more))
     return tuple(tests)
 
 
@@ -161,6 +163,7 @@ def _evaluate(
     kind: Kind,
     name: str,
     rows: tuple[int, int, int],
+    before: tuple[int, bool],
     warm: Phase,
     pairs: Sequence[Pair],
     air: Channel | None,
@@ -168,32 +171,44 @@ def _evaluate(
     notes: list[str],
 ) -> ThermalTest:
     start, stop, end = rows
-    time = recording.time[start : end + 1] - recording.time[start]
+    lead, rests = before
+    part = slice(start - lead, end + 1)
+    clock = recording.time[part] - recording.time[start]
+    time = clock[lead:]
 
-    def curve(label: str, unit: str, place: str, before: FloatArray, after: FloatArray | None) -> Curve:
-        before, after = _zeroed(before), None if after is None else _zeroed(after)
+    def curve(label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> Curve:
+        told, remains = (
+            None if v is None else course(clock, v, lead, lead + stop - start, rests=rests, smooth=kind == "etve")
+            for v in (measured, left)
+        )
+        assert told is not None
+        values = measured[lead:] - told.zero.value
+        after = None if left is None or remains is None else left[lead:] - remains.zero.value
+        run = slice(0, lead + stop - start + 1)
         return Curve(
             name=label,
             unit=unit,
             place=place,
-            values=before,
-            figures=figures(time, before, stop - start),
+            values=values,
+            course=told,
+            figures=figures_of(time, told, values, stop - start),
             settling=None
             if kind == "etve"
-            else settle(time[: stop - start + 1], before[: stop - start + 1], label, unit, warm),
+            else settle(clock[run], measured[run], label, unit, warm, lead=lead, rests=rests),
             after=after,
-            after_figures=None if after is None else figures(time, after, stop - start),
+            after_course=remains,
+            after_figures=None if remains is None or after is None else figures_of(time, remains, after, stop - start),
         )
 
     channels = _probes(recording)
-    before = {c.name: recording.table[c.name].to_numpy(dtype=np.float64)[start : end + 1] for c in channels}
-    after = {n: v[start : end + 1] for n, v in residuals.items()}
-    drawn = {c.name: curve(c.name, c.unit, c.place, before[c.name], after.get(c.name)) for c in channels}
+    measured = {c.name: recording.table[c.name].to_numpy(dtype=np.float64)[part] for c in channels}
+    after = {n: v[part] for n, v in residuals.items()}
+    drawn = {c.name: curve(c.name, c.unit, c.place, measured[c.name], after.get(c.name)) for c in channels}
     tilts = []
     for p in pairs:
         left = p.angle(after[p.tip], after[p.spindle]) if p.tip in after and p.spindle in after else None
         place = f"from {p.tip} and {p.spindle}, {p.distance:g} mm apart"
-        tilts.append(curve(p.tilt, "urad", place, p.angle(before[p.tip], before[p.spindle]), left))
+        tilts.append(curve(p.tilt, "urad", place, p.angle(measured[p.tip], measured[p.spindle]), left))
     targets = []
     for group, members in (_target_groups(recording) if kind == "axis" else {}).items():
         ordered = sorted(members, key=lambda m: m[0])
@@ -201,7 +216,7 @@ def _evaluate(
         ends = (low[1].name, high[1].name)
         left = after[ends[1]] - after[ends[0]] if all(n in after for n in ends) else None
         label = f"length {group.split('_')[0].upper()} {low[0]:g}-{high[0]:g} mm"
-        length = curve(label, "um", f"{ends[1]} minus {ends[0]}", before[ends[1]] - before[ends[0]], left)
+        length = curve(label, "um", f"{ends[1]} minus {ends[0]}", measured[ends[1]] - measured[ends[0]], left)
         positions = np.array([p for p, _ in ordered])
         targets.append(
             Targets(group, group[0].upper(), positions, tuple(drawn.pop(c.name) for _, c in ordered), length)
@@ -209,9 +224,9 @@ def _evaluate(
     air_values = recording.table[air.name].to_numpy()[start : end + 1] if air is not None else np.full(1, np.nan)
     known = air_values[np.isfinite(air_values)]
     curves = (*drawn.values(), *tilts, *(t.length for t in targets))
-    still = [c.name for c in curves if np.isfinite(c.values).any() and c.figures.range_all <= MOVES * noise(c.values)]
+    still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
     if still:
-        notes.append(f"{', '.join(still)}: not beyond the probes' noise, whose range it is that is told")
+        notes.append(f"{', '.join(still)}: its averages do not move beyond their noise, whose range it is that is told")
     if kind == "spindle":
         notes += _about_the_end([c for c in (*drawn.values(), *tilts) if c.name not in still])
     for c in (*curves, *(c for t in targets for c in t.curves)):
@@ -325,7 +340,13 @@ def _about_the_end(curves: Sequence[Curve]) -> list[str]:
     ]
 
 
-def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], number: int) -> list[str]:
+def _lead(recording: Recording, earliest: int, start: int) -> int:
+    """Return how many rows before the start of a test tell what it starts from."""
+    time = recording.time
+    return start - earliest - int(np.searchsorted(time[earliest:start], time[start] - WINDOW))
+
+
+def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], number: int, lead: int) -> list[str]:
     """Return what one should know of the course of a test."""
     start, stop, end = rows
     notes = []
@@ -339,6 +360,12 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
             notes.append(f"it is {running / HOUR:.1f} h long; the environment has a period of a day")
     elif stop == end:
         notes.append("the cool-down was not recorded")
+    if kind != "etve" and lead < 2:
+        readings = "that one reading" if lead == 0 else "its first two readings"
+        notes.append(
+            f"nearly no rest is recorded before the drives start: all is counted from {readings}, noise and all; "
+            f"record {WINDOW / 60:.0f} min of rest"
+        )
     if number > 1:
         notes.append("the machine had run before: it does not start from rest")
     return notes
@@ -374,9 +401,3 @@ def _target_groups(recording: Recording) -> dict[str, list[tuple[float, Channel]
 def _base(channel: Channel) -> str:
     """Return a channel's name without its unit."""
     return re.sub(r"_(um|C|urad)$", "", channel.name)
-
-
-def _zeroed(values: FloatArray) -> FloatArray:
-    """Return values minus the first one that is there."""
-    there = np.flatnonzero(np.isfinite(values))
-    return values - values[there[0]] if there.size else values

@@ -11,10 +11,12 @@ from thermocomp.assessment.iso230_2 import UNCERTAINTY, PositioningResult
 from thermocomp.assessment.thermaltest import Curve, Figures, Targets, ThermalTest
 from thermocomp.assessment.timeconstants import Settling
 
-_CAPTION_60 = "Counted from the start of the test."
+_CAPTION_60 = "Counted from the start of the test; rows averaged over {minutes:.3g} min."
+_CAPTION_U = " ±: expanded uncertainty (k = 2) by the noise, its serial correlation within that time minded."
 _WORDS = {
     ">": "; > where the curve has not settled: it is later",
-    "still": "; still: it does not move beyond its noise",
+    "still": "; still: its averages do not move beyond their noise",
+    "faint": "; faint: it moves, but too little above its noise for a time",
     "returns": "; returns: it comes back before",
     "peaks": "; peaks: it overshoots its last value, then settles back",
 }
@@ -50,13 +52,14 @@ def _curves(test: ThermalTest, title: str, curves: Sequence[Curve]) -> Table:
         rows.append((c.name, *_figures(test, c.figures), *_settled(test, c)))
         if c.after_figures is not None:
             rows.append((f"{c.name}, {WITH}", *_figures(test, c.after_figures), *([None] * len(_settled(test, c)))))
+    about = _CAPTION_60.format(minutes=max(c.course.noise.window for c in curves) / 60) + _CAPTION_U
     if test.kind == "etve":
         columns: tuple[str, ...] = ("", "range, 60 min", "range, all", "largest", "at the end")
-        return Table(title, columns, tuple(rows), None, "Range, all: the ETVE. " + _CAPTION_60)
+        return Table(title, columns, tuple(rows), None, "Range, all: the ETVE. " + about)
     hours = f"{test.running / 3600:.3g} h"
     columns = ("", "range, 60 min", f"range, {hours}", "range, all", "at 60 min", f"at {hours}", "largest", "cool-down")
     ends = "The drives stop" if test.stop < test.end else "The recording ends"
-    caption = f"{_CAPTION_60} {ends} at {hours}. t90: to 90 % of the change up to then"
+    caption = f"{about} {ends} at {hours}. t90: to 90 % of the change up to then"
     told = {cell.split()[0] for c in curves for cell in _settled(test, c) if cell}
     caption += "".join(text for word, text in _WORDS.items() if word in told) + "."
     return Table(title, (*columns, "t90 [min]"), tuple(rows), None, caption)
@@ -65,8 +68,28 @@ def _curves(test: ThermalTest, title: str, curves: Sequence[Curve]) -> Table:
 def _figures(test: ThermalTest, f: Figures) -> tuple[Cell, ...]:
     """Return the cells of a curve; hundredths are below the noise of any probe."""
     run = () if test.kind == "etve" else (f.range_run,)
-    ends = (f.largest, f.at_end) if test.kind == "etve" else (f.at_60, f.at_end, f.largest, f.cool_down)
-    return tuple(round(v, 2) for v in (f.range_60, *run, f.range_all, *ends))
+    ranges = tuple(round(v, 2) for v in (f.range_60, *run, f.range_all))
+    at_end = with_uncertainty(f.at_end, f.U_end)
+    if test.kind == "etve":
+        return (*ranges, round(f.largest, 2), at_end)
+    return (
+        *ranges,
+        with_uncertainty(f.at_60, f.U_60),
+        at_end,
+        round(f.largest, 2),
+        with_uncertainty(f.cool_down, f.U_cool_down),
+    )
+
+
+def with_uncertainty(value: float, expanded: float) -> str:
+    """Return a value and its expanded uncertainty as text, such as ``10.2 ± 0.7``; empty if there is no value."""
+    if not np.isfinite(value):
+        return ""
+    if not np.isfinite(expanded):
+        return f"{value:.4g}"
+    # one digit of the uncertainty at least, but no finer than any probe
+    digits = min(2, max(1, -int(np.floor(np.log10(expanded))))) if expanded > 0 else 2
+    return f"{value:.{digits}f} ± {max(expanded, 0.5 * 10.0**-digits):.{digits}f}"
 
 
 def _settled(test: ThermalTest, curve: Curve) -> tuple[str, ...]:
@@ -78,6 +101,8 @@ def _settled(test: ThermalTest, curve: Curve) -> tuple[str, ...]:
 def _minutes(s: Settling, seconds: float) -> str:
     if not s.moves or s.returns:
         return "still" if not s.moves else "returns"
+    if not s.clear:
+        return "faint"
     if s.overshoots:
         return "peaks"
     if not np.isfinite(seconds):
@@ -94,8 +119,7 @@ def _slopes(test: ThermalTest, targets: Targets) -> Table:
         if values is not None:
             f = length.figures if values is length.values else length.after_figures
             assert f is not None
-            there = np.isfinite(values)
-            end = float(values[there][-1]) if there.any() else float("nan")
+            end = f.at_end + (f.cool_down if np.isfinite(f.cool_down) else 0.0)
             rows.append((text, *(round(v / metres, 2) for v in (f.at_60, f.at_end, end))))
     title = f"Axis {targets.axis}: expansion [um/m]"
     hours = (f"at {test.running / 3600:.3g} h", f"at the end, {test.time[-1] / 3600:.3g} h")
@@ -122,10 +146,11 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
         title = f"Time constants: {phase.kind}{f' {phase.number}' if several else ''} [min]"
         columns = ("", "change", "t63", "t90", "tau", "R2", "fast", "slow", "R2 of both")
         caption = (
-            "t63, t90: read from the curve; > where it has not settled at the end; still: it does not move beyond its "
-            "noise; returns: it comes back before the end; peaks: it overshoots its last value, "
-            "then settles back. tau: of one exponential, fast and "
-            "slow: of two, where they are called for; each with its standard error, in brackets if it is longer than "
+            "change, t63, t90: read from the averaged curve; ±: expanded uncertainty (k = 2) by the noise; > where it "
+            "has not settled at the end; still: its averages do not move beyond their noise; faint: it moves, but too "
+            "little above its noise for a time; returns: it comes back before the end; peaks: it overshoots its last "
+            "value, then settles back. tau: of one exponential, fast and slow: of two, where they are called "
+            "for; each with its standard error, in brackets if it is longer than "
             "the phase or less sure than half of itself."
         )
         tables.append(Table(title, columns, rows, None, caption))
@@ -136,7 +161,7 @@ def _time_constants(s: Settling) -> tuple[Cell, ...]:
     one = _taus(s, 1)
     return (
         s.channel,
-        s.change,
+        with_uncertainty(s.change, s.uncertainty),
         _minutes(s, s.t63),
         _minutes(s, s.t90),
         *one,
@@ -225,6 +250,8 @@ def thermal_content(test: ThermalTest) -> dict[str, Any]:
                 "unit": c.unit,
                 "position_mm": positions.get(c.name),
                 **asdict(c.figures),
+                "moves": c.course.noise.moves,
+                "averaged_over_s": c.course.noise.window,
                 "t63_s": c.settling.t63 if c.settling else None,
                 "t90_s": c.settling.t90 if c.settling else None,
                 "settled": c.settling.settled if c.settling else None,
@@ -263,6 +290,7 @@ def settling_content(s: Settling) -> dict[str, Any]:
         "phase": s.phase.kind,
         "number": s.phase.number,
         "change": s.change,
+        "U_change": s.uncertainty,
         "noise": s.noise,
         "told": s.words or "settled",
         "t63_s": s.t63,

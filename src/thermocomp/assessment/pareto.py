@@ -23,6 +23,11 @@ from thermocomp.recording.samples import Samples
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+#: more sensors have to gain so much to be worth their cables [um] ...
+WORTH = 0.5
+#: ... or this share of the error without compensation, where that is less
+SHARE = 0.05
+
 
 @dataclass(frozen=True, eq=False)
 class Budget:
@@ -78,10 +83,9 @@ class Budget:
         return tuple(len(s) for s in self.sensors)
 
     def enough(self, model: str) -> int | None:
-        """Return the smallest number of sensors that is not clearly worse than the best number.
+        """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest one.
 
-        Not clearly worse: its mean RMS over the blocks is within one standard error of the smallest, as in the choice
-        of the strength of `DynamicRidge`. None if the model could not be fitted in one of the blocks.
+        None if the model could not be fitted in one of the blocks.
         """
         found = self._fewest([self.models.index(model)])
         return None if found is None else self.sizes[found[1]]
@@ -91,14 +95,37 @@ class Budget:
         found = self._fewest(range(len(self.models)))
         return None if found is None else (self.models[found[0]], found[1])
 
+    def margin(self) -> tuple[float, float, float] | None:
+        """Return what the mean RMS over the blocks may be above the smallest one, and where that comes from [um].
+
+        The larger of one standard error of the smallest between the blocks (Breiman 1984, Classification and Regression
+        Trees, section 3.4.3), and of `WORTH`, but of no more than `SHARE` of what there is without compensation.
+
+        Returns
+        -------
+        margin, standard_error, least : float
+            None if no model could be fitted in all blocks.
+        """
+        fitted = self._fitted(range(len(self.models)))
+        return self._margin(fitted) if fitted else None
+
+    def _fitted(self, models: Sequence[int]) -> list[int]:
+        return [m for m in models if np.isfinite(self.rms[m]).all()]
+
+    def _margin(self, models: Sequence[int]) -> tuple[float, float, float]:
+        errors = self.rms[models].reshape(-1, len(self.blocks))
+        best = errors[int(np.argmin(errors.mean(axis=1)))]
+        error = float(best.std(ddof=1) / np.sqrt(len(best))) if len(best) > 1 else 0.0
+        least = min(WORTH, SHARE * float(self.none.mean()))
+        return max(error, least), error, least
+
     def _fewest(self, models: Sequence[int]) -> tuple[int, int] | None:
-        fitted = [m for m in models if np.isfinite(self.rms[m]).all()]
+        fitted = self._fitted(models)
         if not fitted:
             return None
         mean = self.rms[fitted].mean(axis=2)
-        best = self.rms[fitted].reshape(-1, len(self.blocks))[int(np.argmin(mean))]
-        margin = best.std(ddof=1) / np.sqrt(len(best)) if len(best) > 1 else 0.0
-        near = [(self.sizes[k], mean[m, k], m, k) for m, k in np.argwhere(mean <= best.mean() + margin).tolist()]
+        limit = mean.min() + self._margin(fitted)[0]
+        near = [(self.sizes[k], mean[m, k], m, k) for m, k in np.argwhere(mean <= limit).tolist()]
         _, _, m, k = min(near)
         return fitted[m], k
 
@@ -252,8 +279,9 @@ def choose(
             for k, size in enumerate(found.sizes)
         ),
         place,
-        f"Without compensation {found.none_pooled():.2f} um. Enough (mean over the blocks within one standard error of "
-        "the best): " + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models) + ".",
+        f"Without compensation {found.none_pooled():.2f} um. Enough, each model by itself: "
+        + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models)
+        + ".",
     )
     order = np.argsort(-found.frequency[place], kind="stable")
     frequency = Table(
@@ -267,10 +295,10 @@ def choose(
         None,
         "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
     )
-    least = np.unravel_index(int(np.nanargmin(pooled)), pooled.shape)
     notes = [
+        _rule(found),
         "Sensors of each number are the best subset by least squares in the rows to learn from, whatever model is then "
-        "trained on them. Their number was chosen by the errors shown, so they flatter it a little."
+        "trained on them. Their number was chosen by the errors shown, so they flatter it a little.",
     ]
     if not found.proven:
         notes.append("Not all of these sets are proven to be the best of their size.")
@@ -284,11 +312,43 @@ def choose(
         sensors,
         f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves "
         f"{float(pooled[found.models.index(model), place]):.2f} um RMS on unseen cycles, instead of "
-        f"{found.none_pooled():.2f} um; the best of the table, {found.models[int(least[0])]} with "
-        f"{found.sizes[int(least[1])]}, leaves {float(pooled[least]):.2f} um",
+        f"{found.none_pooled():.2f} um; {_trade_off(found, model, place)}",
         (errors, frequency, candidates.repeats(sensors)),
         tuple(notes),
         found,
+    )
+
+
+def _trade_off(found: Budget, model: str, place: int) -> str:
+    """Say what the sensors that were saved cost, beside the best of the table and beside all sensors."""
+    pooled = found.pooled()
+    m, n = found.models.index(model), found.sizes[place]
+    best = np.unravel_index(int(np.nanargmin(pooled)), pooled.shape)
+    others = {(int(best[0]), int(best[1])): ", the best of the table"}
+    others.setdefault((m, len(found.sizes) - 1), "")
+    said = []
+    for (k, j), what in others.items():
+        cost = float(pooled[m, place] - pooled[k, j])
+        if (k, j) != (m, place):
+            by = f" by {found.models[k]}" if k != m else ""
+            said.append(f"{abs(cost):.2g} um {'more' if cost >= 0 else 'less'} than {found.sizes[j]}{by}{what}")
+    if not said:
+        return "fewer cost more than the rule allows"
+    return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)}"
+
+
+def _rule(found: Budget) -> str:
+    """Say by what rule the number of sensors was chosen, in numbers."""
+    margins = found.margin()
+    assert margins is not None
+    margin, error, least = margins
+    told = "what a further sensor has to gain to be worth it"
+    if least < WORTH:
+        told = f"{100 * SHARE:g} % of what there is without compensation, {told}"
+    return (
+        f"Rule: the fewest sensors whose mean RMS over the unseen blocks is within {margin:.2f} um of the smallest: "
+        f"the larger of one standard error between the blocks (Breiman 1984), {error:.2f} um, and of {least:.2f} um, "
+        f"{told}."
     )
 
 

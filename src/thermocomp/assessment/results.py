@@ -116,14 +116,23 @@ class Assessment:
     @property
     def word(self) -> harm.Word:
         """``accepted``, ``unproven`` or ``refused``."""
-        return "refused" if self.failure or self.caveat else self.verdict.word
+        if self.failure or self.caveat:
+            return "refused"
+        return "unproven" if self._fragile else self.verdict.word
+
+    @property
+    def _fragile(self) -> str:
+        """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
+        good = self.robustness is not None and self.verdict.word == "accepted"
+        return self.robustness.harm if good and self.robustness is not None else ""
 
     @property
     def reason(self) -> str:
         """Why, and for what is unproven which test would decide it."""
         if self.failure:
             return f"could not be judged: {self.failure}"
-        told = self.caveat or self.verdict.told
+        fragile = f"{self._fragile}; filter the readings, or take fewer sensors" if self._fragile else ""
+        told = self.caveat or fragile or self.verdict.told
         return f"{told}; {self.left_out}" if self.learned else told
 
     @property

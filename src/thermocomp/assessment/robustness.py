@@ -30,6 +30,8 @@ class Robustness:
         Share of rows with an input outside the trained range.
     outside_rms : float
         RMS in these rows [um]; nan without any.
+    none_rms : float
+        RMS without compensation in all rows [um].
     """
 
     noise: float
@@ -37,6 +39,28 @@ class Robustness:
     lost_rms: dict[str, float]
     outside: float
     outside_rms: float
+    none_rms: float
+
+    @property
+    def worse_than_none(self) -> tuple[str, ...]:
+        """The disturbances under which the model leaves more than no compensation: it does harm then.
+
+        Such as ``noise of 0.4 degC`` (the mean over the draws of one of its laws) and ``loss of t3_C``.
+        """
+        loud = any(mean > self.none_rms for mean, _ in self.noise_rms.values())
+        lost = [f"loss of {name}" for name, rms in self.lost_rms.items() if rms > self.none_rms]
+        return (*([f"noise of {self.noise:g} degC"] if loud else []), *lost)
+
+    @property
+    def harm(self) -> str:
+        """What makes it worse than no compensation, and how much worse, in words; empty if nothing does."""
+        if not self.worse_than_none:
+            return ""
+        errors = {f"noise of {self.noise:g} degC": max((mean for mean, _ in self.noise_rms.values()), default=np.nan)}
+        errors |= {f"loss of {name}": rms for name, rms in self.lost_rms.items()}
+        told = [f"{what} ({errors[what]:.2f} um)" for what in self.worse_than_none]
+        more = f" and {len(told) - 4} more" if len(told) > 4 else ""
+        return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}"
 
     @property
     def worst_lost(self) -> tuple[str, float]:
@@ -78,6 +102,7 @@ def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
         },
         outside=sum(r.outside * n for r, n in known) / sum(rows),
         outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
+        none_rms=mean_square([r.none_rms for r, _ in known], rows),
     )
 
 
@@ -154,5 +179,6 @@ def stress(
         lost_rms={model.inputs[k].name: float(rms[1 + 2 * draws + i]) for i, k in enumerate(lost)},
         outside=float(beyond.mean()),
         outside_rms=float(np.sqrt(np.mean((measured - predicted)[beyond] ** 2))) if beyond.any() else float("nan"),
+        none_rms=float(np.sqrt(np.mean(measured**2))),
     )
     return Replayed(predicted, beyond, robustness)

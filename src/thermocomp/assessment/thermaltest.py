@@ -3,12 +3,13 @@
 Which names are the standard's and which are ours stands in `thermocomp.assessment.iso230_3`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.averaging import Course, K
 from thermocomp.assessment.timeconstants import Settling
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
@@ -82,7 +83,7 @@ class Figures:
     Parameters
     ----------
     range_60 : float
-        Largest minus smallest over the first 60 min; nan if the period is shorter.
+        Largest minus smallest average over the first 60 min; nan if the period is shorter.
     range_run : float
         The same over the time the drives run; of an ETVE test, over all of it.
     range_all : float
@@ -95,6 +96,11 @@ class Figures:
         Last value minus that when the drives stop; nan without a cool-down.
     range_last : float
         Largest minus smallest over the last 60 min that the drives run; nan if they run for less than 2 h.
+    range_rows : float
+        `range_all` of the single rows: their noise is in it.
+    U_60, U_end, U_cool_down : float
+        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` by the noise, that of the zero included; nan
+        if it is not known.
     """
 
     range_60: float
@@ -105,6 +111,10 @@ class Figures:
     largest: float
     cool_down: float
     range_last: float
+    range_rows: float = float("nan")
+    U_60: float = float("nan")
+    U_end: float = float("nan")
+    U_cool_down: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,12 +129,15 @@ class Curve:
     place : str
         In words.
     values : ndarray of shape (n_rows,)
-        Since the start of the test; nan where missing.
+        Since the start of the test, row by row; nan where missing.
+    course : Course
+        The same averaged: what `figures` tells.
     figures : Figures
     settling : Settling or None
         How fast it follows the start of the drives; None if they never start.
     after : ndarray of shape (n_rows,) or None
         What a model leaves of it; None without a model.
+    after_course : Course or None
     after_figures : Figures or None
     """
 
@@ -132,9 +145,11 @@ class Curve:
     unit: str
     place: str
     values: FloatArray
+    course: Course
     figures: Figures
     settling: Settling | None
     after: FloatArray | None = None
+    after_course: Course | None = None
     after_figures: Figures | None = None
 
 
@@ -242,8 +257,41 @@ class ThermalTest:
         return (*self.curves, *self.tilts, *at_targets)
 
 
+def figures_of(time: FloatArray, course: Course, rows: FloatArray, stop: int) -> Figures:
+    """Return what is told of an averaged curve, with its uncertainty.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the start of the test [s].
+    course : Course
+    rows : ndarray of shape (n_rows,)
+        The curve before it was averaged; nan where missing.
+    stop : int
+        Row in which the drives stop; the last one if they do not.
+
+    Returns
+    -------
+    Figures
+    """
+    told = figures(time, course.values, stop)
+    known = np.flatnonzero(np.isfinite(course.values))
+    run, after = known[known <= stop], known[known > stop]
+    if not run.size:
+        return told
+    at_end, zero = course.u[run[-1]], course.zero.u
+    at_60 = float(np.interp(HOUR, time[known], course.u[known])) if np.isfinite(told.at_60) else float("nan")
+    return replace(
+        told,
+        range_rows=float(np.ptp(rows[known])),
+        U_60=float(K * np.hypot(at_60, zero)),
+        U_end=float(K * np.hypot(at_end, zero)),
+        U_cool_down=float(K * np.hypot(course.u[after[-1]], at_end)) if after.size else float("nan"),
+    )
+
+
 def figures(time: FloatArray, values: FloatArray, stop: int) -> Figures:
-    """Return what is told of a curve.
+    """Return what is told of a curve as it stands, row by row.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 Three answers to one question, so that they check each other: the times to 63 % and 90 % are read from the curve itself,
 without a model; then one and two exponentials are fitted. None of it is prescribed by ISO 230-3: all symbols are ours.
+The curve is averaged over minutes first (`thermocomp.assessment.averaging`): no single row decides anything.
 """
 
 from collections.abc import Collection
@@ -11,8 +12,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
+from thermocomp.assessment.averaging import WINDOW, Course, K, Noise, course
 from thermocomp.assessment.exponentials import Fit, fit
 from thermocomp.recording.recording import Recording
 
@@ -24,8 +25,8 @@ Kind = Literal["warm-up", "cool-down"]
 INTERRUPTION = 1200.0
 #: a curve is settled if it stays this near to its last value over the last quarter, as a share of its whole change
 SETTLED = 0.05
-#: a channel has to change by so many times its noise before its times are told
-MOVES = 8.0
+#: a channel has to change by so many times its standard uncertainty before its times are told
+CLEAR = 10.0
 #: a curve overshoots if it goes beyond its last value by more than this share of its whole change: the band of t90
 OVERSHOOT = 0.1
 _ROWS = 8  # fewer are not fitted
@@ -59,11 +60,16 @@ class Settling:
     channel, unit : str
     phase : Phase
     change : float
-        Last value minus first [unit].
+        Value at the end minus that at the start, both averaged [unit].
+    uncertainty : float
+        Of `change`, expanded (k = 2) [unit].
     noise : float
         Standard deviation from row to row [unit].
     moves : bool
-        It changes by at least `MOVES` times its noise; if not, there is nothing to read and nothing is fitted.
+        Its averages differ by more than their noise; see `thermocomp.assessment.averaging.Noise`.
+    clear : bool
+        They differ by at least `CLEAR` times the standard uncertainty of `change`; if not, there is no time to be read
+        and nothing is fitted.
     returns : bool
         It ends nearer to its start than to its extreme: there is no one time that describes it.
     overshoots : bool
@@ -75,7 +81,7 @@ class Settling:
         constants on, 4 % before its final value.
     t63, t90 : float
         When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
-        channel has not settled, the true ones are later; nan if it returns or overshoots.
+        channel has not settled, the true ones are later; nan if it is not clear, returns or overshoots.
     one, two : Fit or None
         None if it could not be fitted; `two` also if a second exponential is not called for.
     """
@@ -84,8 +90,10 @@ class Settling:
     unit: str
     phase: Phase
     change: float
+    uncertainty: float
     noise: float
     moves: bool
+    clear: bool
     returns: bool
     overshoots: bool
     settled: bool
@@ -99,6 +107,8 @@ class Settling:
         """Say what a reader must know of it; empty if there is nothing."""
         if not self.moves:
             return "does not move"
+        if not self.clear:
+            return "moves too little for a time"
         if self.returns:
             return "comes back"
         if self.overshoots:
@@ -187,14 +197,27 @@ def time_constants(
         if c.quantity in ("temperature", "displacement", "angle") and c.name not in leave_out
     ]
     values = recording.values(channels)
-    return tuple(
-        settle(recording.time[p.start : p.end + 1], values[p.start : p.end + 1, k], c.name, c.unit, p)
-        for p in phases
-        for k, c in enumerate(channels)
-    )
+    found = []
+    for number, p in enumerate(phases):
+        # the phase before may have left the machine moving; before the first one it has rested
+        earliest = phases[number - 1].start if number else 0
+        begin = earliest + int(np.searchsorted(recording.time[earliest : p.start], recording.time[p.start] - WINDOW))
+        rows, lead = slice(begin, p.end + 1), p.start - begin
+        for k, c in enumerate(channels):
+            found.append(settle(recording.time[rows], values[rows, k], c.name, c.unit, p, lead=lead, rests=number == 0))
+    return tuple(found)
 
 
-def settle(time: FloatArray, values: FloatArray, channel: str, unit: str, phase: Phase) -> Settling:
+def settle(
+    time: FloatArray,
+    values: FloatArray,
+    channel: str,
+    unit: str,
+    phase: Phase,
+    *,
+    lead: int = 0,
+    rests: bool = True,
+) -> Settling:
     """Read and fit the time constants of one channel in one phase.
 
     Parameters
@@ -205,75 +228,75 @@ def settle(time: FloatArray, values: FloatArray, channel: str, unit: str, phase:
         nan where missing; such rows are passed over.
     channel, unit : str
     phase : Phase
+    lead : int
+        So many rows come before the phase: what it starts from is averaged over them.
+    rests : bool
+        The machine has rested in these rows.
 
     Returns
     -------
     Settling
     """
     there = np.isfinite(values)
-    t, y = time[there] - time[0], values[there]
+    lead, (t, y) = int(there[:lead].sum()), (time[there], values[there])
     nan = float("nan")
-    if len(y) < _ROWS:
-        return Settling(channel, unit, phase, nan, nan, False, False, False, False, nan, nan, None, None)
-    # a median over five rows takes single outliers away and leaves a monotone curve as it is
-    calm = median_filter(y, size=5, mode="nearest")
-    sigma = noise(y)
-    change, span = float(calm[-1] - calm[0]), float(np.ptp(calm))
-    moves = span > max(MOVES * sigma, 1e-9)
-    returns = moves and abs(change) < 0.5 * span
-    beyond = float((np.sign(change) * (calm - calm[-1])).max())
-    overshoots = moves and not returns and beyond > max(OVERSHOOT * abs(change), 3.0 * sigma)
+    if len(y) - lead < _ROWS:
+        return Settling(channel, unit, phase, nan, nan, nan, False, False, False, False, False, nan, nan, None, None)
+    c = course(t, y, lead, len(y) - 1, rests=rests)
+    t, y, curve = t[lead:] - time[min(np.flatnonzero(there)[lead], len(time) - 1)], y[lead:] - c.zero.value, c.values
+    change, span = float(curve[-1]), float(np.ptp(curve))
+    u = float(np.hypot(c.u[-1], c.zero.u))
+    moves = c.noise.moves
+    clear = bool(moves and span >= CLEAR * u)
+    returns = clear and abs(change) < 0.5 * span
+    beyond = float((np.sign(change) * (curve - change)).max())
+    overshoots = clear and not returns and beyond > max(OVERSHOOT * abs(change), 3.0 * u)
     last = t >= 0.75 * t[-1]
-    settled = moves and _rests(t[last], y[last], calm[last], SETTLED * abs(change), sigma)
-    reads = moves and not returns and not overshoots
+    settled = clear and _rests(t[last], y[last], curve[last], SETTLED * abs(change), c.noise)
+    reads = clear and not returns and not overshoots
     return Settling(
         channel,
         unit,
         phase,
         change,
-        sigma,
+        K * u,
+        c.noise.sigma,
         moves,
+        clear,
         returns,
         overshoots,
         settled,
-        _reached(t, calm, 1.0 - np.exp(-1.0)) if reads else nan,
-        _reached(t, calm, 0.9) if reads else nan,
-        *(fit(t, y) if moves else (None, None)),
+        _reached(t, y, c, 1.0 - np.exp(-1.0)) if reads else nan,
+        _reached(t, y, c, 0.9) if reads else nan,
+        *(fit(t, y + c.zero.value) if clear else (None, None)),
     )
 
 
-def noise(values: FloatArray) -> float:
-    """Return the standard deviation from row to row, whatever the course: that of second differences, robustly.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n_rows,)
-        nan where missing; at least three there.
-
-    Returns
-    -------
-    float
-        nan if there are fewer than three values.
-    """
-    known = values[np.isfinite(values)]
-    if len(known) < 3:
-        return float("nan")
-    return float(1.4826 / np.sqrt(6.0) * np.median(np.abs(np.diff(known, 2))))
-
-
-def _rests(t: FloatArray, y: FloatArray, calm: FloatArray, limit: float, noise: float) -> bool:
+def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise: Noise) -> bool:
     """Return whether a curve neither leaves its last value nor creeps on, by more than a limit."""
     if len(t) < 2:
         return False
     rise = float(np.polyfit(t - t.mean(), y, 1)[0] * (t[-1] - t[0]))
-    creeps = abs(rise) > max(limit, 2.0 * noise * np.sqrt(12.0 / len(t)))
-    return not creeps and float(np.abs(calm - calm[-1]).max()) <= limit + 3.0 * noise
+    creeps = abs(rise) > max(limit, np.sqrt(12.0) * K * float(noise.of_mean(len(t))))
+    # the line at the end is twice as unsure as a mean
+    width = limit + 3.0 * np.sqrt(5.0) * float(noise.of_mean(np.mean(np.abs(t - t[-1]) <= noise.window) * len(t)))
+    return bool(not creeps and np.abs(curve - curve[-1]).max() <= width)
 
 
-def _reached(t: FloatArray, y: FloatArray, share: float) -> float:
-    """Return when a share of the change was first reached, linear between two rows [s]."""
-    done = (y - y[0]) / (y[-1] - y[0])
+def _reached(t: FloatArray, y: FloatArray, c: Course, share: float) -> float:
+    """Return when the average first reached a share of its change [s]; a parabola through the rows nearby tells it."""
+    level = share * c.values[-1]
+    done = c.values / c.values[-1]
     k = int(np.argmax(done >= share))
     if k == 0:
         return 0.0
-    return float(t[k - 1] + (share - done[k - 1]) / (done[k] - done[k - 1]) * (t[k] - t[k - 1]))
+    crossed = float(t[k - 1] + (share - done[k - 1]) / (done[k] - done[k - 1]) * (t[k] - t[k - 1]))
+    half = min(0.5 * c.noise.window, crossed, float(t[-1]) - crossed)
+    near = np.abs(t - crossed) <= half
+    if near.sum() < 5:
+        return crossed
+    a, b, constant = np.polyfit((t[near] - crossed) / half, y[near], 2)
+    roots = np.roots([a, b, constant - level])
+    real = roots[np.isreal(roots)].real
+    real = real[np.abs(real) <= 1.0]
+    return crossed + half * float(real[np.argmin(np.abs(real))]) if real.size else crossed

@@ -396,7 +396,7 @@ def compare(
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
-        html.write(comparison, tests, output)
+        html.write(comparison, tests, output, samples)
     out.show_comparison(comparison, output, trouble, _console, as_json=json)
     if comparison.left:
         return STOPPED

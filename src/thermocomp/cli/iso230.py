@@ -33,7 +33,7 @@ Test = Literal["etve", "spindle", "axis"]
 
 _console = Console(highlight=False)
 #: columns that the widest table needs
-TABLE_WIDTH = 118
+TABLE_WIDTH = 136
 
 
 def iso230(

@@ -193,6 +193,8 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     console.print(table)
     for a in judged.overall():
         console.print(f"{mark(a.word)} {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
+        if a.robustness is not None and a.robustness.harm:
+            console.print(f"[red]harmful when disturbed[/] {escape(a.target)}: {escape(a.robustness.harm)}")
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
@@ -352,6 +354,7 @@ def _result(a: Assessment) -> dict[str, Any]:
             "noise_degC": r.noise,
             "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
             "lost_sensor_rms_um": r.lost_rms,
+            "worse_than_none": list(r.worse_than_none),
             "outside_range_pct": 100 * r.outside,
             "outside_range_rms_um": r.outside_rms,
         }

@@ -10,11 +10,12 @@ from thermocomp import __version__
 from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.results import Comparison
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
 from thermocomp.report import figures, selections
 from thermocomp.report.summary import summarise
 
 
-def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
+def render(comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None) -> str:
     """Return the report as one HTML page that needs no network.
 
     Parameters
@@ -22,6 +23,8 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
     comparison : Comparison
     recordings : sequence of Recording
         The tests behind it, in the order they were stacked.
+    samples : Samples, optional
+        All rows of the comparison: the formula shown is that of the best method fitted to them.
 
     Returns
     -------
@@ -43,7 +46,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording]) -> str:
             drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
     stressed = dict.fromkeys(model for model, _ in drawn.values())
     return pages.get_template("report.html").render(
-        **summarise(comparison, recordings),
+        **summarise(comparison, recordings, samples),
         measured=[figures.measured(r) for r in recordings],
         overview=figures.overview(comparison),
         predictions=drawn,
@@ -86,9 +89,9 @@ def write_choices(choices: Sequence[Choice], recordings: Sequence[Recording], pa
     path.write_text(render_choices(choices, recordings), encoding="utf-8")
 
 
-def write(comparison: Comparison, recordings: Sequence[Recording], path: Path) -> None:
-    """Write the report; an existing file is replaced."""
-    path.write_text(render(comparison, recordings), encoding="utf-8")
+def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, samples: Samples | None = None) -> None:
+    """Write the report, see `render`; an existing file is replaced."""
+    path.write_text(render(comparison, recordings, samples), encoding="utf-8")
 
 
 def environment() -> Environment:

@@ -136,14 +136,14 @@ def profiles(test: ThermalTest, number: int) -> str:
     with drawing(test.name + targets.name):
         figure = Figure(figsize=(9.6, 3.0), layout="constrained")
         panels = figure.subplots(1, 2 if models else 1, sharey=True, squeeze=False)[0]
-        for ax, what in zip(panels, ("values", "after"), strict=False):
-            curves = [getattr(c, what) for c in targets.curves]
+        for ax, what in zip(panels, ("course", "after_course"), strict=False):
+            curves = [getattr(c, what).values for c in targets.curves]
             ax.axhline(0, color="#aaa", lw=0.8)
             for (moment, label), colour in zip(moments, ("#999999", COLOURS[4], COLOURS[1], COLOURS[0]), strict=False):
                 row = int(np.argmin(np.abs(time - moment)))
                 ax.plot(targets.positions, [v[row] for v in curves], "-o", ms=3.5, color=colour, label=label)
             ax.set_xlabel(f"{targets.axis} [mm]")
-            ax.set_title("measured, since the start of the test" if what == "values" else "what the model leaves")
+            ax.set_title("measured, since the start of the test" if what == "course" else "what the model leaves")
         panels[0].set_ylabel(f"error of {targets.axis} [um]")
         panels[-1].legend(**_BESIDE)
         return svg(figure)

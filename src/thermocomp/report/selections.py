@@ -18,7 +18,7 @@ def draw(choice: Choice) -> tuple[str, str] | None:
     if isinstance(found, Budget):
         return budget(found), (
             "Lines: all unseen blocks together; dots: each block. Ring: enough, for what more sensors bring is within "
-            "one standard error between the blocks. Condition: how far the sensors repeat each other."
+            "the margin of the rule. Condition: how far the sensors repeat each other."
         )
     if isinstance(found, CorrelationGrouping):
         return grouping(found, choice.target), (

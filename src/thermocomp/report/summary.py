@@ -3,25 +3,33 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from thermocomp import __version__
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.assessment.results import Assessment, Comparison
-from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import METHODS
+from thermocomp.models.training import train
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
 
 #: metrics of the big table, in its order
 TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
 
-def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, Any]:
+def summarise(
+    comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None
+) -> dict[str, Any]:
     """Return everything the report says in words and numbers.
 
     Parameters
     ----------
     comparison : Comparison
     recordings : sequence of Recording
+    samples : Samples, optional
+        All rows of the comparison: the best method is fitted to them for its formula, as ``thermocomp fit`` does.
+        Without them the formula is that of one fold, and says so.
 
     Returns
     -------
@@ -34,7 +42,7 @@ def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
         "verdict": verdict(comparison),
         "cautions": cautions(comparison),
         "usable": [t for t in targets if comparison.best(t) is not None],
-        "targets": [_target(comparison, t) for t in targets],
+        "targets": [_target(comparison, t, samples) for t in targets],
         "recordings": [_recording(r) for r in recordings],
         "models": [{"name": m, "summary": METHODS[m].summary} for m in _models(comparison)],
         "metrics": [METRICS[name] for name in TABLE],
@@ -73,17 +81,26 @@ def cautions(comparison: Comparison) -> list[str]:
     found = []
     if comparison.left:
         found.append(f"the work was stopped: {comparison.left} pairs of method and target were not judged.")
-    harmful = [f"{a.target} ({r.worst_lost[0]})" for a, r in known if r.worst_lost[1] >= a.none_metric("rms")]
-    if harmful:
-        found.append(f"a sensor that is cut off unnoticed makes it worse than none for {_list(harmful)}.")
     loud = [(a, max(mean for mean, _ in r.noise_rms.values())) for a, r in known]
-    loud = [(a, noisy) for a, noisy in loud if noisy > 2 * a.metric("rms")]
+    loud = [(a, noisy) for a, noisy in loud if 2 * a.metric("rms") < noisy <= a.none_metric("rms")]
     if loud:
         text = _list([f"{a.target} {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
         found.append(f"noise of {known[0][1].noise:g} degC on every temperature raises the RMS [um] of {text}.")
+    found += harms(comparison)
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
         found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
+    return found
+
+
+def harms(comparison: Comparison) -> list[str]:
+    """Return which models noise or a lost sensor makes worse than none: the best of each target, or the least bad."""
+    found = []
+    for target in dict.fromkeys(a.target for a in comparison.assessments):
+        judged = [a for a in comparison.overall() if a.target == target and not a.failure]
+        shown = comparison.best(target) or min(judged, key=lambda a: a.metric("rms"), default=None)
+        if shown is not None and shown.robustness is not None and shown.robustness.harm:
+            found.append(f"{shown.model} for {target} is {shown.robustness.harm}.")
     return found
 
 
@@ -91,7 +108,7 @@ def _models(comparison: Comparison) -> list[str]:
     return list(dict.fromkeys(a.model for a in comparison.assessments))
 
 
-def _target(comparison: Comparison, target: str) -> dict[str, Any]:
+def _target(comparison: Comparison, target: str, samples: Samples | None) -> dict[str, Any]:
     overall = [a for a in comparison.overall() if a.target == target]
     none = overall[0]
     best = comparison.best(target)
@@ -106,7 +123,7 @@ def _target(comparison: Comparison, target: str) -> dict[str, Any]:
             for a in overall
         ],
         "best": best.model if best else None,
-        "formula": _formula(comparison, best),
+        "formula": _formula(comparison, best, samples),
     }
 
 
@@ -125,26 +142,34 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
         "fit_s": a.fit_s,
         "noise": {law: mean for law, (mean, _) in r.noise_rms.items()} if r else None,
         "lost": r.worst_lost if r else None,
+        "harm": r.harm if r else "",
+        "worse_than_none": r.worse_than_none if r else (),
         "outside": r.outside if r else None,
     }
 
 
-def _formula(comparison: Comparison, best: Assessment | None) -> dict[str, Any] | None:
+def _formula(comparison: Comparison, best: Assessment | None, samples: Samples | None) -> dict[str, Any] | None:
     if best is None:
         return None
-    models = [
-        a.frozen
-        for a in comparison.assessments
-        if a.target == best.target and a.model == best.model and a.frozen is not None
-    ]
-    model: ErrorModel = models[-1]
+    if samples is not None:
+        k = [c.name for c in samples.targets].index(best.target)
+        model = train(best.model, samples, k, np.ones(len(samples), dtype=np.bool_)).model
+    else:
+        folds = [
+            a.frozen
+            for a in comparison.assessments
+            if a.target == best.target and a.model == best.model and a.frozen is not None
+        ]
+        model = folds[-1]
+    learned = model.provenance.cycles if model.provenance else ()
     return {
         "text": model.formula(),
         "family": model.family,
         "support": model.support,
         "inputs": model.inputs,
-        "learned": model.provenance.cycles if model.provenance else (),
-        "of_several": len(models) > 1,
+        "of": "fitted to all rows, as thermocomp fit does for the model file"
+        if samples is not None
+        else f"of one fold only, trained on {', '.join(learned)}; thermocomp fit fits it to all rows",
     }
 
 

@@ -1,0 +1,334 @@
+"""Averages over a stated time and their uncertainty: no single noisy row decides what a curve is told to be.
+
+How the noise is found: the scatter of second differences from row to row, robustly, is what is independent from row
+to row; that of third differences of means over `WINDOW` is what of it is left in a mean, however neighbouring rows hang
+together. The larger of the two counts. Noise that lasts for much longer than `WINDOW` cannot be told from a drift, and
+counts as one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.stats import t as student
+
+FloatArray = NDArray[np.float64]
+
+#: time over which is averaged [s]
+WINDOW = 600.0
+#: a shorter stretch is averaged over this share of its length, so that enough means are left to compare
+SHARE = 1.0 / 8.0
+#: chance that a curve of noise alone is said to move
+RISK = 0.01
+#: coverage factor of an expanded uncertainty (GUM)
+K = 2.0
+#: a single row so many times the noise away from those around it is an outlier
+OUTLIER = 8.0
+_MEANS = 6  # fewer tell nothing of their own scatter
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What the rows of one curve scatter by.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation from row to row [unit of the curve].
+    inflation : float
+        Standard error of a mean over the window, by that of so many independent rows; at least 1.
+    resolution : float
+        Smallest difference between two values; averaging does not get below its standard uncertainty.
+    window : float
+        Time over which is averaged [s].
+    moves : bool
+        The means of the last third beside those of the first, or any two means, differ by more than their noise would
+        make them by chance (`RISK`; Student's t, Bonferroni over all pairs).
+    """
+
+    sigma: float
+    inflation: float
+    resolution: float
+    window: float
+    moves: bool
+
+    def of_mean(self, rows: FloatArray | float) -> FloatArray:
+        """Return the standard uncertainty of means over so many rows [unit of the curve]."""
+        floor = self.resolution / np.sqrt(12.0) if self.sigma == 0.0 else 0.0
+        return np.asarray(np.maximum(self.inflation * self.sigma / np.sqrt(np.maximum(rows, 1.0)), floor))
+
+
+@dataclass(frozen=True)
+class Zero:
+    """The state that a curve is counted from.
+
+    Parameters
+    ----------
+    value, u : float
+        Mean, and its standard uncertainty [unit of the curve].
+    rows : int
+        Over so many.
+    """
+
+    value: float
+    u: float
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A curve as averaged, counted from its zero.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_rows,)
+        Averaged, minus the zero; 0 in the first row; nan where missing [unit of the curve].
+    u : ndarray of shape (n_rows,)
+        Standard uncertainty of the averages, without that of the zero.
+    zero : Zero
+    noise : Noise
+    """
+
+    values: FloatArray
+    u: FloatArray
+    zero: Zero
+    noise: Noise
+
+
+def window_of(duration: float) -> float:
+    """Return the time over which a stretch of `duration` [s] is averaged [s]."""
+    return min(WINDOW, SHARE * duration)
+
+
+def scatter(values: FloatArray) -> float:
+    """Return the standard deviation from row to row, whatever the course: that of second differences, robustly.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_rows,)
+        nan where missing; at least three there.
+
+    Returns
+    -------
+    float
+        nan if there are fewer than three values.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 3:
+        return float("nan")
+    return float(1.4826 / np.sqrt(6.0) * np.median(np.abs(np.diff(known, 2))))
+
+
+def cleaned(values: FloatArray) -> FloatArray:
+    """Return values of a curve without bends, single outliers replaced by what the rows around them say.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_rows,)
+        nan where missing, and passed over.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+    """
+    there = np.isfinite(values)
+    y = values[there]
+    if len(y) < 8:
+        return values
+    limit = OUTLIER * scatter(y)
+    # a median over five rows leaves a monotone curve as it is
+    calm = median_filter(y, size=5, mode="nearest")
+    y = np.where(np.abs(y - calm) > limit, calm, y)
+    ahead = 2.0 * y[-2] - y[-3]
+    y[-1] = ahead if abs(y[-1] - ahead) > limit * np.sqrt(6.0) else y[-1]
+    found = values.copy()
+    found[there] = y
+    return found
+
+
+def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> Noise:
+    """Find the noise of a curve, and whether it moves beyond it.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    values : ndarray of shape (n_rows,)
+        nan where missing.
+    stop : int, optional
+        Row in which the drives stop: a bend of the curve, which is no noise.
+
+    Returns
+    -------
+    Noise
+        It does not move if there are fewer than three values.
+    """
+    there = np.isfinite(values)
+    t, y = time[there], values[there]
+    if len(y) < 3:
+        return Noise(float("nan"), 1.0, 0.0, WINDOW, False)
+    sigma, window = scatter(y), window_of(float(t[-1] - t[0]))
+    steps = np.diff(np.unique(y))
+    # rounding of the arithmetic is no resolution
+    steps = steps[steps > 1e-9 * max(1.0, float(np.abs(y).max()))]
+    resolution = float(steps.min()) if steps.size else 0.0
+    bend = len(y) if stop is None else int(there[: stop + 1].sum())
+    parts = [_means(t[part], y[part], window) for part in (slice(None, bend), slice(bend, None)) if len(y[part])]
+    means, rows = np.concatenate([m for m, _ in parts]), np.concatenate([n for _, n in parts])
+    per_mean = float(np.median(rows))
+    white, own = sigma / np.sqrt(per_mean), 0.0
+    if len(means) >= _MEANS and per_mean >= 2:
+        own = _scatter_of_means([m for m, _ in parts])
+    noise = Noise(sigma, float(max(1.0, own / white)) if white > 0 else 1.0, resolution, window, False)
+    white = max(white, float(noise.of_mean(np.inf)))
+    return replace(noise, moves=_moves(means, white, len(y), own))
+
+
+def _means(t: FloatArray, y: FloatArray, window: float) -> tuple[FloatArray, FloatArray]:
+    """Return means over one window after the other, and of how many rows each is."""
+    _, block, rows = np.unique(np.floor((t - t[0]) / window), return_inverse=True, return_counts=True)
+    return np.bincount(block, y) / rows, rows.astype(np.float64)
+
+
+def _scatter_of_means(parts: Sequence[FloatArray]) -> float:
+    """Return the standard deviation of means by their third differences, robustly; 0 if they are too few.
+
+    Of long series those of means that lie apart are taken: means next to each other may still hang together.
+    """
+    differences = []
+    for means in parts:
+        apart = max(1, len(means) // 36)
+        differences += [np.diff(means[k::apart], 3) for k in range(apart)]
+    found = np.abs(np.concatenate(differences))
+    return float(1.4826 / np.sqrt(20.0) * np.median(found)) if len(found) >= 3 else 0.0
+
+
+def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
+    """Return whether means move: the last third beside the first, or any two of them, beyond their standard errors."""
+    third = max(1, len(means) // 3)
+    rise = abs(float(means[-third:].mean() - means[:third].mean())) / np.sqrt(2.0 / third)
+    span = float(np.ptp(means)) / np.sqrt(2.0)
+    pairs = max(len(means) * (len(means) - 1), 2)
+    for found, risk in ((rise, RISK / 4.0), (span, RISK / 2.0 / pairs)):
+        # what the noise is known from: so many differences, robustly
+        errors = ((white, rows / 4.0), (own, len(means) / 4.0))
+        if found > max(1e-9, *(u * float(student.isf(risk, max(2.0, df))) for u, df in errors)):
+            return True
+    return False
+
+
+def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool = True) -> Zero:
+    """Return the state at the last of some rows, from the rows in the window before it.
+
+    Parameters
+    ----------
+    time, values : ndarray of shape (n_rows,)
+        Up to the row in which the test begins; nan where missing.
+    noise : Noise
+    rests : bool
+        The machine has rested all the time, so that the mean tells its state; else a straight line through the rows.
+
+    Returns
+    -------
+    Zero
+        nan if no row of the window has a value.
+    """
+    near = np.isfinite(values) & (time >= time[-1] - noise.window)
+    t, y = time[near], values[near]
+    if not len(y):
+        return Zero(float("nan"), float("nan"), 0)
+    if rests or len(y) < 4:
+        return Zero(float(y.mean()), float(noise.of_mean(len(y))), len(y))
+    value, u = _line(t, y, noise, time[-1:])
+    return Zero(float(value[0]), float(u[0]), len(y))
+
+
+def course(time: FloatArray, values: FloatArray, start: int, stop: int, *, rests: bool, smooth: bool = False) -> Course:
+    """Average the curve of a test, on both sides of the row in which the drives stop, and count it from its zero.
+
+    Parameters
+    ----------
+    time, values : ndarray of shape (n_rows,)
+        With the rows before the test; nan where missing.
+    start, stop : int
+        Rows in which the drives start and stop; `stop` is the last one if they do not.
+    rests : bool
+        The machine has rested in all rows before `start`.
+    smooth : bool
+        Nothing happens in the row `start`: the zero comes from the rows after it.
+
+    Returns
+    -------
+    Course
+        From `start` on.
+    """
+    parts = (slice(None, start + 1), slice(start + 1, stop + 1), slice(stop + 1, None))
+    clean = np.concatenate([cleaned(values[part]) for part in parts])
+    t, y = time[start:], clean[start:]
+    noise = noise_of(t, y, stop - start)
+    if smooth:
+        zero = zero_of(-t[::-1], y[::-1], noise, rests=False)
+    else:
+        zero = zero_of(time[: start + 1], clean[: start + 1], noise, rests=rests)
+    there = np.flatnonzero(np.isfinite(y))
+    if not zero.rows and there.size:  # no value at the start of the test: the first one
+        zero = Zero(float(y[there[0]]), float(noise.of_mean(1.0)), 1)
+    run, run_u = averaged(t[: stop - start + 1], y[: stop - start + 1], noise)
+    rest, rest_u = averaged(t[stop - start :], y[stop - start :], noise)
+    means = np.concatenate([run, rest[1:]]) - zero.value
+    u = np.concatenate([run_u, rest_u[1:]])
+    if there.size and there[0] == 0:
+        means[0], u[0] = 0.0, 0.0
+    return Course(means, u, zero, noise)
+
+
+def averaged(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
+    """Average a curve that begins in its first row and goes on smoothly to its last one.
+
+    A row is the mean over the window around it. Towards the first row, in which the drives start or stop, the window
+    narrows, so that what came before is not mixed in; towards the last one it stays where it is, and a straight line
+    through it is followed.
+
+    Parameters
+    ----------
+    time, values : ndarray of shape (n_rows,)
+        nan where missing.
+    noise : Noise
+
+    Returns
+    -------
+    averaged : ndarray of shape (n_rows,)
+        nan where `values` is.
+    u : ndarray of shape (n_rows,)
+        Standard uncertainty.
+    """
+    out, u = np.full(len(values), np.nan), np.full(len(values), np.nan)
+    there = np.isfinite(values)
+    if not there.any():
+        return out, u
+    t, y = time[there], values[there]
+    half = np.minimum(0.5 * noise.window, t - t[0])
+    first = np.searchsorted(t, t - half - 1e-6)
+    last = np.searchsorted(t, t + half + 1e-6)
+    sums = np.concatenate([[0.0], np.cumsum(y - y[0])])
+    rows = (last - first).astype(np.float64)
+    mean, error = y[0] + (sums[last] - sums[first]) / rows, noise.of_mean(rows)
+    end = t > t[-1] - 0.5 * noise.window
+    near = t >= t[-1] - noise.window - 1e-6
+    if near.sum() >= 4 and not near.all():
+        mean[end], error[end] = _line(t[near], y[near], noise, t[end])
+    else:  # too few rows for a line: the rows themselves
+        mean[end], error[end] = y[end], noise.of_mean(1.0)
+    out[there], u[there] = mean, error
+    return out, u
+
+
+def _line(t: FloatArray, y: FloatArray, noise: Noise, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the straight line through some rows, and its standard uncertainty, at other times."""
+    centre, away = t.mean(), at - t.mean()
+    spread = float(((t - centre) ** 2).sum())
+    slope = float(((t - centre) * (y - y.mean())).sum() / spread)
+    # as many rows as a mean of the same uncertainty would have
+    return y.mean() + slope * away, noise.of_mean(1.0 / (1.0 / len(t) + away**2 / spread))
