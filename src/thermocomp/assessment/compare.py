@@ -59,7 +59,7 @@ class Assessment:
     n_sensors : tuple of (int, int)
         Fewest and most inputs with an influence in one model.
     learned : int
-        Rows that were left out because the model had learned from them.
+        Rows that the model had learned from: left out, unless there are no others (see `caveat`).
     """
 
     model: str
@@ -102,14 +102,10 @@ class Assessment:
         """Why it was accepted or refused."""
         if self.failure:
             return f"could not be judged: {self.failure}"
-        told = self.caveat or self.verdict.reason
-        return f"{told}; {self.left_out}" if self.learned else told
-
-    @property
-    def left_out(self) -> str:
-        """How many rows were left out because the model had learned from them, in words; empty if none was."""
+        if self.caveat or not self.learned:
+            return self.caveat or self.verdict.reason
         of = len(self.measured) + self.learned
-        return f"{self.learned:,} of {of:,} rows were learned from: left out" if self.learned else ""
+        return f"{self.verdict.reason}; {self.learned:,} of {of:,} rows were learned from: left out"
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ class Provenance:
     rows: int = 0
     version: str = ""
     source: str = ""
-    prints: Prints | None = None
+    prints: Prints | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
