@@ -56,6 +56,7 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
         assert overall.reason == (
             f"no honest test: {len(copy)} of {len(copy)} rows were learned from; judge it on another recording"
         )
+        assert overall.learned == len(overall.measured) == len(copy)
         assert np.isfinite(overall.metric("rms"))
 
 

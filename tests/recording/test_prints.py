@@ -127,6 +127,17 @@ def test_the_whole_training_and_a_day_is_cut_where_the_day_begins() -> None:
     assert not found[800:].any()
 
 
+def test_a_day_between_two_pieces_is_left_and_a_few_new_rows_are_not() -> None:
+    first, second = learned().take(slice_of(0, 350)), learned().take(slice_of(350, 800))
+    day = stack([small_machine((2200.0, 1200.0), seed=3)], ["z_um"])
+    found = overlap(kept(), joined(first, day, second), 0) >= 0
+    assert found[:350].all()
+    assert found[750:].all()
+    assert found[350:750].sum() <= 150
+    few = day.take(np.arange(10))
+    assert (overlap(kept(), joined(first, few, second), 0) >= 0).all()
+
+
 def test_altered_rows_and_missing_values_are_bridged() -> None:
     deviations = learned().deviations.copy()
     deviations[::70] += 40.0
@@ -200,7 +211,7 @@ def test_two_hundred_random_walks_in_coarse_steps() -> None:
     before: list[Prints] = []
     for _ in range(200):
         steps = rng.normal(0, rng.choice([0.03, 0.1, 0.3]), (600, 4))
-        walk = np.round(np.cumsum(steps, axis=0, dtype=np.float64), 1)
+        walk = np.cumsum(steps, axis=0, dtype=np.float64).round(1)
         test = series(walk[:, 1:], walk[:, 0])
         assert not any(share(p, test) for p in before[-10:])
         assert (repeats(test, 0) < 0).all()
@@ -235,6 +246,33 @@ def test_the_same_profile_on_another_day_in_steps_of_an_instrument(um: float, de
     assert all((repeats(day, 0) < 0).all() for day in days)
     if um < 5:  # else the warm-up hardly moves beyond its noise
         assert np.mean([share(p, d.take(np.arange(360) != 180)) for p, d in zip(prints, days, strict=True)]) > 0.8
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1])
+def test_the_same_profile_with_noise_that_rounding_all_but_hides(noise: float) -> None:
+    """Slow enough that each step of an instrument lasts for many rows: runs that come again and again say nothing."""
+    rng = np.random.default_rng(1)
+    spindle = np.tile(np.r_[np.ones(375), np.zeros(375)], 4)
+    rows = np.arange(3000) / 3000
+    warm = np.column_stack([g * lag(spindle, 375 / k) for g, k in ((30, 4), (8, 4), (5, 2), (2, 1))])
+    steps = np.array([0.25, 0.0625, 0.0625, 0.0625])
+    days = []
+    for _ in range(8):
+        weather = 0.1 * np.sin(2 * np.pi * rows * rng.uniform(0.3, 3) + rng.uniform(0, 6))
+        day = warm + weather[:, None] * [3, 1, 1, 1] + steps * (rng.uniform(-0.5, 0.5, 4))
+        day = np.round((day + steps * noise * rng.normal(size=warm.shape)) / steps) * steps
+        days.append(series(day[:, 1:], day[:, 0]))
+    prints = [fingerprint(day, 0, np.ones(3000, dtype=np.bool_)) for day in days]
+    assert [share(p, d) for k, p in enumerate(prints) for m, d in enumerate(days) if m != k] == [0.0] * 56
+    assert all((repeats(day, 0) < 0).all() for day in days)
+
+
+def test_a_smooth_warm_up_in_steps_of_an_instrument_says_nothing() -> None:
+    spindle = np.r_[np.zeros(5), np.ones(900)]
+    warm = np.column_stack([g * lag(spindle, tau) for g, tau in ((30, 150), (8, 150), (5, 300), (2, 600))])
+    steps = np.array([1.0, 0.1, 0.1, 0.1])
+    warm = np.round(warm / steps) * steps
+    assert fingerprint(series(warm[:, 1:], warm[:, 0]), 0, np.ones(905, dtype=np.bool_)) is None
 
 
 def test_a_plateau_and_a_ramp_give_none() -> None:
@@ -309,6 +347,10 @@ def test_several_tests_are_kept_and_known_one_by_one() -> None:
     samples = stack(tests, ["z_um"])
     prints = of(samples)
     assert prints.learned == ((0, 800), (800, 1600), (1600, 2400))
+    for run in prints.runs:
+        rows = unpacked(run.rows).astype(np.int64)
+        assert len(rows) > 100
+        assert ((rows % 800) + LENGTH * run.stride < 800).all()  # no run goes on in another test
     for k, test in enumerate(tests):
         found = overlap(prints, stack([test], ["z_um"]), 0)
         assert np.abs(found - np.arange(800 * k, 800 * (k + 1))).max() <= 2 * LENGTH

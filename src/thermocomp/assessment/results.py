@@ -75,7 +75,7 @@ class Assessment:
     n_sensors : tuple of (int, int)
         Fewest and most inputs with an influence in one model.
     learned : int
-        Rows that were left out because the model had learned from them.
+        Rows that the model had learned from: left out, unless there are no others (see `caveat`).
     """
 
     model: str
@@ -133,13 +133,9 @@ class Assessment:
             return f"could not be judged: {self.failure}"
         fragile = f"{self._fragile}; filter the readings, or take fewer sensors" if self._fragile else ""
         told = self.caveat or fragile or self.verdict.told
-        return f"{told}; {self.left_out}" if self.learned else told
-
-    @property
-    def left_out(self) -> str:
-        """How many rows were left out because the model had learned from them, in words; empty if none was."""
-        of = len(self.measured) + self.learned
-        return f"{self.learned:,} of {of:,} rows were learned from: left out" if self.learned else ""
+        if self.caveat or not self.learned:
+            return told
+        return f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were learned from: left out"
 
 
 @dataclass(frozen=True)

@@ -213,7 +213,7 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules) -> Assessment:
             if len(seen) == len(samples.test_names)
             else f"{n:,} of {of:,} rows were learned from"
         )
-        caveat, n, known = f"no honest test: {why}; judge it on another recording", 0, np.zeros_like(known)
+        caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
     name = model.provenance.method if model.provenance else model.family
     return replace(judge(name, model, samples, split, rules=rules), overall=True, caveat=caveat, learned=n)

@@ -116,7 +116,7 @@ class Provenance:
     version: str = ""
     source: str = ""
     learned: Learned | None = None
-    prints: Prints | None = None
+    prints: Prints | None = field(default=None, repr=False)
 
 
 #: version of the rules that a verdict is given by; files that do not say were judged by older ones

@@ -28,8 +28,6 @@ LONG = (60, 12, 6, 4, 2)
 INPUTS = 4
 #: of fingerprints in a model file [byte]; as text they are a third more
 BYTES = 14_000
-#: least surprise of a run, given how the channel goes on otherwise [bit]
-BITS = 20.0
 #: a run whose half occurs more often is something periodic
 REPEATS = 4
 #: least mean of the third differences where rounding hides the noise [resolution]; of a smooth curve it is 1.03 at most
@@ -208,28 +206,16 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: _Rows) -> _Windows
     mark = np.where(inside, _marks(x, scale.step, stride), np.uint32(0))
     off = 0.5 - np.abs(ratio - moves)
     bends = moves[stride:] - moves[:-stride]
-    bits = _surprise(bends, stride)
     rough = np.minimum(np.abs(bends[stride:] - bends[:-stride]), 2.0)
-    margin, told, roughness = np.full(n, 0.5), np.zeros(n), np.zeros(n)
+    margin, roughness = np.full(n, 0.5), np.zeros(n)
     for k in range(LENGTH):
         margin = np.minimum(margin, off[k * stride :][:n])
-        if k < LENGTH - 1:
-            told += bits[k * stride :][:n]
         if k < LENGTH - 2:
             roughness += rough[k * stride :][:n]
-    telling = (mark > 0) & (told >= BITS) & _seldom(_marks(x, scale.step, stride, LENGTH // 2), n, stride)
+    telling = (mark > 0) & _seldom(_marks(x, scale.step, stride, LENGTH // 2), n, stride)
     if scale.step <= scale.resolution:
         telling &= roughness >= ROUGH * (LENGTH - 2)
     return _Windows(mark, telling, _moving(x, scale, rows)[LENGTH * stride // 2 :][:n], margin)
-
-
-def _surprise(bends: FloatArray, stride: int) -> FloatArray:
-    """Return how little each change of the differences was to be expected after the one before [bit]."""
-    symbol = (np.clip(bends, -4, 4) + 4).astype(np.intp)
-    pair = symbol[:-stride] * 9 + symbol[stride:]
-    count = np.bincount(pair, minlength=81).reshape(9, 9) + 0.5
-    bits = np.log2(count.sum(axis=1, keepdims=True)) - np.log2(count)
-    return np.asarray(np.concatenate([np.zeros(stride), bits.ravel()[pair]]))
 
 
 def _seldom(halves: Marks, n: int, stride: int) -> BoolArray:
