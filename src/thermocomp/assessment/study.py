@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
-from thermocomp.assessment.splits import Judging, Split
+from thermocomp.assessment.splits import Judging, Split, called, stretches
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
+from thermocomp.core.validity import Validity
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
@@ -48,6 +50,7 @@ def fit(
     judging: Judging,
     *,
     support: Support = Support(),
+    recordings: Sequence[Recording] = (),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Fitted:
@@ -60,6 +63,8 @@ def fit(
     judging : Judging
     support : Support
         For the models.
+    recordings : sequence of Recording
+        The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -79,10 +84,12 @@ def fit(
     comparison = compare(samples, [method], judging, support=support, robustness=False, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
+    covered = coverage.cover(samples, judging, recordings)
     for k, overall in enumerate(comparison.overall()):
         trained = train(method, samples, k, everything, support=support)
         progress(f"{overall.target} {method} all rows")
-        models.append(replace(trained.model, honest_error=honest_error(overall, judging)))
+        honest = honest_error(overall, judging)
+        models.append(replace(trained.model, honest_error=honest, validity=covered))
         estimators.append(trained.estimator)
         r_squared.append(trained.r_squared)
     return Fitted(tuple(models), tuple(estimators), tuple(r_squared), comparison)
@@ -122,11 +129,14 @@ class Judged:
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
         Names of recordings that a model was fitted to: no honest test.
+    validity : Validity or None
+        What the thermal cycles of these recordings cover.
     """
 
     models: tuple[ErrorModel, ...]
     assessments: tuple[Assessment, ...]
     seen: tuple[str, ...]
+    validity: Validity | None = None
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per model, over all cycles."""
@@ -156,6 +166,7 @@ def assess(
         A channel the models need is not in the recordings.
     """
     found: list[Assessment] = []
+    covered = None
     hashes = {h for m in models if m.provenance for h in m.provenance.data_sha256}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
     caveat = f"no honest test: fitted to {', '.join(seen)}; judge it on another recording" if seen else ""
@@ -164,8 +175,16 @@ def assess(
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
         everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
+        covered = covered or coverage.cover(samples, units(samples), recordings)
         name = model.provenance.method if model.provenance else model.family
         overall = replace(judge(name, model, samples, everything), overall=True, caveat=caveat)
         cut = per_cycle(overall)
         found += [*cut, overall] if len(cut) > 1 else [overall]
-    return Judged(tuple(models), tuple(found), seen)
+    return Judged(tuple(models), tuple(found), seen, covered)
+
+
+def units(samples: Samples) -> Judging:
+    """Return the thermal cycles of recordings as units, those too short joined to the one before."""
+    none = np.zeros(len(samples), dtype=np.bool_)
+    blocks = stretches(samples.cycle, samples.test)
+    return Judging("all cycles", tuple(Split(called(samples, b), none, np.isin(samples.cycle, b)) for b in blocks))

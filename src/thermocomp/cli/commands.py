@@ -283,7 +283,13 @@ def fit(
     judging = study.judging(samples)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
-            samples, model, judging, support=Support(support, margin), jobs=study.jobs, progress=progress
+            samples,
+            model,
+            judging,
+            support=Support(support, margin),
+            recordings=tests,
+            jobs=study.jobs,
+            progress=progress,
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:

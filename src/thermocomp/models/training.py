@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,10 @@ from sklearn.metrics import r2_score
 
 from thermocomp import __version__
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.covering import cover
 from thermocomp.models.methods import Method, given, method
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.samples import Samples
@@ -104,7 +106,14 @@ def train(
         support=support,
         provenance=_provenance(how, estimator, samples, seen),
     )
+    model = replace(model, joint=_joint(model, samples, seen))
     return Trained(how.name, estimator, model, seconds, r_squared)
+
+
+def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport | None:
+    """Return the joint support of the model's inputs in the rows that were learned from."""
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    return cover(samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen])
 
 
 def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen: BoolArray) -> Provenance:
