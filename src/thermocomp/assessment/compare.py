@@ -8,6 +8,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
+from thermocomp.assessment.coverage import cover
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
@@ -77,6 +78,7 @@ def compare(
     refuse_leaks(samples, judging)
     names = expand(methods)
     rules.check(names)
+    alike = _alike(samples, judging)
     targets, n = range(len(samples.targets)), len(judging.splits)
     pieces = [(k, name, split) for k in targets for name in names for split in judging.splits]
     done: list[Assessment] = []
@@ -102,7 +104,8 @@ def compare(
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
         best = recommend(samples.targets[k].name, list(scores[k]), verdicts, scores[k], inners) if k in scores else None
         recommended += [best] if best else []
-        after = corrected({name: harm.together(v) for name, v in verdicts.items()}, rules.primary, best)
+        whole_of = {name: harm.together(v, caps=alike) for name, v in verdicts.items()}
+        after = corrected(whole_of, rules.primary, best)
         for name, p in mine.items():
             found += p if len(p) > 1 else []
             found.append(replace(_together(p), verdict=after[name]))
@@ -230,6 +233,14 @@ def judge(
         robustness=stressed.robustness if stressed else None,
         frozen=model,
     )
+
+
+def _alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
+    """Return that the units are too alike to count as several, if they are."""
+    covered = cover(samples, judging)
+    if covered.independent >= harm.MIN_UNITS or covered.units < harm.MIN_UNITS:
+        return ()
+    return (f"only {covered.independent} of {covered.units} units are not alike, at least {harm.MIN_UNITS} are needed",)
 
 
 def _caps(split: Split, learned: Learned | None) -> tuple[str, ...]:

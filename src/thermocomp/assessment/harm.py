@@ -302,12 +302,12 @@ def measure(
     )
 
 
-def together(parts: Sequence[Verdict], about: str = "") -> Verdict:
+def together(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
     """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
-        caps=tuple(dict.fromkeys(c for v in parts for c in v.caps)),
+        caps=tuple(dict.fromkeys([*caps, *(c for v in parts for c in v.caps)])),
         refusal=next((v.refusal for v in parts if v.refusal), ""),
         about=about,
     )

@@ -32,6 +32,10 @@ class Robustness:
         RMS in these rows [um]; nan without any.
     none_rms : float
         RMS without compensation in all rows [um].
+    unlike : float
+        Share of rows outside the joint support: inputs together unlike all that was trained, or a speed that was not.
+    unlike_rms : float
+        RMS in these rows [um]; nan without any.
     """
 
     noise: float
@@ -40,6 +44,8 @@ class Robustness:
     outside: float
     outside_rms: float
     none_rms: float
+    unlike: float = 0.0
+    unlike_rms: float = float("nan")
 
     @property
     def worse_than_none(self) -> tuple[str, ...]:
@@ -58,7 +64,8 @@ class Robustness:
             return ""
         errors = {f"noise of {self.noise:g} degC": max((mean for mean, _ in self.noise_rms.values()), default=np.nan)}
         errors |= {f"loss of {name}": rms for name, rms in self.lost_rms.items()}
-        told = [f"{what} ({errors[what]:.2f} um)" for what in self.worse_than_none]
+        worst_first = sorted(self.worse_than_none, key=lambda what: -errors[what])
+        told = [f"{what} ({errors[what]:.2f} um)" for what in worst_first]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
         return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}"
 
@@ -84,6 +91,7 @@ def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
     rows = [n for _, n in known]
     first = known[0][0]
     beyond = [(r.outside_rms, r.outside * n) for r, n in known if r.outside > 0]
+    unlike = [(r.unlike_rms, r.unlike * n) for r, n in known if r.unlike > 0]
     return Robustness(
         noise=first.noise,
         noise_rms={
@@ -103,6 +111,8 @@ def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
         outside=sum(r.outside * n for r, n in known) / sum(rows),
         outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
         none_rms=mean_square([r.none_rms for r, _ in known], rows),
+        unlike=sum(r.unlike * n for r, n in known) / sum(rows),
+        unlike_rms=mean_square([v for v, _ in unlike], [w for _, w in unlike]),
     )
 
 
@@ -173,12 +183,38 @@ def stress(
         beyond[k] = np.atleast_2d(state.outside)[0].any()
     rms = np.sqrt(squares / len(measured))
     laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
+    unlike = unlike_rows(model, samples, rows)
     robustness = Robustness(
         noise=noise,
         noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
         lost_rms={model.inputs[k].name: float(rms[1 + 2 * draws + i]) for i, k in enumerate(lost)},
         outside=float(beyond.mean()),
-        outside_rms=float(np.sqrt(np.mean((measured - predicted)[beyond] ** 2))) if beyond.any() else float("nan"),
-        none_rms=float(np.sqrt(np.mean(measured**2))),
+        outside_rms=_rms((measured - predicted)[beyond]),
+        none_rms=_rms(measured),
+        unlike=float(unlike.mean()),
+        unlike_rms=_rms((measured - predicted)[unlike]),
     )
     return Replayed(predicted, beyond, robustness)
+
+
+def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArray:
+    """Return which of some rows are outside the joint support of a model; rows with a missing input are not.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+
+    Returns
+    -------
+    ndarray of bool of shape (n_wanted,)
+    """
+    if model.joint is None:
+        return np.zeros(int(rows.sum()), dtype=np.bool_)
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    return np.asarray(model.joint.distance(samples.change()[rows][:, columns]) > 1.0)
+
+
+def _rms(residual: FloatArray) -> float:
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")

@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import compare, judge, per_cycle
 from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.results import Assessment, Comparison, Rules
-from thermocomp.assessment.splits import Judging, Split
+from thermocomp.assessment.splits import Judging, Split, called, stretches
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
+from thermocomp.core.validity import Validity
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
@@ -51,6 +53,7 @@ def fit(
     *,
     rules: Rules = Rules(),
     support: Support = Support(),
+    recordings: Sequence[Recording] = (),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Fitted:
@@ -65,6 +68,8 @@ def fit(
         What is stated before judging.
     support : Support
         For the models.
+    recordings : sequence of Recording
+        The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -84,10 +89,12 @@ def fit(
     comparison = compare(samples, [method], judging, rules=rules, support=support, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
+    covered = coverage.cover(samples, judging, recordings)
     for k, overall in enumerate(comparison.overall()):
         trained = train(method, samples, k, everything, support=support, prints=True)
         progress(f"{overall.target} {method} all rows")
-        models.append(replace(trained.model, honest_error=honest_error(overall, judging)))
+        honest = honest_error(overall, judging)
+        models.append(replace(trained.model, honest_error=honest, validity=covered))
         estimators.append(trained.estimator)
         r_squared.append(trained.r_squared)
     return Fitted(tuple(models), tuple(estimators), tuple(r_squared), comparison)
@@ -130,11 +137,14 @@ class Judged:
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
         Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
+    validity : Validity or None
+        What the thermal cycles of these recordings cover.
     """
 
     models: tuple[ErrorModel, ...]
     assessments: tuple[Assessment, ...]
     seen: tuple[str, ...]
+    validity: Validity | None = None
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per model, over all cycles."""
@@ -173,16 +183,18 @@ def assess(
         A channel the models need is not in the recordings.
     """
     found: list[Assessment] = []
+    covered = None
     hashes = {h for m in models for h in _hashes(m)}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
     for model in models:
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
+        covered = covered or coverage.cover(samples, units(samples), recordings)
         overall = _assess(model, _called_as_in(model, samples), rules)
         cut = [replace(a, learned=0) for a in per_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
-    return Judged(tuple(models), tuple(found), seen)
+    return Judged(tuple(models), tuple(found), seen, covered)
 
 
 def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
@@ -217,3 +229,10 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules) -> Assessment:
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
     name = model.provenance.method if model.provenance else model.family
     return replace(judge(name, model, samples, split, rules=rules), overall=True, caveat=caveat, learned=n)
+
+
+def units(samples: Samples) -> Judging:
+    """Return the thermal cycles of recordings as units, those too short joined to the one before."""
+    none = np.zeros(len(samples), dtype=np.bool_)
+    blocks = stretches(samples.cycle, samples.test)
+    return Judging("all cycles", tuple(Split(called(samples, b), none, np.isin(samples.cycle, b)) for b in blocks))

@@ -287,7 +287,14 @@ def fit(
     judging, how = study.judging(samples), Support(support, margin)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
-            samples, model, judging, rules=study.rules(), support=how, jobs=study.jobs, progress=progress
+            samples,
+            model,
+            judging,
+            rules=study.rules(),
+            support=how,
+            recordings=tests,
+            jobs=study.jobs,
+            progress=progress,
         )
     result = replace(result, models=tuple(m.taken(accept_unproven or "") for m in result.models))
     modelfile.write(result.models, output, overwrite=overwrite)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.choice import Table as ChoiceTable
 from thermocomp.assessment.harm import Unit
@@ -20,7 +22,7 @@ from thermocomp.cli.shown import mark
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
-from thermocomp.report.summary import cautions
+from thermocomp.report.summary import cautions, unlike
 
 _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
@@ -171,6 +173,8 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "seen_in_training": judged.seen,
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "trouble": trouble,
+            "validity": asdict(judged.validity) if judged.validity is not None else None,
+            "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
             "results": [_result(a) for a in judged.assessments],
         }
         print_json(content, console)
@@ -198,6 +202,14 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
+        if a.robustness is not None and a.robustness.unlike > 0.1:
+            console.print(f"[yellow]but[/] {escape(a.target)}: {unlike(a.robustness)}")
+    fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
+    known = {name: v for name, v in fitted.items() if v is not None}
+    if known:
+        covered = coverage.table(known)
+        console.print(f"\n[bold]{escape(covered.title)}[/]")
+        print_table(covered, console)
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             word = mark(f"{m.honest_error.word} when it was fitted")
@@ -355,6 +367,8 @@ def _result(a: Assessment) -> dict[str, Any]:
             "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
             "lost_sensor_rms_um": r.lost_rms,
             "worse_than_none": list(r.worse_than_none),
+            "unlike_training_pct": 100 * r.unlike,
+            "unlike_training_rms_um": r.unlike_rms,
             "outside_range_pct": 100 * r.outside,
             "outside_range_rms_um": r.outside_rms,
         }

@@ -119,6 +119,10 @@ def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) 
     return ""
 
 
+#: what is said to be outside where each input is inside its own range, but all together are unlike the training
+TOGETHER = "inputs together"
+
+
 def _plausible(channel: Input, zero: float) -> tuple[float, float]:
     """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
 
@@ -175,6 +179,8 @@ def step(
         corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
         if after.outside.any():
             outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
+        elif not model.distance(after, values) <= 1.0:
+            outside.append(TOGETHER)
     new = OnlineState(tuple(states), tuple(corrections), reading.time, now)
     return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
 

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
 from thermocomp.core.prints import Prints
+from thermocomp.core.validity import Validity
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -64,13 +66,16 @@ class Support:
     - ``hold``: the last deviation from inside the range is given until all inputs are back,
     - ``fade``: the deviation is faded to zero, linearly, over `fade_over` beyond the range.
 
+    A model with a `JointSupport` is outside, too, where its inputs together are unlike all that was trained: ``hold``
+    and ``fade`` act on that as well, ``clip`` gives what it gives (see `ErrorModel.distance`).
+
     Parameters
     ----------
     policy : {'clip', 'hold', 'fade'}
     margin : float
         Share of each input's trained span that is still taken as inside.
     fade_over : float
-        Share of each input's trained span over which ``fade`` reaches zero.
+        Share of each input's trained span over which ``fade`` reaches zero; of the joint distance: share of its limit.
     """
 
     policy: Literal["clip", "hold", "fade"] = "clip"
@@ -209,6 +214,10 @@ class ErrorModel(ABC):
         Where it comes from.
     honest_error : HonestError or None
         Error on unseen cycles; None if it was never judged.
+    validity : Validity or None
+        What these cycles covered.
+    joint : JointSupport or None
+        What of its inputs' space was trained; None: a range per input is all that is known.
     """
 
     family: ClassVar[str]
@@ -221,11 +230,15 @@ class ErrorModel(ABC):
     support: Support = Support()
     provenance: Provenance | None = None
     honest_error: HonestError | None = None
+    validity: Validity | None = None
+    joint: JointSupport | None = None
 
     def __post_init__(self) -> None:
         names = [i.name for i in self.inputs]
         if len(set(names)) != len(names):
             raise InputError(f"model of {self.target}: an input is named twice in {names}")
+        if self.joint is not None and self.joint.n_inputs > len(names):
+            raise InputError(f"model of {self.target}: its joint support is of more inputs than its {len(names)}")
         self._check()
 
     # -- what a family fills in --------------------------------------------------------------------------------------
@@ -310,13 +323,42 @@ class ErrorModel(ABC):
         if memory is None:
             memory, dt = self._begin(clipped), 0.0
         memory, deviation = self._advance(memory, clipped, dt)
-        if self.support.policy != "clip" and outside.any():
-            if self.support.policy == "hold":
-                deviation = np.where(outside.any(axis=-1), state.deviation, deviation)
-            else:
-                excess = np.minimum(np.abs(change - clipped), self._fade_span) / self._fade_span
-                deviation = deviation * np.clip(1.0 - excess.max(axis=-1), 0.0, 1.0)
+        if self.support.policy != "clip":
+            deviation = self._supported(state.deviation, deviation, change, clipped)
         return State(reference, memory, deviation, outside), deviation
+
+    def distance(self, state: State, inputs: FloatArray) -> FloatArray:
+        """Return how far a reading is from what was trained, in all inputs together.
+
+        Parameters
+        ----------
+        state : State
+            After the step that took the reading in.
+        inputs : ndarray of shape (..., n_inputs)
+            The reading.
+
+        Returns
+        -------
+        ndarray of shape (...,)
+            See `JointSupport.distance`; a reading is outside unless it is at most 1. 0 without a joint support.
+        """
+        if self.joint is None:
+            return np.zeros(np.shape(inputs)[:-1])
+        return self.joint.distance(inputs - state.reference)
+
+    def _supported(
+        self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
+    ) -> FloatArray:
+        """Return the deviation that ``hold`` or ``fade`` lets pass."""
+        far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
+        outside = (clipped != change).any(axis=-1) | ~(far <= 1.0)
+        if not outside.any():
+            return deviation
+        if self.support.policy == "hold":
+            return np.where(outside, before, deviation)
+        excess = np.minimum(np.abs(change - clipped), self._fade_span) / self._fade_span
+        beyond = np.maximum(excess.max(axis=-1, initial=0.0), (far - 1.0) / self.support.fade_over)
+        return np.asarray(deviation * np.clip(1.0 - beyond, 0.0, 1.0))
 
     # -- derived numbers ---------------------------------------------------------------------------------------------
 

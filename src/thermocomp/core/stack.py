@@ -111,6 +111,12 @@ class Stack:
             _padded({k: used[k] for k, m in linear if m.support.policy == policy and m.inputs})
             for policy in ("hold", "fade")
         )
+        self._fade_over = np.array([self.models[k].support.fade_over for k in self._faded[0].tolist()])
+        self._joint = [
+            (k, m.joint, np.array(used[k], dtype=np.intp))
+            for k, m in linear
+            if m.joint is not None and m.support.policy != "clip"
+        ]
 
     def init(self) -> StackState:
         """Return the state of a machine that has just been zeroed: see `ErrorModel.init`."""
@@ -157,15 +163,20 @@ class Stack:
         signals = terms[..., self._follows]
         memory = signals if memory is None else lagbank.advance(memory, signals, dt, self._tau)
         deviation = np.asarray(terms @ self._direct + memory @ self._lagged + self._intercept)
-        if outside.any():
+        if self._joint or outside.any():
+            far = np.zeros((*change.shape[:-1], len(self.models)))
+            for k, joint, taps in self._joint:
+                far[..., k] = joint.distance(change[..., taps])
             models, taps = self._faded
             if models.size:
                 excess = (np.minimum(np.abs(change - clipped), self._span) / self._span)[..., taps].max(axis=-1)
-                deviation[..., models] *= np.clip(1.0 - excess, 0.0, 1.0)
+                beyond = np.maximum(excess, (far[..., models] - 1.0) / self._fade_over)
+                deviation[..., models] *= np.clip(1.0 - beyond, 0.0, 1.0)
             models, taps = self._held
             if models.size:
                 last, now = state.deviation[..., models], deviation[..., models]
-                deviation[..., models] = np.where(outside[..., taps].any(axis=-1), last, now)
+                beyond = outside[..., taps].any(axis=-1) | ~(far[..., models] <= 1.0)
+                deviation[..., models] = np.where(beyond, last, now)
         others = []
         for (k, model, columns), before in zip(self._others, state.others, strict=True):
             after, deviation[..., k] = model.step(before, values[..., columns], dt)

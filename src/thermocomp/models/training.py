@@ -12,8 +12,10 @@ from sklearn.metrics import r2_score
 
 from thermocomp import __version__
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.covering import cover
 from thermocomp.models.methods import Method, given, method
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.prints import fingerprint
@@ -124,7 +126,14 @@ def train(
         # of what the model needs: no file can be judged that has not got it
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
+    model = replace(model, joint=_joint(model, samples, seen))
     return Trained(how.name, estimator, model, seconds, r_squared, predicted)
+
+
+def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport | None:
+    """Return the joint support of the model's inputs in the rows that were learned from."""
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    return cover(samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen])
 
 
 def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, target: int, seen: BoolArray) -> Provenance:

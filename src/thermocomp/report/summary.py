@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from thermocomp import __version__
+from thermocomp.assessment import coverage
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.assessment.results import Assessment, Comparison
+from thermocomp.assessment.robustness import Robustness
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.recording.quality import check
@@ -40,6 +42,9 @@ def summarise(
         "version": __version__,
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
+        "covered": None
+        if samples is None
+        else coverage.table({"judged": coverage.cover(samples, comparison.judging, recordings)}),
         "cautions": cautions(comparison),
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t, samples) for t in targets],
@@ -90,6 +95,7 @@ def cautions(comparison: Comparison) -> list[str]:
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
         found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
+    found += [f"{a.target}: {unlike(r)}." for a, r in known if r.unlike > 0.1]
     return found
 
 
@@ -102,6 +108,14 @@ def harms(comparison: Comparison) -> list[str]:
         if shown is not None and shown.robustness is not None and shown.robustness.harm:
             found.append(f"{shown.model} for {target} is {shown.robustness.harm}.")
     return found
+
+
+def unlike(r: Robustness) -> str:
+    """Say how many rows are outside the joint support, and the error there."""
+    return (
+        f"{100 * r.unlike:.0f} % of the rows are unlike the training (inputs together, or a speed between trained "
+        f"ones), {r.unlike_rms:.2f} um RMS there"
+    )
 
 
 def _models(comparison: Comparison) -> list[str]:

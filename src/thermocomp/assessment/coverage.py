@@ -1,0 +1,188 @@
+"""What the judged units covered, and how alike they are: for which conditions an honest error speaks.
+
+Alike: each unit's inputs (as recorded, so that the room counts) are read at `PLACES` places from its first row to its
+last. The distance of two units is the root mean square difference over places and inputs, each input by its standard
+deviation over all judged rows, and the logarithm of the ratio of their numbers of rows beside it. Two units below
+`ALIKE` are alike: a copy of a unit, or the same program on the same kind of day, tells nothing new. Alike units count
+once (single linkage).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment.choice import Cell, Table
+from thermocomp.assessment.iso230_3 import find_ambient
+from thermocomp.assessment.splits import Judging
+from thermocomp.core.validity import Validity
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+#: distance below which two units are alike [standard deviations of the inputs]
+ALIKE = 0.1
+#: times at which two units are compared
+PLACES = 32
+#: speeds nearer than this share of the largest are one
+_SAME_SPEED = 0.02
+
+
+def cover(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
+    """Return what the units of a judgement covered.
+
+    Parameters
+    ----------
+    samples : Samples
+    judging : Judging
+        Its blocks are the units.
+    recordings : sequence of Recording
+        The tests of `samples`, in their order: for the surroundings and the days.
+
+    Returns
+    -------
+    Validity
+    """
+    blocks = [rows for split in judging.splits if (rows := split.judge & samples.valid).any()]
+    judged = np.any(blocks, axis=0) if blocks else np.zeros(len(samples), dtype=np.bool_)
+    distances = unit_distances(samples, blocks)
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    starts = [float(samples.values[np.flatnonzero(rows)[0], temperatures].mean()) for rows in blocks if temperatures]
+    name, ambient = _ambient(samples, judged, recordings)
+    return Validity(
+        units=len(blocks),
+        independent=_groups(distances < ALIKE),
+        nearest=float(distances[np.triu_indices(len(blocks), 1)].min()) if len(blocks) > 1 else None,
+        speeds=_speeds(samples, judged, recordings),
+        ambient=ambient,
+        ambient_channel=name,
+        start=(min(starts), max(starts)) if starts else None,
+        days=_days(samples, judged, recordings),
+        hours=float(np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)[judged].sum() / 3600.0),
+    )
+
+
+def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
+    """Return the distance of every two units, (n_units, n_units); see the rule above.
+
+    Parameters
+    ----------
+    samples : Samples
+    blocks : sequence of ndarray of bool of shape (n_rows,)
+        Rows of each unit, in which every input is a number.
+
+    Returns
+    -------
+    ndarray of shape (n_units, n_units)
+    """
+    if not blocks:
+        return np.empty((0, 0))
+    judged = np.any(blocks, axis=0)
+    spread = samples.values[judged].std(axis=0)
+    moving = spread > 1e-9 * np.abs(samples.values[judged]).max(axis=0)
+    curves, durations = [], []
+    for rows in blocks:
+        # rows of several tests, one after the other: by their number
+        place = np.linspace(0.0, rows.sum() - 1.0, PLACES)
+        values = samples.values[rows][:, moving] / spread[moving]
+        curves.append([np.interp(place, np.arange(len(values)), v) for v in values.T])
+        durations.append(float(rows.sum()))
+    shape, length = np.array(curves).reshape(len(blocks), -1), np.log(durations)
+    square = ((shape[:, None] - shape[None]) ** 2).mean(axis=-1) if shape.shape[1] else np.zeros((len(blocks),) * 2)
+    return np.asarray(np.sqrt(square + (length[:, None] - length[None]) ** 2))
+
+
+def _groups(alike: BoolArray) -> int:
+    """Return how many groups there are if whatever is alike belongs together."""
+    left, found = set(range(len(alike))), 0
+    while left:
+        found += 1
+        reached = [left.pop()]
+        while reached:
+            near = {k for k in left if alike[reached[-1], k]}
+            reached.pop()
+            left -= near
+            reached += sorted(near)
+    return found
+
+
+def _speeds(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> tuple[float, ...]:
+    columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    measured = [samples.values[judged][:, columns].ravel()]
+    for k, recording in enumerate(recordings):  # a model may do without the speed that it was judged at
+        if recording.speed is not None:
+            measured.append(recording.values([recording.speed])[samples.row[judged & (samples.test == k)], 0])
+    known = np.concatenate(measured)
+    values = np.unique(np.round(known[np.isfinite(known)], 1))
+    found: list[float] = []
+    for v in values.tolist():
+        if not found or v - found[-1] > _SAME_SPEED * float(np.abs(values).max()):
+            found.append(v)
+    return tuple(found)
+
+
+def _ambient(
+    samples: Samples, judged: BoolArray, recordings: Sequence[Recording]
+) -> tuple[str, tuple[float, float] | None]:
+    named, values = "", []
+    for k, recording in enumerate(recordings):
+        air = find_ambient(recording)
+        if air is not None:
+            rows = samples.row[judged & (samples.test == k)]
+            values.append(recording.table[air.name].to_numpy(dtype=np.float64)[rows])
+            named = named or air.name
+    known = np.concatenate(values) if values else np.empty(0)
+    known = known[np.isfinite(known)]
+    return (named, (float(known.min()), float(known.max()))) if known.size else ("", None)
+
+
+def _days(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> int:
+    days: set[np.datetime64] = set()
+    for k, recording in enumerate(recordings):
+        if recording.start:
+            begin = np.datetime64(recording.start.replace("Z", "").split("+")[0], "s")
+            time = samples.time[judged & (samples.test == k)]
+            days |= set((begin + time.astype("timedelta64[s]")).astype("datetime64[D]").tolist())
+    return len(days)
+
+
+def table(named: dict[str, Validity]) -> Table:
+    """Return what was covered as a short table: one column for each judgement.
+
+    Parameters
+    ----------
+    named : dict of str to Validity
+        What each is to be called; at least one.
+
+    Returns
+    -------
+    Table
+    """
+    columns = [_cells(v) for v in named.values()]
+    rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
+    caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."
+    return Table("What the judged units covered", ("", *named), tuple(rows), None, caption)
+
+
+def _cells(v: Validity) -> dict[str, str]:
+    days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
+    return {
+        "units judged": f"{v.units}, {v.independent} of them not alike" if v.units > 1 else f"{v.units}",
+        "most alike two": "" if v.nearest is None else f"{v.nearest:.2f} of the inputs' spread apart",
+        "hours, days": f"{v.hours:.1f} h{days}",
+        "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
+        "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not named",
+        "mean temperature at the start [degC]": _range(v.start) if v.start else "",
+    }
+
+
+def _range(values: tuple[float, float]) -> str:
+    return f"{values[0]:.1f} to {values[1]:.1f}"
+
+
+def _listed(speeds: Sequence[float]) -> str:
+    if len(speeds) > 12:
+        return f"{speeds[0]:.0f} to {speeds[-1]:.0f}, {len(speeds)} of them"
+    return ", ".join(f"{v:.0f}" for v in speeds)

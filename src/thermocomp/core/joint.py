@@ -1,0 +1,112 @@
+"""Joint support: how far a reading is, in all inputs together, from what a model was trained on.
+
+A range per input takes every corner of the box for known: a hot front beside a cold rear, or a speed between the
+trained ones. Here the distance to the nearest of a few training states counts, and for speeds the distance to the
+nearest trained speed. How it is calibrated stands in `thermocomp.models.covering`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointSupport:
+    """Training states that stand for all of them, as plain numbers.
+
+    Parameters
+    ----------
+    columns : tuple of int
+        Inputs (all but speeds and feeds) whose changes are compared together.
+    scale : tuple of float
+        One distance in each of them, so that the mean square over all is the square of a distance [their units].
+    points : tuple of tuple of float
+        Representative training states: changes of these inputs, in units of `scale`.
+    limit : float
+        Distance to the nearest point from which on a state is outside [-].
+    speeds : tuple of int
+        Inputs that are speeds or feeds.
+    levels : tuple of tuple of float
+        Trained values of each of them [their units].
+    tolerances : tuple of float
+        Distance to the nearest level from which on a speed is outside [their units].
+
+    Raises
+    ------
+    InputError
+        The numbers do not fit together, or one is not finite.
+    """
+
+    columns: tuple[int, ...]
+    scale: tuple[float, ...]
+    points: tuple[tuple[float, ...], ...]
+    limit: float
+    speeds: tuple[int, ...] = ()
+    levels: tuple[tuple[float, ...], ...] = ()
+    tolerances: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        numbers = [*self.scale, *(v for p in self.points for v in p), self.limit]
+        numbers += [*(v for level in self.levels for v in level), *self.tolerances]
+        if not np.isfinite(numbers).all() or not min([*self.scale, *self.tolerances, self.limit]) > 0:
+            raise InputError("joint support: numbers must be finite, scales, tolerances and the limit positive")
+        if len(self.scale) != len(self.columns) or any(len(p) != len(self.columns) for p in self.points):
+            raise InputError("joint support: a scale and a number in each point for every column is wanted")
+        if not len(self.speeds) == len(self.levels) == len(self.tolerances) or not all(self.levels):
+            raise InputError("joint support: levels and a tolerance for every speed are wanted")
+        if self.columns and not self.points:
+            raise InputError("joint support: no point")
+        if min([*self.columns, *self.speeds], default=0) < 0:
+            raise InputError("joint support: there is no input before the first")
+
+    @property
+    def n_inputs(self) -> int:
+        """At least so many inputs the model must have."""
+        return 1 + max([*self.columns, *self.speeds], default=-1)
+
+    def distance(self, change: FloatArray) -> FloatArray:
+        """Return how far states are from what was trained, by the limit: outside is what is not at most 1.
+
+        Parameters
+        ----------
+        change : ndarray of shape (..., n_inputs)
+            Inputs minus their reference, before they are clipped [their units].
+
+        Returns
+        -------
+        ndarray of shape (...,)
+            The larger of the distance to the nearest point, by `limit`, and of that to the nearest trained speed, by
+            its tolerance; nan for a state with a nan. Rounded to a millionth, so that a batch gives what each of its
+            states gives alone.
+        """
+        columns, weights, points, squares = self._numbers
+        far = np.zeros(change.shape[:-1])
+        if self.columns:
+            state = change[..., columns] * weights
+            square = (state * state).sum(axis=-1)[..., None] - state @ points + squares
+            far = np.sqrt(np.maximum(square.min(axis=-1), 0.0))
+        for k, levels, tolerance in zip(self.speeds, self._levels, self.tolerances, strict=True):
+            far = np.maximum(far, np.abs(change[..., k, None] - levels).min(axis=-1) / tolerance)
+        return np.asarray(np.round(far, 6))
+
+    @cached_property
+    def _levels(self) -> tuple[FloatArray, ...]:
+        return tuple(np.array(level) for level in self.levels)
+
+    @cached_property
+    def _numbers(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+        """Columns, and weights and points such that a squared difference is that of a distance by the limit."""
+        unit = self.limit * np.sqrt(max(len(self.columns), 1))
+        points = np.array(self.points, dtype=np.float64).reshape(len(self.points), len(self.columns)) / unit
+        return (
+            np.array(self.columns, dtype=np.intp),
+            1.0 / (np.array(self.scale) * unit),
+            2.0 * points.T,
+            (points**2).sum(axis=1),
+        )

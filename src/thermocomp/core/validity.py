@@ -1,0 +1,52 @@
+"""What the units that a model was judged on have covered."""
+
+from dataclasses import dataclass
+
+from thermocomp.core.exceptions import InputError
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What the judged units covered: for these conditions the honest error speaks.
+
+    Parameters
+    ----------
+    units : int
+        Cycles, files or blocks that were judged.
+    independent : int
+        So many of them are left when those that are alike count once.
+    nearest : float or None
+        Distance of the two units that are most alike, in standard deviations of the inputs; None with a single unit.
+        Below `thermocomp.assessment.coverage.ALIKE` two units are alike.
+    speeds : tuple of float
+        Spindle speeds that were run; those nearer than 2 % of the largest are one [1/min]; empty if none was recorded.
+    ambient : tuple of float or None
+        Lowest and highest temperature of the surroundings [degC]; None if no channel is named after them.
+    ambient_channel : str
+        That channel; empty if there is none.
+    start : tuple of float or None
+        Lowest and highest mean of all temperatures at the start of a unit [degC]; None without a temperature.
+    days : int
+        Calendar days with a judged row; 0 if the recordings have no time stamps.
+    hours : float
+        Judged in all [h].
+
+    Raises
+    ------
+    InputError
+        Fewer units than independent ones.
+    """
+
+    units: int
+    independent: int
+    nearest: float | None
+    speeds: tuple[float, ...]
+    ambient: tuple[float, float] | None
+    ambient_channel: str
+    start: tuple[float, float] | None
+    days: int
+    hours: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.independent <= self.units:
+            raise InputError(f"validity: {self.independent} independent of {self.units} units")

@@ -1,0 +1,123 @@
+"""Joint support of a training set: a few states that stand for all, and a limit calibrated on cycles left out.
+
+States: farthest-point cover (Gonzalez 1985, Clustering to minimize the maximum intercluster distance): each new point
+is the training state that is farthest from those there are. Limit: the distance that `SHARE` of the rows of left-out
+cycles have at most to a cover of the others, and never less than that of any training row to the cover.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.machine import Channel
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: rows of left-out cycles that are inside
+SHARE = 0.95
+#: a speed is known so near to a trained one, by the span of the trained speeds and standstill
+NEAR = 0.1
+#: numbers in all points together: the model file stays below 8 KB more
+NUMBERS = 360
+#: most inputs that are compared, those that change most first
+COLUMNS = 40
+_ROWS = 600  # of the training that points are taken from
+_BLOCKS = 8  # left out at most
+
+
+def cover(change: FloatArray, channels: Sequence[Channel], cycle: IntArray) -> JointSupport | None:
+    """Return the joint support of training rows.
+
+    Parameters
+    ----------
+    change : ndarray of shape (n_rows, n_inputs)
+        Inputs minus their reference, finite [their units].
+    channels : sequence of Channel
+        What they are.
+    cycle : ndarray of int of shape (n_rows,)
+        Thermal cycle of each row; with a single one its quarters are left out in turn.
+
+    Returns
+    -------
+    JointSupport or None
+        None if no input changes.
+    """
+    driven = [j for j, c in enumerate(channels) if c.quantity in ("spindle_speed", "feed")]
+    spread = change.std(axis=0)
+    others = [j for j in np.argsort(-spread, kind="stable").tolist() if spread[j] > 0 and j not in driven]
+    columns = sorted(others[:COLUMNS])
+    speeds = [j for j in driven if np.ptp(change[:, j]) > 0]
+    if not columns and not speeds:
+        return None
+    levels, tolerances = [], []
+    for j in speeds:
+        tolerance = NEAR * float(max(change[:, j].max(), 0.0) - min(change[:, j].min(), 0.0))
+        levels.append(_levels(change[:, j], 0.5 * tolerance))
+        tolerances.append(tolerance)
+    scale = np.array([float(f"{v:.5g}") for v in spread[columns]])
+    points, limit = np.empty((0, 0)), 1.0
+    if columns:
+        states = change[:, columns] / scale
+        n_points = int(np.clip(NUMBERS // len(columns), 8, 40))
+        points = np.round(_points(states, n_points), 3)
+        limit = float(np.ceil(1e4 * max(_calibrated(states, cycle, n_points), _nearest(states, points).max())) / 1e4)
+    return JointSupport(
+        tuple(columns),
+        tuple(scale.tolist()),
+        tuple(map(tuple, points.tolist())),
+        max(limit, 1e-3),
+        tuple(speeds),
+        tuple(levels),
+        tuple(tolerances),
+    )
+
+
+def _calibrated(states: FloatArray, cycle: IntArray, n_points: int) -> float:
+    """Return the distance that most rows of left-out cycles have at most to a cover of the others."""
+    names, block = np.unique(cycle, return_inverse=True)
+    if len(names) == 1:
+        block = np.arange(len(states)) * 4 // len(states)
+    elif len(names) > _BLOCKS:
+        block = block * _BLOCKS // len(names)
+    found = []
+    for k in np.unique(block):
+        mine, rest = states[block == k], states[block != k]
+        if len(rest):
+            found.append(_nearest(_thinned(mine), _points(rest, n_points)))
+    return float(np.quantile(np.concatenate(found), SHARE)) if found else 0.0
+
+
+def _points(states: FloatArray, n_points: int) -> FloatArray:
+    """Return states that cover all: the one nearest to the mean, then always the one farthest from those before."""
+    pool = _thinned(states)
+    taken = [int(np.argmin(((pool - pool.mean(axis=0)) ** 2).sum(axis=1)))]
+    far = _nearest(pool, pool[taken])
+    while len(taken) < n_points and far.max() > 0:
+        taken.append(int(np.argmax(far)))
+        far = np.minimum(far, _nearest(pool, pool[taken[-1:]]))
+    return pool[taken]
+
+
+def _nearest(states: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the distance of states to the nearest point, (n_states,): root of the mean square over the inputs."""
+    square = np.full(len(states), np.inf)
+    for p in points:
+        square = np.minimum(square, ((states - p) ** 2).mean(axis=1))
+    return np.asarray(np.sqrt(square))
+
+
+def _thinned(states: FloatArray) -> FloatArray:
+    return states[:: max(1, -(-len(states) // _ROWS))]
+
+
+def _levels(values: FloatArray, radius: float) -> tuple[float, ...]:
+    """Return values such that every one of `values` is within `radius` of one of them."""
+    found: list[float] = []
+    for v in np.unique(values).tolist():
+        if not found or v - found[-1] > radius:
+            found.append(v)
+    return tuple(found)
