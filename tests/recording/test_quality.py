@@ -44,15 +44,17 @@ def test_a_sound_sensor_of_any_noise_and_resolution_raises_nothing(
     noise: float, resolution: float, quantity: str
 ) -> None:
     for seed in range(3):
-        assert _check(_warm_up(noise=noise, resolution=resolution, seed=seed), quantity) == []
+        zero = 0.0 if quantity == "temperature" else 20.0  # a probe starts at its zero
+        assert _check(_warm_up(noise=noise, resolution=resolution, seed=seed) - zero, quantity) == []
 
 
 def test_a_displacement_that_jumps_or_creeps_to_rest_raises_nothing() -> None:
-    creeping = np.round(1000 * np.exp(-TIME / 600))  # a dial gauge of 1 um that stands still for the last 5 hours
-    jumping = np.where(TIME > 5000, 100.0, 0.0) + _warm_up()
+    creeping = np.round(1000 * np.expm1(-TIME / 600))  # a dial gauge of 1 um that stands still for the last 5 hours
+    jumping = np.where(TIME > 5000, 100.0, 0.0) - 20  # the tool was changed: all probes tell it
+    both = _recording(quantity="displacement", x=jumping + _warm_up(), y=jumping + _warm_up(seed=2))
 
     assert _check(creeping, "displacement") == []
-    assert _check(jumping, "displacement") == []
+    assert [f.kind for f in check(both)] == ["no cycle"]
 
 
 def test_a_spindle_speed_and_a_position_may_stand_still() -> None:
@@ -210,7 +212,7 @@ def test_an_implausible_temperature_is_trouble() -> None:
     ],
 )
 def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, value: float, severity: str) -> None:
-    values = _warm_up()
+    values = _warm_up() - (0.0 if quantity == "temperature" else 20.0)
     values[[300, 1200]] = value
     stuck = values.copy()
     stuck[1500:] = stuck[1500]
@@ -312,7 +314,7 @@ def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
 
 def test_probing_cycles_are_no_trouble() -> None:
     """A touch probe has values in its cycles only, in the same rows for all points; a lone gappy probe is trouble."""
-    drift = _warm_up(noise=0.5)
+    drift = _warm_up(noise=0.5) - 20
     there = np.arange(N) % 50 == 0
     touched = {name: np.where(there, drift + k, np.nan) for k, name in enumerate(("x", "y"))}
     found = check(_recording(quantity="displacement", **touched))
