@@ -340,7 +340,7 @@ def test_outliers_in_a_row_are_told_with_their_rows(row: int, length: int, pick:
     found = _trouble(_changed(recording, [name], fault))
 
     assert [(f.channel, f.kind) for f in found] == [(name, "spike")]
-    assert f"up to {length} rows" in found[0].text
+    assert f"1 spike of {length} rows" in found[0].text
     (rows,) = troubled_rows(recording, found).values()
     assert np.flatnonzero(rows).tolist() == list(range(row, row + length))
 

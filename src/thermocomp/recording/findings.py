@@ -34,6 +34,8 @@ class Finding:
         One sentence: where, how much, what to do. Rows are counted from 0, as in the recording's table.
     rows : ndarray of int, optional
         The rows it concerns, where the others are sound; None if it concerns the whole channel or recording.
+    row : int, optional
+        Where a lasting trouble begins, or a gap: a place for a mark in a figure.
     """
 
     severity: Severity
@@ -41,6 +43,7 @@ class Finding:
     kind: str
     text: str
     rows: IntArray | None = field(default=None, compare=False, repr=False)
+    row: int | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,7 +162,7 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
         "probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract the "
         "step behind it, or leave the channel out"
     )
-    return Finding("trouble", channel.name, "step", text)
+    return Finding("trouble", channel.name, "step", text, row=row)
 
 
 def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) -> bool:
@@ -185,4 +185,4 @@ def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
         f"changes places with {b.channel.name} at {at(row, time)}: each goes on where the other was. Swap the two "
         "columns back from there on, or leave both out"
     )
-    return Finding("trouble", a.channel.name, "swapped", text)
+    return Finding("trouble", a.channel.name, "swapped", text, row=row)

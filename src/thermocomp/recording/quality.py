@@ -202,7 +202,7 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
             f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at(longest, time)}, where "
             f"rows are {usual:g} s apart; a model's memory is unsure behind it: split the test there or record it again"
         )
-        yield Finding("warning", "", "gap", text)
+        yield Finding("warning", "", "gap", text, row=longest)
     kept = steps[steps <= 5 * usual]
     low, middle, high = (float(q) for q in np.quantile(kept, (0.05, 0.5, 0.95)))
     if high - low > 0.2 * middle:

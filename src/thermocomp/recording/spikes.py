@@ -51,7 +51,7 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
         return
     top = int(hits[np.argmax(height[hits])])
     lengths = np.diff(np.flatnonzero(np.diff(hits, prepend=-5, append=len(x) + 5) != 1))
-    width = f" of up to {lengths.max()} rows" if lengths.max() > 1 else ""
+    width = f" of {'up to ' * (len(lengths) > 1)}{lengths.max()} rows" if lengths.max() > 1 else ""
     yield Finding(
         "trouble" if height[top] > span else "warning",
         signal.channel.name,

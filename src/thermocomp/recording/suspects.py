@@ -168,4 +168,4 @@ def zeros(signals: Sequence[Signal]) -> Iterator[Finding]:
                 "is the continuation of another, join them; else take its first value for zero in a mapping: "
                 'zero = "first"'
             )
-            yield Finding("warning", s.channel.name, "not zeroed", text)
+            yield Finding("warning", s.channel.name, "not zeroed", text, row=int(s.rows[0]))
