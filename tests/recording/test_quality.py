@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.recording.cycles import find_cycles, whole
-from thermocomp.recording.quality import Finding, check
+from thermocomp.recording.quality import Finding, check, lasting_trouble, troubled_rows
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -322,3 +322,38 @@ def test_probing_cycles_are_no_trouble() -> None:
     assert "has 40 values in 2000 rows" in found[-1].text
     (lone,) = [f for f in _check(np.where(there, drift, np.nan), "displacement") if f.kind == "missing values"]
     assert lone.severity == "trouble"
+
+
+def test_rows_in_trouble_are_told_apart_from_channels_in_trouble() -> None:
+    """Codes, implausible values, stuck stretches and spikes have rows; a dead sensor and a wrong unit have none."""
+    coded, wild, stuck, spiking = (_warm_up(seed=k) for k in range(4))
+    coded[[3, 700]] = -999.0
+    wild[1200] = 2000.0
+    stuck[1500:1600] = stuck[1500]
+    spiking[[300, 301]] += 60.0
+    recording = _recording(
+        coded=coded,
+        wild=wild,
+        stuck=stuck,
+        spiking=spiking,
+        sound=_warm_up(seed=5),
+        dead=np.full(N, 21.0),
+        absent=np.full(N, -180.0),
+        hot=_warm_up(seed=6) + 600,
+        kelvin=_warm_up(seed=7) + 273.15,
+    )
+
+    rows = {name: np.flatnonzero(found).tolist() for name, found in troubled_rows(recording).items()}
+
+    assert rows.pop("stuck") == pytest.approx(list(range(1501, 1600)), abs=2)
+    assert rows == {"coded": [3, 700], "wild": [1200], "spiking": [300, 301]}
+    lasting = lasting_trouble(check(recording))
+    assert {(f.channel, f.kind) for f in lasting} == {
+        ("dead", "constant"),
+        ("absent", "missing-value code"),
+        ("hot", "implausible"),
+        ("kelvin", "unit"),
+    }
+    given = check(recording)
+    assert troubled_rows(recording, given).keys() == troubled_rows(recording).keys()
+    assert troubled_rows(recording, ()) == {}
