@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.recording.cycles import find_cycles, whole
-from thermocomp.recording.quality import Finding, check
+from thermocomp.recording.quality import Finding, check, lasting_trouble, troubled_rows
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -44,15 +44,17 @@ def test_a_sound_sensor_of_any_noise_and_resolution_raises_nothing(
     noise: float, resolution: float, quantity: str
 ) -> None:
     for seed in range(3):
-        assert _check(_warm_up(noise=noise, resolution=resolution, seed=seed), quantity) == []
+        zero = 0.0 if quantity == "temperature" else 20.0  # a probe starts at its zero
+        assert _check(_warm_up(noise=noise, resolution=resolution, seed=seed) - zero, quantity) == []
 
 
 def test_a_displacement_that_jumps_or_creeps_to_rest_raises_nothing() -> None:
-    creeping = np.round(1000 * np.exp(-TIME / 600))  # a dial gauge of 1 um that stands still for the last 5 hours
-    jumping = np.where(TIME > 5000, 100.0, 0.0) + _warm_up()
+    creeping = np.round(1000 * np.expm1(-TIME / 600))  # a dial gauge of 1 um that stands still for the last 5 hours
+    jumping = np.where(TIME > 5000, 100.0, 0.0) - 20  # the tool was changed: all probes tell it
+    both = _recording(quantity="displacement", x=jumping + _warm_up(), y=jumping + _warm_up(seed=2))
 
     assert _check(creeping, "displacement") == []
-    assert _check(jumping, "displacement") == []
+    assert [f.kind for f in check(both)] == ["no cycle"]
 
 
 def test_a_spindle_speed_and_a_position_may_stand_still() -> None:
@@ -210,7 +212,7 @@ def test_an_implausible_temperature_is_trouble() -> None:
     ],
 )
 def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, value: float, severity: str) -> None:
-    values = _warm_up()
+    values = _warm_up() - (0.0 if quantity == "temperature" else 20.0)
     values[[300, 1200]] = value
     stuck = values.copy()
     stuck[1500:] = stuck[1500]
@@ -312,7 +314,7 @@ def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
 
 def test_probing_cycles_are_no_trouble() -> None:
     """A touch probe has values in its cycles only, in the same rows for all points; a lone gappy probe is trouble."""
-    drift = _warm_up(noise=0.5)
+    drift = _warm_up(noise=0.5) - 20
     there = np.arange(N) % 50 == 0
     touched = {name: np.where(there, drift + k, np.nan) for k, name in enumerate(("x", "y"))}
     found = check(_recording(quantity="displacement", **touched))
@@ -320,3 +322,38 @@ def test_probing_cycles_are_no_trouble() -> None:
     assert "has 40 values in 2000 rows" in found[-1].text
     (lone,) = [f for f in _check(np.where(there, drift, np.nan), "displacement") if f.kind == "missing values"]
     assert lone.severity == "trouble"
+
+
+def test_rows_in_trouble_are_told_apart_from_channels_in_trouble() -> None:
+    """Codes, implausible values, stuck stretches and spikes have rows; a dead sensor and a wrong unit have none."""
+    coded, wild, stuck, spiking = (_warm_up(seed=k) for k in range(4))
+    coded[[3, 700]] = -999.0
+    wild[1200] = 2000.0
+    stuck[1500:1600] = stuck[1500]
+    spiking[[300, 301]] += 60.0
+    recording = _recording(
+        coded=coded,
+        wild=wild,
+        stuck=stuck,
+        spiking=spiking,
+        sound=_warm_up(seed=5),
+        dead=np.full(N, 21.0),
+        absent=np.full(N, -180.0),
+        hot=_warm_up(seed=6) + 600,
+        kelvin=_warm_up(seed=7) + 273.15,
+    )
+
+    rows = {name: np.flatnonzero(found).tolist() for name, found in troubled_rows(recording).items()}
+
+    assert rows.pop("stuck") == pytest.approx(list(range(1501, 1600)), abs=2)
+    assert rows == {"coded": [3, 700], "wild": [1200], "spiking": [300, 301]}
+    lasting = lasting_trouble(check(recording))
+    assert {(f.channel, f.kind) for f in lasting} == {
+        ("dead", "constant"),
+        ("absent", "missing-value code"),
+        ("hot", "implausible"),
+        ("kelvin", "unit"),
+    }
+    given = check(recording)
+    assert troubled_rows(recording, given).keys() == troubled_rows(recording).keys()
+    assert troubled_rows(recording, ()) == {}

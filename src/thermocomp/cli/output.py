@@ -6,7 +6,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -17,14 +16,12 @@ from thermocomp.assessment.choice import Table as ChoiceTable
 from thermocomp.assessment.harm import Unit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
+from thermocomp.cli.checked import recording_content
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.shown import mark
 from thermocomp.core.model import ErrorModel
-from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report.summary import cautions, unlike
-
-_SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
 
 def show_comparison(
@@ -216,47 +213,10 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             console.print(f"{word} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True)
 
 
-def show_check(
-    tests: Sequence[Recording], findings: Sequence[Sequence[Finding]], console: Console, *, as_json: bool
-) -> None:
-    """Print what recordings hold and what is wrong with them."""
-    if as_json:
-        content = [_recording(r, found) for r, found in zip(tests, findings, strict=True)]
-        print_json({"recordings": content}, console)
-        return
-    for r, found in zip(tests, findings, strict=True):
-        hours = (r.time[-1] - r.time[0]) / 3600
-        console.print(
-            f"[bold]{escape(r.source or r.name)}[/]: {len(r)} rows, {hours:.2f} h, "
-            f"a row every {r.sampling_interval:g} s" + (f", from {r.start}" if r.start else "")
-        )
-        table = Table()
-        for heading in ("channel", "quantity", "unit", "smallest", "largest", "missing"):
-            table.add_column(heading, justify="right" if heading in ("smallest", "largest", "missing") else "left")
-        for c in r.channels:
-            values = r.table[c.name].to_numpy()
-            finite = values[np.isfinite(values)]
-            low, high = (f"{finite.min():.4g}", f"{finite.max():.4g}") if finite.size else ("", "")
-            table.add_row(escape(c.name), c.quantity, c.unit, low, high, str(len(values) - finite.size or ""))
-        console.print(table)
-        cycles = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
-        console.print(f"{len(r.cycles)} thermal cycle(s): {escape(cycles)}")
-        told = {f.text for f in found}
-        for note in r.notes:
-            if note in told:  # a column that was left out is a finding too
-                continue
-            console.print(f"[dim]note[/] {escape(note)}")
-        for f in found:
-            where = f"{escape(f.channel)} " if f.channel else ""
-            console.print(f"[{_SEVERITY[f.severity]}]{f.severity}[/] [bold]{where}[/]{escape(f.text)}")
-        if not found:
-            console.print("[green]nothing wrong found[/]")
-
-
 def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: Console, *, as_json: bool) -> None:
     """Print what was recorded on the virtual machine."""
     if as_json:
-        content = [{"file": str(p), **_recording(r, ())} for r, p in zip(tests, paths, strict=True)]
+        content = [{"file": str(p), **recording_content(r, ())} for r, p in zip(tests, paths, strict=True)]
         print_json({"recordings": content}, console)
         return
     for r, p in zip(tests, paths, strict=True):
@@ -390,17 +350,4 @@ def _model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
         "none_rms_um": honest.none_rms if honest else None,
         "verdict": honest.word if honest else None,
         "reason": honest.why if honest else None,
-    }
-
-
-def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
-    return {
-        "name": r.name,
-        "source": r.source,
-        "rows": len(r),
-        "sampling_interval_s": r.sampling_interval,
-        "channels": [{"name": c.name, "quantity": c.quantity, "unit": c.unit, "place": c.place} for c in r.channels],
-        "cycles": [{"name": c.name, "start": c.start, "stop": c.stop} for c in r.cycles],
-        "notes": list(r.notes),
-        "findings": [{"severity": f.severity, "kind": f.kind, "channel": f.channel, "text": f.text} for f in found],
     }

@@ -1,0 +1,218 @@
+"""What `check` found in recordings, as one offline page: the channels drawn, the findings marked at their rows."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from thermocomp import __version__
+from thermocomp.core.machine import Channel
+from thermocomp.recording.findings import Finding
+from thermocomp.recording.recording import Recording
+from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, svg, thinned
+from thermocomp.report.html import environment
+
+#: what is drawn below each other, in this order
+_PANELS = {"spindle_speed": 1.0, "temperature": 2.4, "displacement": 2.4, "angle": 2.0, "position": 1.2, "feed": 1.0}
+_MARK = {"trouble": "#b00020", "warning": "#E69F00", "info": "#5b636e"}
+#: names beside a panel
+_NAMED = 14
+_LONGEST = 28
+
+
+def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    findings : sequence of sequence of Finding
+        Of each recording, the gravest first.
+
+    Returns
+    -------
+    str
+    """
+    return (
+        environment()
+        .get_template("check.html")
+        .render(
+            version=__version__,
+            recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
+        )
+    )
+
+
+def write(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]], path: Path) -> None:
+    """Write the page; an existing file is replaced."""
+    path.write_text(render(recordings, findings), encoding="utf-8", errors="replace")
+
+
+def draw(recording: Recording, findings: Sequence[Finding]) -> str:
+    """Show what each channel did, and where what was found lies; a finding's number is its place in the list.
+
+    Parameters
+    ----------
+    recording : Recording
+    findings : sequence of Finding
+
+    Returns
+    -------
+    str
+        SVG; empty if there is nothing to draw.
+    """
+    shown = {q: recording.of_quantity(q) for q in _PANELS if recording.of_quantity(q)}
+    if not shown:
+        return ""
+    numbers: dict[str, list[tuple[int, Finding]]] = {}
+    for number, f in enumerate(findings, start=1):
+        numbers.setdefault(f.channel, []).append((number, f))
+    heights = [_PANELS[q] for q in shown]
+    with drawing(recording.name), warnings.catch_warnings():
+        # a name may hold letters that the font to measure it lacks; the browser has them
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure = Figure(figsize=(9.6, 0.8 + 1.15 * sum(heights)), layout="constrained")
+        panels = figure.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+        for ax, (quantity, channels) in zip(panels, shown.items(), strict=True):
+            _panel(ax, recording, quantity, channels, numbers)
+        panels[-1].set_xlabel("time [h]")
+        panels[-1].margins(x=0)
+        return svg(figure)
+
+
+def _panel(
+    ax: Axes,
+    recording: Recording,
+    quantity: str,
+    channels: Sequence[Channel],
+    numbers: Mapping[str, Sequence[tuple[int, Finding]]],
+) -> None:
+    """Draw the channels of one quantity with their findings."""
+    hours = recording.time / 3600
+    for k, cycle in enumerate(recording.cycles):
+        if k % 2 == 0:
+            ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
+    low, high = _limits(recording, channels, numbers)
+    ax.set_ylim(low, high)
+    # those with a finding are named first
+    ordered = sorted(channels, key=lambda c: c.name not in numbers)
+    handles, names = [], []
+    labels: dict[float, list[tuple[int, Finding]]] = {}
+    for k, c in enumerate(ordered):
+        values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
+        style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
+        line = ax.plot(*thinned(hours, values), style, color=COLOURS[k % len(COLOURS)], lw=1.0, zorder=3)[0]
+        handles.append(line)
+        names.append(plain(c.name))
+        for number, f in numbers.get(c.name, ()):
+            _mark(ax, hours, np.clip(values, low, high), f, "--")
+            if (row := _first(f)) is not None:
+                labels.setdefault(float(hours[row]), []).append((number, f))
+    for number, f in numbers.get("", ()):
+        _mark(ax, hours, hours, f, ":")
+        if (row := _first(f)) is not None:
+            labels.setdefault(float(hours[row]), []).append((number, f))
+    for hour, mine in labels.items():
+        _label(ax, hour, mine)
+    ax.set_ylabel(channels[0].unit)
+    ax.set_title(quantity.replace("_", " "))
+    if len(names) > _NAMED:
+        handles, names = handles[:_NAMED], [*names[: _NAMED - 1], f"and {len(names) - _NAMED + 1} more"]
+    ax.legend(handles, names, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
+
+
+def _limits(
+    recording: Recording, channels: Sequence[Channel], numbers: Mapping[str, Sequence[tuple[int, Finding]]]
+) -> tuple[float, float]:
+    """Return the range of what is sound, with a margin: beside a spike of millimetres nothing else would be seen."""
+    low, high = np.inf, -np.inf
+    for c in channels:
+        values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
+        for _, f in numbers.get(c.name, ()):
+            if f.rows is not None:
+                values[f.rows] = np.nan
+        low, high = float(np.nanmin(values, initial=low)), float(np.nanmax(values, initial=high))
+    if low > high:
+        return 0.0, 1.0
+    margin = 0.08 * (high - low) or max(1.0, 0.01 * abs(high))
+    return low - margin, high + margin
+
+
+def _first(f: Finding) -> int | None:
+    """Return the row a finding's number stands at."""
+    return int(f.rows[0]) if f.rows is not None and f.rows.size else f.row
+
+
+def _mark(ax: Axes, hours: FloatArray, values: FloatArray, f: Finding, style: str) -> None:
+    """Mark the rows of a finding on its channel, or the row where it begins."""
+    if f.rows is not None and f.rows.size:
+        drawn = f.rows[:: max(1, len(f.rows) // POINTS)]
+        ax.plot(hours[drawn], values[drawn], "x", color=_MARK[f.severity], ms=5, mew=1.4, zorder=5, clip_on=False)
+    elif f.row is not None:
+        ax.axvline(float(hours[f.row]), color=_MARK[f.severity], lw=1.1, ls=style, zorder=4)
+
+
+def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
+    """Write the numbers of the findings that begin at the same time, the gravest giving the colour."""
+    first = min(found, key=lambda one: one[0])[1]
+    ax.annotate(
+        ", ".join(str(number) for number, _ in found[:4]) + (" ..." if len(found) > 4 else ""),
+        (hour, 1.0),
+        xycoords=ax.get_xaxis_transform(),
+        xytext=(0, -1),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize=7.5,
+        color="white",
+        zorder=6,
+        bbox={"boxstyle": "round,pad=0.2", "fc": _MARK[first.severity], "ec": "none"},
+    )
+
+
+def plain(name: str) -> str:
+    """Return a name as a figure shows it: short, on one line, with no sign that starts a formula or hides a legend."""
+    text = "".join(c if c.isprintable() else " " for c in name)
+    text = text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
+
+
+def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
+    kinds: dict[str, list[str]] = {}
+    for number, f in enumerate(found, start=1):
+        kinds.setdefault(f.channel, []).append(f"{number} {f.kind}")
+    channels = []
+    for c in r.channels:
+        values = r.table[c.name].to_numpy(dtype=np.float64)
+        finite = values[np.isfinite(values)]
+        channels.append(
+            {
+                "name": c.name,
+                "quantity": c.quantity.replace("_", " "),
+                "unit": c.unit,
+                "place": c.place,
+                "low": f"{finite.min():.4g}" if finite.size else "",
+                "high": f"{finite.max():.4g}" if finite.size else "",
+                "missing": len(values) - finite.size,
+                "found": kinds.get(c.name, []),
+            }
+        )
+    return {
+        "name": r.name,
+        "file": r.source.replace("\\", "/").rsplit("/", 1)[-1] or r.name,
+        "rows": len(r),
+        "hours": (r.time[-1] - r.time[0]) / 3600,
+        "interval": r.sampling_interval,
+        "start": r.start,
+        "cycles": [{"name": c.name, "rows": f"{c.start}-{c.stop - 1}"} for c in r.cycles],
+        "channels": channels,
+        "worst": found[0].severity if found else "",
+        "findings": found,
+        "counts": {s: sum(f.severity == s for f in found) for s in ("trouble", "warning", "info")},
+        "notes": [n for n in r.notes if n not in {f.text for f in found}],
+        "figure": draw(r, found),
+    }

@@ -1,0 +1,100 @@
+"""`thermocomp check`: tables, one line per file, JSON and the page."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smallmachine import small_machine
+from thermocomp.cli.app import run
+from thermocomp.cli.checked import stretches
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[str]:
+    """Five recordings; the second has a probe that was touched and outliers, the third starts off its zero."""
+    paths = []
+    for k in range(5):
+        recording = small_machine(seed=k)
+        table = recording.table.copy()
+        if k == 1:
+            table.loc[500:, "x_um"] += 30.0
+            table.loc[300:303, "z_um"] += 4300.0
+        if k == 2:
+            table["z_um"] += 12.0
+        table.insert(0, "time_s", recording.time)
+        path = tmp_path / f"day{k}.csv"
+        table.to_csv(path, index=False)
+        paths.append(str(path))
+    return paths
+
+
+def test_one_file_is_told_in_full(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", files[1]]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "trouble x_um steps by" in text
+    assert "trouble z_um 1 spike of 4 rows" in text
+    assert "4 thermal cycle(s)" in text
+    assert run(["check", files[0]]) == 0
+    assert "nothing wrong found" in capsys.readouterr().out
+
+
+def test_more_than_three_files_get_a_line_each(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", *files]) == 1
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("│")]
+    cells = [" ".join(line.replace("│", " ").split()) for line in lines]
+    text = " ".join(cells)
+    assert "trouble" in text
+    assert text.count("nothing") == 3
+    assert "warning not zeroed" in text
+    assert "steps by" not in text
+    assert all(f"{k}.csv" in text.replace(" ", "") for k in range(5))
+    assert run(["check", files[0], *files[2:]]) == 0
+
+
+def test_many_findings_of_a_kind_are_gathered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = small_machine()
+    table = recording.table[["t1_C", "spindle_rpm"]].copy()
+    for k in range(9):
+        table[f"p{k}_um"] = recording.table["z_um"] * (1 + k) + 50
+    table.insert(0, "time_s", recording.time)
+    table.to_csv(tmp_path / "nine.csv", index=False)
+    assert run(["check", str(tmp_path / "nine.csv")]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert text.count("models count from zero") == 4
+    assert "warning not zeroed, 5 more: p4_um, p5_um, p6_um, p7_um, p8_um" in text
+
+
+def test_json_holds_the_rows(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", *files, "--json"]) == 1
+    recordings = json.loads(capsys.readouterr().out)["recordings"]
+    assert [r["worst"] for r in recordings] == [None, "trouble", "warning", None, None]
+    assert recordings[0]["hours"] == pytest.approx(799 / 60)
+    found = {f["kind"]: f for f in recordings[1]["findings"]}
+    assert found["spike"]["rows"] == [[300, 304]]
+    assert found["step"]["rows"] is None
+    assert abs(found["step"]["row"] - 500) <= 1
+
+
+def test_a_page_is_written_and_never_over_something(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "page.html"
+    assert run(["check", *files[:2], "-o", str(page)]) == 1
+    assert "Page:" in capsys.readouterr().out
+    first = page.read_text(encoding="utf-8")
+    assert first.count("<h2") == 2
+    assert run(["check", files[0], "-o", str(page)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert page.read_text(encoding="utf-8") == first
+    assert run(["check", files[0], "-o", str(page), "--overwrite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["page"] == str(page)
+    assert run(["check", files[0], "-o", files[0], "--overwrite"]) == 2
+    assert run(["check", files[0], "-o", str(tmp_path / "page.pdf")]) == 2
+
+
+def test_stretches() -> None:
+    assert stretches(np.array([], dtype=int)) == []
+    assert stretches([5]) == [[5, 6]]
+    assert stretches([3, 1, 2, 7, 9, 8]) == [[1, 4], [7, 10]]
