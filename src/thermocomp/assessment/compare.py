@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
-from thermocomp.assessment.replay import replay
+from thermocomp.assessment.replay import run
 from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.assessment.splits import Judging, Split, called, stretches
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.models.methods import deployable, expand
@@ -57,6 +58,14 @@ class Assessment:
         It is the last word on this model and target: all that was judged, not one cycle of it.
     n_sensors : tuple of (int, int)
         Fewest and most inputs with an influence in one model.
+    alone : ndarray of shape (n_judged,), optional
+        What the model alone predicts, without gate and limits; `predicted` is what would run, with them [um].
+    limits : Limits or None
+        That `predicted` keeps to; None: there are none, and it is the model behind the gate, or alone.
+    rejected : int
+        Judged readings that the gate turned away though they were complete.
+    turned_away : str
+        The first reading that it turned away, and why.
     """
 
     model: str
@@ -77,10 +86,19 @@ class Assessment:
     caveat: str = ""
     overall: bool = False
     n_sensors: tuple[int, int] = (0, 0)
+    alone: FloatArray | None = None
+    limits: Limits | None = None
+    rejected: int = 0
+    turned_away: str = ""
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
+
+    def alone_metric(self, name: str) -> float:
+        """Return the metric of the model alone, without gate and limits."""
+        alone = self.predicted if self.alone is None else self.alone
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
 
     def none_metric(self, name: str) -> float:
         """Return the metric without compensation."""
@@ -138,6 +156,7 @@ def compare(
     *,
     support: Support = Support(),
     robustness: bool = True,
+    limits: Limits | None = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
@@ -156,6 +175,8 @@ def compare(
         What the models do outside their trained range.
     robustness : bool
         Also replay with noise and lost sensors.
+    limits : Limits or None
+        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -168,7 +189,7 @@ def compare(
     names = expand(methods)
     pieces = [(k, n, split) for k in range(len(samples.targets)) for n in names for split in judging.splits]
     done: list[Assessment] = []
-    work = (delayed(_assess_method)(samples, n, k, split, support, robustness) for k, n, split in pieces)
+    work = (delayed(_assess_method)(samples, n, k, split, support, robustness, limits) for k, n, split in pieces)
     try:
         for a in Parallel(n_jobs=jobs, return_as="generator")(work):
             progress(f"{a.target} {a.model} {a.block}")
@@ -194,9 +215,19 @@ def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging) -> int:
 
 
 def judge(
-    name: str, model: ErrorModel, samples: Samples, split: Split, *, fit_s: float = 0.0, robustness: bool = True
+    name: str,
+    model: ErrorModel,
+    samples: Samples,
+    split: Split,
+    *,
+    fit_s: float = 0.0,
+    robustness: bool = True,
+    limits: Limits | None = Limits(),
 ) -> Assessment:
-    """Judge a frozen model on a block.
+    """Judge a frozen model on a block: what a compensator with it would have left there.
+
+    The verdict is taken, in each part that is judged, on the worse of what would run and the model alone: a model does
+    not pass because limits clip what it says.
 
     Parameters
     ----------
@@ -211,6 +242,8 @@ def judge(
         The fit took [s].
     robustness : bool
         Also replay with noise and lost sensors.
+    limits : Limits or None
+        Of the compensator; None: the model alone is judged.
 
     Returns
     -------
@@ -223,9 +256,11 @@ def judge(
         return _failed(samples, name, target, split, f"{model.target} has no number in {split.block} to judge against")
     measured = samples.deviations[rows, target]
     stressed = stress(model, samples, measured, rows) if robustness else None
-    predicted = stressed.predicted if stressed else replay(model, samples, rows)[0]
-    if not np.isfinite(metrics.rms(measured, predicted)):
+    ran = run(model, samples, rows, limits or Limits())
+    predicted = ran.deviation if limits is None else ran.compensated
+    if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+    segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
     return Assessment(
         model=name,
         target=model.target,
@@ -235,16 +270,42 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.judge(
-            measured, predicted, [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
-        ),
+        verdict=harm.judge(measured, worse(measured, predicted, ran.deviation, segments), segments),
         sensors=model.sensors,
         n_sensors=(len(model.sensors), len(model.sensors)),
         fit_s=fit_s,
         n_effective=effective_sample_size(measured - predicted),
         robustness=stressed.robustness if stressed else None,
         frozen=model,
+        alone=ran.deviation,
+        limits=None if limits is None else ran.limits,
+        rejected=0 if limits is None else int(ran.rejected.sum()),
+        turned_away="" if limits is None else ran.why,
     )
+
+
+def worse(
+    measured: FloatArray, ran: FloatArray, alone: FloatArray, segments: Sequence[tuple[str, BoolArray]]
+) -> FloatArray:
+    """Return, in each segment, what leaves more of it: what would run, or the model alone.
+
+    Parameters
+    ----------
+    measured, ran, alone : ndarray of shape (n_rows,)
+        Deviations [um].
+    segments : sequence of (name, ndarray of bool of shape (n_rows,))
+        What is judged.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+        [um]
+    """
+    found = ran.copy()
+    for _, mine in segments:
+        if metrics.rms(measured[mine], alone[mine]) > metrics.rms(measured[mine], ran[mine]):
+            found[mine] = alone[mine]
+    return found
 
 
 def per_cycle(whole: Assessment) -> list[Assessment]:
@@ -259,6 +320,7 @@ def per_cycle(whole: Assessment) -> list[Assessment]:
                 block=f"cycle {verdict.cycle}",
                 measured=measured,
                 predicted=predicted,
+                alone=None if whole.alone is None else whole.alone[rows],
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],
@@ -272,13 +334,19 @@ def per_cycle(whole: Assessment) -> list[Assessment]:
 
 
 def _assess_method(
-    samples: Samples, name: str, target: int, split: Split, support: Support, robustness: bool
+    samples: Samples,
+    name: str,
+    target: int,
+    split: Split,
+    support: Support,
+    robustness: bool,
+    limits: Limits | None,
 ) -> Assessment:
     try:
         trained = train(name, samples, target, split.learn, support=support)
     except FitError as e:
         return _failed(samples, name, target, split, str(e))
-    return judge(name, trained.model, samples, split, fit_s=trained.seconds, robustness=robustness)
+    return judge(name, trained.model, samples, split, fit_s=trained.seconds, robustness=robustness, limits=limits)
 
 
 def _failed(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
@@ -329,6 +397,9 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         fit_s=sum(a.fit_s for a in parts),
         n_effective=sum(a.n_effective for a in parts),
         robustness=pooled([(a.robustness, len(a.measured)) for a in parts]),
+        alone=np.concatenate([a.predicted if a.alone is None else a.alone for a in parts]),
+        rejected=sum(a.rejected for a in parts),
+        turned_away=next((a.turned_away for a in parts if a.turned_away), ""),
         frozen=None,
         failure=failures[0] if failures else "",
         overall=True,

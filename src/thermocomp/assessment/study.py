@@ -7,6 +7,7 @@ import numpy as np
 
 from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
 from thermocomp.assessment.splits import Judging, Split
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
 from thermocomp.models.base import ThermalRegressor
@@ -48,6 +49,7 @@ def fit(
     judging: Judging,
     *,
     support: Support = Support(),
+    limits: Limits = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Fitted:
@@ -60,6 +62,8 @@ def fit(
     judging : Judging
     support : Support
         For the models.
+    limits : Limits
+        Of the compensator that is judged with them.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -76,7 +80,9 @@ def fit(
     """
     if not find(method).kind.freezable:
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
-    comparison = compare(samples, [method], judging, support=support, robustness=False, jobs=jobs, progress=progress)
+    comparison = compare(
+        samples, [method], judging, support=support, robustness=False, limits=limits, jobs=jobs, progress=progress
+    )
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     for k, overall in enumerate(comparison.overall()):
@@ -134,7 +140,11 @@ class Judged:
 
 
 def assess(
-    models: Sequence[ErrorModel], recordings: Sequence[Recording], *, progress: Callable[[str], None] = _silent
+    models: Sequence[ErrorModel],
+    recordings: Sequence[Recording],
+    *,
+    limits: Limits = Limits(),
+    progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
 
@@ -143,6 +153,8 @@ def assess(
     models : sequence of ErrorModel
     recordings : sequence of Recording
         With the models' inputs and targets.
+    limits : Limits
+        Of the compensator that is judged with them.
     progress : callable
         Called with a line of text per model.
 
@@ -165,7 +177,7 @@ def assess(
         samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
         everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
         name = model.provenance.method if model.provenance else model.family
-        overall = replace(judge(name, model, samples, everything), overall=True, caveat=caveat)
+        overall = replace(judge(name, model, samples, everything, limits=limits), overall=True, caveat=caveat)
         cut = per_cycle(overall)
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen)

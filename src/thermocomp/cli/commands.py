@@ -13,6 +13,7 @@ from rich.console import Console
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
+    Compensator,
     Flag,
     Json,
     Names,
@@ -229,6 +230,7 @@ def fit(
     output: Output,
     support: Policy = "clip",
     margin: float = 0.25,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     overwrite: Flag = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -255,6 +257,8 @@ def fit(
         What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
     margin : float
         Share of each input's trained span by which its range is widened.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -283,7 +287,13 @@ def fit(
     judging = study.judging(samples)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
-            samples, model, judging, support=Support(support, margin), jobs=study.jobs, progress=progress
+            samples,
+            model,
+            judging,
+            support=Support(support, margin),
+            limits=compensator.limits(),
+            jobs=study.jobs,
+            progress=progress,
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
@@ -297,6 +307,7 @@ def assess(
     /,
     *,
     mapping: Path | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     json: Json = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
@@ -309,6 +320,8 @@ def assess(
         CSV, XLSX or Parquet files; each is one test.
     mapping : Path
         TOML file that says what the columns are.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
     json : bool
         Print results for a machine instead of a table.
 
@@ -325,7 +338,7 @@ def assess(
     models = modelfile.read(model)
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
-        judged = studies.assess(models, tests, progress=progress)
+        judged = studies.assess(models, tests, limits=compensator.limits(), progress=progress)
     out.show_assess(judged, trouble, _console, as_json=json)
     return 0 if all(a.accepted for a in judged.assessments) else 1
 
@@ -336,6 +349,7 @@ def compare(
     *,
     study: Study,
     models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -351,6 +365,8 @@ def compare(
     models : list of str
         Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
         mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+    compensator : Compensator
+        Its limits: what would run is judged, not the models alone.
     output : Path
         Report to write (.html).
     overwrite : bool
@@ -374,7 +390,9 @@ def compare(
     samples = study.samples(tests)
     judging = study.judging(samples)
     with by_steps(comparing.n_pieces(samples, models, judging), hidden=json) as progress:
-        comparison = comparing.compare(samples, models, judging, jobs=study.jobs, progress=progress)
+        comparison = comparing.compare(
+            samples, models, judging, limits=compensator.limits(), jobs=study.jobs, progress=progress
+        )
     if output is not None:
         with needs("study"):
             from thermocomp.report import html

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
 from thermocomp.cli.extras import needs
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -82,6 +83,30 @@ class Study:
         if self.leave_one_file_out:
             return splits.leave_one_file_out(samples)
         return splits.leave_one_cycle_out(samples)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Compensator:
+    """What the compensator that is judged with a model may never do.
+
+    Parameters
+    ----------
+    magnitude : float
+        Largest correction in either direction [um].
+    rate : float
+        Fastest change of a correction [um/s].
+    dead_band : float
+        Changes smaller than this are not made [um].
+    """
+
+    magnitude: float = Limits.magnitude
+    rate: float = Limits.rate
+    dead_band: float = Limits.dead_band
+
+    def limits(self) -> Limits:
+        """Return them as the online step takes them."""
+        return Limits(self.magnitude, self.rate, self.dead_band)
 
 
 @Parameter(name="*")

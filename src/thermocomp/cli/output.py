@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
+from thermocomp.report.running import told
 from thermocomp.report.summary import cautions
 
 _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
@@ -57,6 +59,8 @@ def show_comparison(
             )
     for caution in cautions(comparison):
         console.print(f"[yellow]but[/] {escape(caution)}")
+    for line in told(comparison.overall()):
+        console.print(escape(line))
     if comparison.left:
         console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
     if report is not None:
@@ -146,6 +150,8 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     for m in fitted.models:
         if m.honest_error is not None and not m.accepted:
             console.print(f"[red]refused[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
+    for line in told(fitted.comparison.overall()):
+        console.print(escape(line))
     console.print(f"Model file: {path}", soft_wrap=True)
 
 
@@ -181,6 +187,8 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
+    for line in told(judged.overall()):
+        console.print(escape(line))
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             console.print(f"[red]refused when it was fitted[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
@@ -310,6 +318,9 @@ def _result(a: Assessment) -> dict[str, Any]:
         "mae_um": a.metric("mae"),
         "rms_um": a.metric("rms"),
         "max_um": a.metric("max_abs"),
+        "alone_mae_um": a.alone_metric("mae"),
+        "alone_rms_um": a.alone_metric("rms"),
+        "alone_max_um": a.alone_metric("max_abs"),
         "peak_to_peak_um": a.metric("peak_to_peak"),
         "none_mae_um": a.none_metric("mae"),
         "none_rms_um": a.none_metric("rms"),
@@ -323,6 +334,9 @@ def _result(a: Assessment) -> dict[str, Any]:
         "fit_s": a.fit_s,
         "n_rows": len(a.measured),
         "n_effective": a.n_effective,
+        "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
+        "readings_turned_away": a.rejected,
+        "first_turned_away": a.turned_away,
     }
     if a.robustness is not None:
         r = a.robustness

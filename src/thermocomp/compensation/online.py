@@ -9,6 +9,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from numbers import Real
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -29,9 +30,11 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
 #: any number at all; finite, so that an infinity is none
 ANY = (-sys.float_info.max, sys.float_info.max)
 #: how far the zero of a day may lie from the zero of the training [degC]
-DAY = 25.0
+DAY = 15.0
 #: least room beyond the trained range of a temperature [degC]
 MIN_SPAN = 10.0
+#: room beyond the trained range of what nature sets no bounds to (a displacement, a number), in widths of that range
+WIDE = 10.0
 #: how far ahead of the clock a reading may be stamped [s]
 CLOCK_SKEW = 1.0
 
@@ -42,7 +45,7 @@ class OnlineState(NamedTuple):
     models: tuple[State, ...]  #: one per model
     corrections: tuple[Correction, ...]  #: in force, one per model
     time: float | None  #: of the last reading that passed the gate [s]
-    clock: float | None  #: when the step was last taken, whatever the gate said [s]
+    clock: float | None  #: the latest at which the step was taken, whatever the gate said [s]
 
 
 class OnlineResult(NamedTuple):
@@ -74,8 +77,11 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
 def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
     """Say why a reading must not be used; the empty string if it may.
 
-    A temperature is plausible while it stays within its trained range widened by the whole span of that range, and the
-    first one, which decides what counts as zero, while it is within `DAY` of the zero of the training.
+    A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
+    first reading decides what counts as zero: there the temperatures as a whole (their median) have to be within `DAY`
+    of the zero of the training, and each of them as near to the others as it was then, give or take `MIN_SPAN` or its
+    trained span. What nature sets no bounds to, a displacement or a bare number, has its trained range, widened by
+    `WIDE` times its width.
 
     Parameters
     ----------
@@ -96,14 +102,49 @@ def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now
     if untimely:
         return untimely
     for model, memory in zip(models, state.models, strict=True):
-        for channel, zero in zip(model.inputs, memory.reference.tolist(), strict=True):
-            value = reading.values.get(channel.name)
-            if value is None:
-                return f"{channel.name} is missing"
-            low, high = _plausible(channel, zero)
-            # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
-            if not ((type(value) is float or _is_number(value)) and low <= value <= high):
-                return f"{channel.name} = {value} {channel.unit} is not plausible"
+        why = implausible(model, [reading.values.get(i.name) for i in model.inputs], memory.reference.tolist())
+        if why:
+            return why
+    return ""
+
+
+def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
+    """Say which value of a reading must not be used and why; the empty string if all may.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    values : sequence of shape (n_inputs,)
+        As a source gave them; None is a value that is missing.
+    reference : sequence of float of shape (n_inputs,)
+        What counts as zero; nan where the first reading is to decide it.
+
+    Returns
+    -------
+    str
+    """
+    undecided = []
+    for channel, value, zero in zip(model.inputs, values, reference, strict=True):
+        if value is None:
+            return f"{channel.name} is missing"
+        low, high = plausible(channel, zero)
+        # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
+        if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
+            return f"{channel.name} = {value} {channel.unit} is not plausible"
+        if math.isnan(zero) and channel.quantity == "temperature":
+            undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
+    return _no_start(undecided) if undecided else ""
+
+
+def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
+    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
+    middle = median(offset for _, offset in offsets)
+    for channel, offset in offsets:
+        start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
+        if abs(middle) > DAY:
+            return f"{start}: the machine is {middle:+.1f} degC from the zero of its training"
+        if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
+            return f"{start}: {offset - middle:+.1f} degC off the others, counted from the zero of its training"
     return ""
 
 
@@ -119,19 +160,19 @@ def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) 
     return ""
 
 
-def _plausible(channel: Input, zero: float) -> tuple[float, float]:
+def plausible(channel: Input, zero: float) -> tuple[float, float]:
     """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
 
     `zero` is what counts as zero now; nan before the first reading, which decides it.
     """
     low, high = PLAUSIBLE.get(channel.quantity, ANY)
-    if channel.quantity == "temperature":
-        if math.isnan(zero):
-            around, below, above = channel.reference, -DAY, DAY
-        else:
-            span = max(channel.high - channel.low, MIN_SPAN)
-            around, below, above = zero, channel.low - span, channel.high + span
-        low, high = max(low, around + below), min(high, around + above)
+    if channel.quantity == "temperature" and not math.isnan(zero):
+        span = max(channel.high - channel.low, MIN_SPAN)
+        low, high = max(low, zero + channel.low - span), min(high, zero + channel.high + span)
+    elif channel.quantity not in PLAUSIBLE:
+        around = channel.reference if math.isnan(zero) else zero
+        room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
+        low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
     return low, high
 
 
@@ -161,7 +202,7 @@ def step(
     """
     rejected = gate(models, reading, state, now, limits)
     if rejected:
-        waiting = state._replace(clock=now) if math.isfinite(now) else state
+        waiting = state._replace(clock=_later(state.clock, now)) if math.isfinite(now) else state
         return waiting, _result(models, state.corrections, rejected, ())
     dt = 0.0 if state.time is None else reading.time - state.time
     # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
@@ -175,8 +216,13 @@ def step(
         corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
         if after.outside.any():
             outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-    new = OnlineState(tuple(states), tuple(corrections), reading.time, now)
+    new = OnlineState(tuple(states), tuple(corrections), reading.time, _later(state.clock, now))
     return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
+
+
+def _later(clock: float | None, now: float) -> float:
+    """Return the clock, which never goes back: time that was travelled in must not be there to travel in again."""
+    return now if clock is None else max(clock, now)
 
 
 def _result(

@@ -184,7 +184,7 @@ def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progre
         done += 1
         progress(done / pieces, f"{task.name}: {what}")
 
-    found = compare(task.samples, methods, task.judging, jobs=jobs, progress=tell)
+    found = compare(task.samples, methods, task.judging, limits=None, jobs=jobs, progress=tell)
     rows = []
     for overall in found.overall():
         blocks = [a for a in found.assessments if a.model == overall.model and a.frozen is not None]

@@ -10,6 +10,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import METHODS
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
+from thermocomp.report.running import told
 
 #: methods beyond which the best is suspected of luck
 MANY = 6
@@ -35,6 +36,7 @@ def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
         "cautions": cautions(comparison),
+        "running": told(comparison.overall()),
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t) for t in targets],
         "recordings": [_recording(r) for r in recordings],
@@ -122,6 +124,7 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
     return {
         "model": a.model,
         "values": {m: a.metric(m) for m in TABLE},
+        "alone": a.alone_metric("rms"),
         "accepted": a.accepted,
         "reason": a.reason,
         "best": best is not None and a.model == best.model,
