@@ -17,6 +17,7 @@ from thermocomp.core.model import ErrorModel, Input, Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.terms import Variable
+from thermocomp.core.zero import FIRST_READING, Zeroing
 
 INPUTS = (
     Input("t", "temperature", "degC", 20.0, True, -2.0, 15.0),
@@ -62,6 +63,7 @@ values = st.one_of(
         [Limits(), Limits(magnitude=5.0, rate=0.01, dead_band=0.3), Limits(magnitude=1e9, rate=1e9, reading_age=1e9)]
     ),
     known=st.booleans(),
+    zeroing=st.sampled_from([FIRST_READING, Zeroing(300.0, 10.0, "n"), Zeroing(100.0, 100.0), Zeroing(0.0, 60.0, "n")]),
 )
 def test_it_is_the_online_step(
     family: str,
@@ -69,12 +71,14 @@ def test_it_is_the_online_step(
     rows: list[tuple[float, float, float]],
     limits: Limits,
     known: bool,
+    zeroing: Zeroing,
 ) -> None:
-    model: ErrorModel = replace(FAMILIES[family], support=Support(policy))
+    model: ErrorModel = replace(FAMILIES[family], support=Support(policy), zeroing=zeroing)
     reference = (21.0, 0.0) if known else None
     time = np.cumsum([dt for dt, _, _ in rows]) if rows else np.empty(0)
     table = np.array([[t, n] for _, t, n in rows]).reshape(-1, 2)
-    found = batch.run(model, limits, time, table, reference)
+    stands = np.array([bool(zeroing.speed) and zeroing.stands(n) for _, n in table.tolist()], dtype=np.bool_)
+    found = batch.run(model, limits, time, table, reference=reference, resting=stands)
     state = online.start([model])._replace(models=(model.init(reference),))
     first = ""
     for k, row in enumerate(table):
@@ -102,6 +106,19 @@ def test_without_limits_it_is_the_model(rows: list[tuple[float, float]]) -> None
         assert found.deviation[k] == deviation
         if not found.rejected.any():
             assert found.compensated[k] == deviation
+
+
+def test_counted_anew_the_correction_begins_at_zero_again() -> None:
+    time = np.arange(0.0, 3600.0, 10.0)
+    table = np.column_stack([20.0 + np.minimum(time / 60, 10.0), np.where(time < 1800, 3000.0, 0.0)])
+    model = replace(LAGS, zeroing=Zeroing(100.0, 10.0, "n"))
+    stands = table[:, 1] == 0
+    whole = batch.run(model, Limits(rate=1e9, magnitude=1e9), time, table, resting=stands)
+    found = batch.run(model, Limits(rate=1e9, magnitude=1e9), time, table, resting=stands, anew=180)
+    at_rest = slice(180, 191)  # 100 s at 10 s
+    assert found.deviation == pytest.approx(whole.deviation - whole.deviation[at_rest].mean())
+    assert (found.compensated[:190] == 0.0).all()
+    assert found.compensated[190:] == pytest.approx(found.deviation[190:])
 
 
 def test_a_slow_limit_is_seen_in_what_runs_and_not_in_the_model() -> None:

@@ -15,6 +15,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import HonestError, Input
 from thermocomp.core.reading import Reading
+from thermocomp.core.zero import Zeroing
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
 
@@ -244,6 +245,64 @@ def test_what_nature_sets_no_bounds_to_has_those_of_the_training(quantity: str, 
         assert result.rejected in ("", f"q = {value} {unit} is not plausible")
     _, result = online.step(models, OPEN, state, Reading(9.0, begin | {"q": 20.0}), 9.0)
     assert not result.rejected  # outside the trained range, but of its size: the model's support says what to do
+
+
+AVERAGING = Zeroing(300.0, 10.0, "n")
+
+
+def live(models: list[LinearDynamic], rows: list[tuple[float, float, float]]) -> list[tuple[online.OnlineState, float]]:
+    """Return the state and the correction after each reading (time, t, n)."""
+    state, found = online.start(models), []
+    for time, t, n in rows:
+        state, result = online.step(models, OPEN, state, reading(time, t, n), time)
+        found.append((state, result.corrections["z"].offset))
+    return found
+
+
+def test_the_zero_is_the_mean_of_the_first_minutes_at_rest() -> None:
+    """The correction is zero until it is known; then it is as if it had been known from the first reading on."""
+    averaging, rng = replace(model(), zeroing=AVERAGING), np.random.default_rng(5)
+    temperatures = 20 + 0.4 * rng.normal(size=40)
+    rows = [(15.0 * k, float(t), 0.0) for k, t in enumerate(temperatures)]
+    found = live([averaging], rows)
+    assert [offset for _, offset in found[:20]] == [0.0] * 20
+    zero = float(found[20][0].models[0].reference[0])
+    assert zero == pytest.approx(temperatures[:21].mean(), abs=0.1)
+    assert abs(zero - 20) < 0.25 < abs(temperatures - 20).max()
+    state, last = averaging.init([zero, 0.0]), 0.0
+    for k, (time, t, n) in enumerate(rows):
+        state, deviation = averaging.step(state, np.array([t, n]), time - last)
+        last = time
+        if k >= 20:
+            assert found[k][1] == -float(deviation)
+    assert all(not s.gathered[0].times for s, _ in found[20:])
+
+
+def test_the_zero_ends_where_the_spindle_starts() -> None:
+    rows = [(15.0 * k, 20.0 + 0.1 * (k % 2), 0.0) for k in range(4)] + [(15.0 * k, 30.0, 3000.0) for k in range(4, 9)]
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    assert [offset for _, offset in found[:4]] == [0.0] * 4
+    assert found[4][0].models[0].reference[0] == pytest.approx(20.05)
+    assert found[4][1] == pytest.approx(-2 * 9.95 - 0.01 * 3000 * -math.expm1(-15 / 600))
+
+
+def test_a_spindle_that_turns_from_the_first_reading_keeps_the_zero_short() -> None:
+    """Ten seconds, not five minutes: the machine warms up meanwhile."""
+    for n, speed in ((3000.0, "n"), (0.0, "")):  # it turns; or nothing says that it stands
+        zeroing = Zeroing(300.0, 10.0, speed)
+        found = live([replace(model(), zeroing=zeroing)], [(2.0 * k, 20.0 + 0.02 * k, n) for k in range(20)])
+        assert found[5][0].models[0].reference[0] == pytest.approx(20.05)
+        assert found[4][1] == 0.0
+    once_a_minute = live([replace(model(), zeroing=AVERAGING)], [(60.0 * k, 20.0 + k, 3000.0) for k in range(3)])
+    assert once_a_minute[1][0].models[0].reference[0] == 20.0
+    assert once_a_minute[0][1] == 0.0 > once_a_minute[1][1]
+
+
+def test_an_outlier_and_a_dead_reading_are_not_in_the_zero() -> None:
+    rows = [(15.0 * k, 20.0 + 0.01 * (k % 3), 0.0) for k in range(21)]
+    rows[3], rows[7] = (45.0, 27.0, 0.0), (105.0, math.nan, 0.0)  # 7 degC off is no machine that does not start
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    assert found[-1][0].models[0].reference[0] == pytest.approx(20.01, abs=0.002)
 
 
 def test_outside_inputs_are_told() -> None:

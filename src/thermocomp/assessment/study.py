@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermocomp.assessment.compare import Assessment, Comparison, compare, judge, per_cycle
+from thermocomp.assessment.replay import absolute
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -15,6 +16,8 @@ from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import Start
+from thermocomp.recording.starts import find as find_starts
 
 
 def _silent(_: str) -> None:
@@ -128,11 +131,14 @@ class Judged:
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
         Names of recordings that a model was fitted to: no honest test.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
     """
 
     models: tuple[ErrorModel, ...]
     assessments: tuple[Assessment, ...]
     seen: tuple[str, ...]
+    starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per model, over all cycles."""
@@ -144,6 +150,7 @@ def assess(
     recordings: Sequence[Recording],
     *,
     limits: Limits = Limits(),
+    starts: Start | Sequence[Start] | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
@@ -155,6 +162,8 @@ def assess(
         With the models' inputs and targets.
     limits : Limits
         Of the compensator that is judged with them.
+    starts : Start or sequence of Start, optional
+        How each recording begins, or all of them; found out if not given.
     progress : callable
         Called with a line of text per model.
 
@@ -165,19 +174,35 @@ def assess(
     Raises
     ------
     InputError
-        A channel the models need is not in the recordings.
+        A channel the models need is not in the recordings, or it cannot be told how one of these begins.
     """
     found: list[Assessment] = []
     hashes = {h for m in models if m.provenance for h in m.provenance.data_sha256}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
     caveat = f"no honest test: fitted to {', '.join(seen)}; judge it on another recording" if seen else ""
+    if starts is None:
+        starts = find_starts(
+            recordings,
+            [r.channel(m.target) for r in recordings[:1] for m in models],
+            zeroing=models[0].zeroing,
+            absolute=absolute(models),
+        )
+    told: tuple[tuple[str, Start], ...] = ()
     for model in models:
         progress(f"{model.target} {model.family}")
         rezero = any(i.rezero for i in model.inputs)
-        samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
+        samples = stack(
+            recordings,
+            [model.target],
+            [i.name for i in model.inputs],
+            rezero=rezero,
+            zeroing=model.zeroing,
+            starts=starts,
+        )
+        told = tuple(zip(samples.test_names, samples.starts, strict=True))
         everything = Split("all cycles", np.zeros(len(samples), np.bool_), np.ones(len(samples), np.bool_))
         name = model.provenance.method if model.provenance else model.family
         overall = replace(judge(name, model, samples, everything, limits=limits), overall=True, caveat=caveat)
         cut = per_cycle(overall)
         found += [*cut, overall] if len(cut) > 1 else [overall]
-    return Judged(tuple(models), tuple(found), seen)
+    return Judged(tuple(models), tuple(found), seen, told)

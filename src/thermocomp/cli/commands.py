@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from rich.console import Console
 
+from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
@@ -231,6 +232,7 @@ def fit(
     support: Policy = "clip",
     margin: float = 0.25,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     overwrite: Flag = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -259,6 +261,8 @@ def fit(
         Share of each input's trained span by which its range is widened.
     compensator : Compensator
         Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -283,7 +287,7 @@ def fit(
         from thermocomp.files import modelfile
     refuse_existing([output], overwrite, recordings, ".json")
     trouble = tell_trouble(tests)
-    samples = study.samples(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
     judging = study.judging(samples)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
@@ -297,7 +301,7 @@ def fit(
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
-        out.show_fit(result, output, trouble, _console, as_json=json)
+        out.show_fit(result, samples, output, trouble, _console, as_json=json)
     return 0 if all(m.accepted for m in result.models) else 1
 
 
@@ -308,6 +312,7 @@ def assess(
     *,
     mapping: Path | None = None,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     json: Json = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
@@ -322,6 +327,8 @@ def assess(
         TOML file that says what the columns are.
     compensator : Compensator
         Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
     json : bool
         Print results for a machine instead of a table.
 
@@ -338,7 +345,9 @@ def assess(
     models = modelfile.read(model)
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
-        judged = studies.assess(models, tests, limits=compensator.limits(), progress=progress)
+        judged = studies.assess(
+            models, tests, limits=compensator.limits(), starts=beginning.of(tests, mapping), progress=progress
+        )
     out.show_assess(judged, trouble, _console, as_json=json)
     return 0 if all(a.accepted for a in judged.assessments) else 1
 
@@ -350,6 +359,7 @@ def compare(
     study: Study,
     models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -367,6 +377,8 @@ def compare(
         mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
     compensator : Compensator
         Its limits: what would run is judged, not the models alone.
+    beginning : Beginning
+        How the recordings begin.
     output : Path
         Report to write (.html).
     overwrite : bool
@@ -387,7 +399,7 @@ def compare(
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
-    samples = study.samples(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
     judging = study.judging(samples)
     with by_steps(comparing.n_pieces(samples, models, judging), hidden=json) as progress:
         comparison = comparing.compare(
@@ -397,7 +409,7 @@ def compare(
         with needs("study"):
             from thermocomp.report import html
         html.write(comparison, tests, output)
-    out.show_comparison(comparison, output, trouble, _console, as_json=json)
+    out.show_comparison(comparison, samples, output, trouble, _console, as_json=json)
     if comparison.left:
         return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1

@@ -13,17 +13,20 @@ from thermocomp.assessment.choice import Settings
 from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.zero import Zeroing
 
 if TYPE_CHECKING:
     from thermocomp.assessment.splits import Judging
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
+    from thermocomp.recording.starts import Start
 
 _stderr = Console(stderr=True, highlight=False)
 
 Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
 Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
 OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
+OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
@@ -51,6 +54,8 @@ class Study:
         Judge on each recording in turn.
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
+    zero_over : float
+        Average that start over so long, while the spindle stands [s]; 0: it is the first row.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     """
@@ -62,15 +67,20 @@ class Study:
     leave_one_cycle_out: Flag = False
     leave_one_file_out: Flag = False
     absolute: Flag = False
+    zero_over: float = Zeroing.at_rest
     jobs: int = -1
 
-    def samples(self, tests: "list[Recording]") -> "Samples":
-        """Stack the tests."""
+    def samples(self, tests: "list[Recording]", start: "Start | None" = None) -> "Samples":
+        """Stack the tests, which begin as stated, or as found out."""
         from thermocomp.recording.samples import stack
 
         if self.jobs == 0:
             raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
-        return stack(tests, self.target, self.inputs, rezero=not self.absolute)
+        speed = tests[0].speed
+        zeroing = Zeroing(
+            self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
+        )
+        return stack(tests, self.target, self.inputs, rezero=not self.absolute, zeroing=zeroing, starts=start)
 
     def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""

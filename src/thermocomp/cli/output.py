@@ -20,6 +20,8 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.starts import Start
 from thermocomp.report.running import told
 from thermocomp.report.summary import cautions
 
@@ -27,12 +29,20 @@ _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
 
 def show_comparison(
-    comparison: Comparison, report: Path | None, trouble: Sequence[str], console: Console, *, as_json: bool
+    comparison: Comparison,
+    samples: Samples,
+    report: Path | None,
+    trouble: Sequence[str],
+    console: Console,
+    *,
+    as_json: bool,
 ) -> None:
     """Print a comparison of methods on unseen blocks."""
+    begins = list(zip(samples.test_names, samples.starts, strict=True))
     if as_json:
         content = {
             "judging": comparison.judging.name,
+            "starts": _starts(begins),
             "condition_number": comparison.collinearity.condition_number,
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
@@ -42,6 +52,7 @@ def show_comparison(
         }
         print_json(content, console)
         return
+    _tell_starts(begins, console)
     console.print(f"Judged on: {comparison.judging.name}")
     console.print(_assessment_table(comparison.assessments))
     console.print(_cycle_table(comparison.assessments))
@@ -124,13 +135,23 @@ def print_table(t: ChoiceTable, console: Console) -> None:
         console.print(escape(t.caption), style="dim")
 
 
-def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
+def show_fit(
+    fitted: Fitted, samples: Samples, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool
+) -> None:
     """Print models that were fitted and written."""
+    begins = list(zip(samples.test_names, samples.starts, strict=True))
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
-        content = {"judging": fitted.comparison.judging.name, "file": str(path), "trouble": trouble, "models": models}
+        content = {
+            "judging": fitted.comparison.judging.name,
+            "starts": _starts(begins),
+            "file": str(path),
+            "trouble": trouble,
+            "models": models,
+        }
         print_json(content, console)
         return
+    _tell_starts(begins, console)
     console.print(f"Judged on: {fitted.comparison.judging.name}")
     table = Table()
     for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):
@@ -160,12 +181,14 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     if as_json:
         content = {
             "seen_in_training": judged.seen,
+            "starts": _starts(judged.starts),
             "verdict_when_fitted": {m.target: m.honest_error.verdict for m in judged.models if m.honest_error},
             "trouble": trouble,
             "results": [_result(a) for a in judged.assessments],
         }
         print_json(content, console)
         return
+    _tell_starts(judged.starts, console)
     console.print(_assessment_table(judged.assessments))
     console.print(_cycle_table(judged.assessments))
     table = Table(title="Robustness: RMS in um")
@@ -192,6 +215,15 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             console.print(f"[red]refused when it was fitted[/] {escape(m.target)}: {escape(m.honest_error.reason)}")
+
+
+def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
+    for name, start in begins:
+        console.print(f"Start of {escape(start.told(name))}")
+
+
+def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
+    return [start.content(name) for name, start in begins]
 
 
 def show_check(

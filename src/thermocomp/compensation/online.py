@@ -2,7 +2,8 @@
 
 The way of a reading: gate (complete? finite? plausible? fresh? later than the last?) -> minus the reference state and
 `ErrorModel.step` per component -> minus sign -> limits -> `Correction`. What the gate turns away changes nothing: every
-correction stays where it was.
+correction stays where it was. The first readings after a start are averaged: they are what temperatures count from, and
+the corrections stay zero until it is known, as long as the spindle stands (`ErrorModel.zeroing`).
 """
 
 import math
@@ -17,8 +18,9 @@ import numpy as np
 from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, Input, State
+from thermocomp.core.model import ErrorModel, FloatArray, Input, State
 from thermocomp.core.reading import Reading
+from thermocomp.core.zero import Gathered
 
 #: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
 PLAUSIBLE: dict[str, tuple[float, float]] = {
@@ -46,6 +48,7 @@ class OnlineState(NamedTuple):
     corrections: tuple[Correction, ...]  #: in force, one per model
     time: float | None  #: of the last reading that passed the gate [s]
     clock: float | None  #: the latest at which the step was taken, whatever the gate said [s]
+    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
 
 
 class OnlineResult(NamedTuple):
@@ -71,14 +74,15 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
         m.check_not_refused()
-    return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
+    none = tuple(Correction(0.0) for _ in models)
+    return OnlineState(tuple(m.init() for m in models), none, None, None, tuple(Gathered() for _ in models))
 
 
 def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
     """Say why a reading must not be used; the empty string if it may.
 
     A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
-    first reading decides what counts as zero: there the temperatures as a whole (their median) have to be within `DAY`
+    first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within `DAY`
     of the zero of the training, and each of them as near to the others as it was then, give or take `MIN_SPAN` or its
     trained span. What nature sets no bounds to, a displacement or a bare number, has its trained range, widened by
     `WIDE` times its width.
@@ -117,7 +121,7 @@ def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence
     values : sequence of shape (n_inputs,)
         As a source gave them; None is a value that is missing.
     reference : sequence of float of shape (n_inputs,)
-        What counts as zero; nan where the first reading is to decide it.
+        What counts as zero; nan where it is not known yet.
 
     Returns
     -------
@@ -163,7 +167,7 @@ def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) 
 def plausible(channel: Input, zero: float) -> tuple[float, float]:
     """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
 
-    `zero` is what counts as zero now; nan before the first reading, which decides it.
+    `zero` is what counts as zero now; nan while it is not known.
     """
     low, high = PLAUSIBLE.get(channel.quantity, ANY)
     if channel.quantity == "temperature" and not math.isnan(zero):
@@ -207,17 +211,47 @@ def step(
     dt = 0.0 if state.time is None else reading.time - state.time
     # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
     travel = 0.0 if state.clock is None else min(now - state.clock, limits.reading_age)
-    states, corrections, outside = [], [], []
-    for model, memory, current in zip(models, state.models, state.corrections, strict=True):
+    states, corrections, begins, outside = [], [], [], []
+    for k, (model, current) in enumerate(zip(models, state.corrections, strict=True)):
+        memory = state.models[k]
         values = np.array([reading.values[i.name] for i in model.inputs])
-        after, deviation = model.step(memory, values, dt)
-        wanted = Correction.opposing(Deviation(float(deviation)))
-        states.append(after)
-        corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
-        if after.outside.any():
-            outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-    new = OnlineState(tuple(states), tuple(corrections), reading.time, _later(state.clock, now))
+        gathered, known = state.gathered[k], True
+        if memory.memory is None and np.isnan(memory.reference).any():
+            resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
+            memory, gathered, known = _zeroed(model, memory, gathered, (reading.time, values, resting))
+        begins.append(gathered)
+        if known:
+            after, deviation = model.step(memory, values, dt)
+            wanted = Correction.opposing(Deviation(float(deviation)))
+            states.append(after)
+            corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
+            if after.outside.any():
+                outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
+        else:
+            states.append(memory)
+            corrections.append(current)
+    new = OnlineState(tuple(states), tuple(corrections), reading.time, _later(state.clock, now), tuple(begins))
     return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
+
+
+def _zeroed(
+    model: ErrorModel, memory: State, gathered: Gathered, reading: tuple[float, FloatArray, bool]
+) -> tuple[State, Gathered, bool]:
+    """Take a reading into the zero if it belongs there; return whether the zero is known now.
+
+    Once it is, the model goes through the readings before this one, as if it had been known from the first of them.
+    """
+    before = gathered
+    if gathered.belongs(model.zeroing, reading[0], reading[2]):
+        gathered = gathered.add(*reading)
+        if not gathered.complete(model.zeroing):
+            return memory, gathered, False
+    memory = memory._replace(reference=gathered.zero(memory.reference))
+    last = before.times[0] if before.times else 0.0
+    for time, values in zip(before.times, before.values, strict=True):
+        memory, _ = model.step(memory, values, time - last)
+        last = time
+    return memory, Gathered(), True
 
 
 def _later(clock: float | None, now: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.zero import FIRST_READING, Zeroing
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -31,8 +32,9 @@ class Input:
     reference : float
         Value that counts as zero [unit].
     rezero : bool
-        True: the first reading after a start (or a re-zeroing) replaces `reference`, as the temperatures of a drift
-        test are counted from its start; False: `reference` is absolute, as for a spindle speed.
+        True: the mean of the first readings after a start (or a re-zeroing) replaces `reference`, as the temperatures
+        of a drift test are counted from its start (`ErrorModel.zeroing`); False: `reference` is absolute, as for a
+        spindle speed.
     low, high : float
         Trained range of value minus reference [unit].
     """
@@ -100,6 +102,8 @@ class Provenance:
         thermocomp version that fitted it.
     source : str
         A publication, for models taken from one.
+    starts : tuple of str
+        How each of the recordings began: cold, continued, rezeroed or known; in the order of `data_sha256`.
     """
 
     method: str
@@ -109,6 +113,7 @@ class Provenance:
     rows: int = 0
     version: str = ""
     source: str = ""
+    starts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,8 @@ class ErrorModel(ABC):
         Where it comes from.
     honest_error : HonestError or None
         Error on unseen cycles; None if it was never judged.
+    zeroing : Zeroing
+        Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     """
 
     family: ClassVar[str]
@@ -186,6 +193,7 @@ class ErrorModel(ABC):
     support: Support = Support()
     provenance: Provenance | None = None
     honest_error: HonestError | None = None
+    zeroing: Zeroing = FIRST_READING
 
     def __post_init__(self) -> None:
         names = [i.name for i in self.inputs]

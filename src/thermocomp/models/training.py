@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,6 +81,7 @@ def train(
         raise FitError(
             f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
         )
+    _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
     estimator = how.build(speeds) if isinstance(name, str) else clone(name)
     begin = time.perf_counter()
@@ -104,7 +105,18 @@ def train(
         support=support,
         provenance=_provenance(how, estimator, samples, seen),
     )
-    return Trained(how.name, estimator, model, seconds, r_squared)
+    return Trained(how.name, estimator, replace(model, zeroing=samples.zeroing), seconds, r_squared)
+
+
+def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
+    """Refuse to learn from displacements whose zero lies somewhere on the way of a warm machine."""
+    for test in np.unique(samples.test[seen]).tolist() if samples.starts else []:
+        start = samples.starts[test]
+        if start.word == "rezeroed" and start.earlier:
+            raise FitError(
+                f"{samples.test_names[test]} was re-zeroed on a machine that went on from {start.earlier[-1].name}: "
+                "its displacements miss what had come until then. Such a test can judge (assess), not teach"
+            )
 
 
 def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen: BoolArray) -> Provenance:
@@ -117,4 +129,5 @@ def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, seen
         cycles=tuple(samples.cycle_names[c] for c in cycles),
         rows=int(seen.sum()),
         version=__version__,
+        starts=tuple(samples.starts[t].word for t in tests) if samples.starts else (),
     )

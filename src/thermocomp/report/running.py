@@ -3,15 +3,9 @@
 from collections.abc import Sequence
 
 from thermocomp.assessment.compare import Assessment
-from thermocomp.core.correction import Limits
 
 #: models of which it is said what they leave without gate and limits; there is a number for each in the JSON
 MOST = 4
-
-
-def limits_in_words(limits: Limits) -> str:
-    """Return limits as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""
-    return f"at most {limits.magnitude:g} um, {limits.rate:g} um/s, dead band {limits.dead_band:g} um"
 
 
 def told(assessments: Sequence[Assessment]) -> list[str]:
@@ -37,7 +31,7 @@ def told(assessments: Sequence[Assessment]) -> list[str]:
         more = f", {len(other) - MOST} more by less" if len(other) > MOST else ""
         alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
         lines.append(
-            f"Judged is what would run, behind the gate and with limits ({limits_in_words(limited[0].limits)}). RMS of "
+            f"Judged is what would run, behind the gate and with limits ({limited[0].limits.in_words()}). RMS of "
             f"the models alone: {alone_words}."
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
