@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, RecordingError
@@ -50,6 +50,7 @@ def test_the_first_row_of_each_test_has_no_row_before_it(steps: list[list[float]
     np.testing.assert_allclose(samples.dt()[~first], np.concatenate(steps), rtol=1e-9)
 
 
+@settings(deadline=None)
 @given(steps=TESTS, first_missing=st.integers(0, 2))
 def test_temperatures_are_counted_from_the_first_complete_row_of_their_test(
     steps: list[list[float]], first_missing: int
@@ -266,3 +267,15 @@ def test_files_that_follow_each_other(stamp: str, level: float, word: str) -> No
         own = (found.test == 0) & (found.cycle >= 0)
         assert found.time[own][0] == 2995.0
         assert np.isnan(found.deviations[(found.test == 0) & ~own]).all()
+
+
+def test_three_files_of_one_test() -> None:
+    """What the last one goes on from is both others, in the order of time."""
+    first = _drift(stamp="2026-03-01T08:00:00")
+    second = replace(_drift(50.7, stamp="2026-03-01T08:49:55"), name="second")
+    second.table["z_um"] = 50.7
+    third = replace(_drift(50.7, stamp="2026-03-01T09:39:50"), name="third")
+    found = stacking.stack([third, first, second], ["z_um"])
+    assert [[r.name for r in s.earlier] for s in found.starts] == [["d0", "second"], [], ["d0"]]
+    assert found.reference()[0].tolist() == found.reference()[1].tolist() == found.reference()[2].tolist()
+    assert found.time[found.test == 0][[0, 200, 400]].tolist() == [0.0, 2995.0, 5990.0]

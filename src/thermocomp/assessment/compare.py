@@ -19,6 +19,7 @@ from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -132,12 +133,15 @@ class Comparison:
         Of the temperatures.
     left : int
         Pairs of method and target that were not judged, because the work was stopped.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
     """
 
     judging: Judging
     assessments: tuple[Assessment, ...]
     collinearity: Collinearity
     left: int = 0
+    starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per target and method: over all its blocks."""
@@ -206,7 +210,8 @@ def compare(
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
-    return Comparison(judging, tuple(found), heat, left=len(pieces) // len(judging.splits) - whole)
+    left, begins = len(pieces) // len(judging.splits) - whole, zip(samples.test_names, samples.starts, strict=False)
+    return Comparison(judging, tuple(found), heat, left=left, starts=tuple(begins))
 
 
 def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging) -> int:

@@ -301,7 +301,7 @@ def fit(
         )
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
-        out.show_fit(result, samples, output, trouble, _console, as_json=json)
+        out.show_fit(result, output, trouble, _console, as_json=json)
     return 0 if all(m.accepted for m in result.models) else 1
 
 
@@ -409,7 +409,7 @@ def compare(
         with needs("study"):
             from thermocomp.report import html
         html.write(comparison, tests, output)
-    out.show_comparison(comparison, samples, output, trouble, _console, as_json=json)
+    out.show_comparison(comparison, output, trouble, _console, as_json=json)
     if comparison.left:
         return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1

@@ -20,7 +20,6 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.quality import Finding
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
 from thermocomp.recording.starts import Start
 from thermocomp.report.running import told
 from thermocomp.report.summary import cautions
@@ -30,7 +29,6 @@ _SEVERITY = {"trouble": "bold red", "warning": "yellow", "info": "dim"}
 
 def show_comparison(
     comparison: Comparison,
-    samples: Samples,
     report: Path | None,
     trouble: Sequence[str],
     console: Console,
@@ -38,11 +36,10 @@ def show_comparison(
     as_json: bool,
 ) -> None:
     """Print a comparison of methods on unseen blocks."""
-    begins = list(zip(samples.test_names, samples.starts, strict=True))
     if as_json:
         content = {
             "judging": comparison.judging.name,
-            "starts": _starts(begins),
+            "starts": _starts(comparison.starts),
             "condition_number": comparison.collinearity.condition_number,
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
@@ -52,7 +49,7 @@ def show_comparison(
         }
         print_json(content, console)
         return
-    _tell_starts(begins, console)
+    _tell_starts(comparison.starts, console)
     console.print(f"Judged on: {comparison.judging.name}")
     console.print(_assessment_table(comparison.assessments))
     console.print(_cycle_table(comparison.assessments))
@@ -135,23 +132,20 @@ def print_table(t: ChoiceTable, console: Console) -> None:
         console.print(escape(t.caption), style="dim")
 
 
-def show_fit(
-    fitted: Fitted, samples: Samples, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool
-) -> None:
+def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
     """Print models that were fitted and written."""
-    begins = list(zip(samples.test_names, samples.starts, strict=True))
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
         content = {
             "judging": fitted.comparison.judging.name,
-            "starts": _starts(begins),
+            "starts": _starts(fitted.comparison.starts),
             "file": str(path),
             "trouble": trouble,
             "models": models,
         }
         print_json(content, console)
         return
-    _tell_starts(begins, console)
+    _tell_starts(fitted.comparison.starts, console)
     console.print(f"Judged on: {fitted.comparison.judging.name}")
     table = Table()
     for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):

@@ -172,12 +172,16 @@ def find(
     InputError
         It cannot be told, and a model begun at zero would be wrong by it.
     """
-    return tuple(
-        Start("known", "temperatures are taken as they are")
-        if absolute
-        else _found(r, [o for o in recordings if o is not r], targets, zeroing)
-        for r in recordings
-    )
+    if absolute:
+        return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
+    found = {id(r): _found(r, [o for o in recordings if o is not r], targets, zeroing) for r in recordings}
+
+    def whole(start: Start) -> Start:
+        """Return a start with all that went before: what it continues may be a continuation itself."""
+        before = found[id(start.earlier[0])] if start.earlier else start
+        return replace(start, earlier=(*whole(before).earlier, *start.earlier)) if before.earlier else start
+
+    return tuple(whole(found[id(r)]) for r in recordings)
 
 
 def resting(recording: Recording, zeroing: Zeroing) -> BoolArray:

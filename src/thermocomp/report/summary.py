@@ -37,6 +37,7 @@ def summarise(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
         "verdict": verdict(comparison),
         "cautions": cautions(comparison),
         "running": told(comparison.overall()),
+        "starts": [start.told(name) for name, start in comparison.starts],
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t) for t in targets],
         "recordings": [_recording(r) for r in recordings],
