@@ -13,6 +13,7 @@ import numpy as np
 
 from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.files import recordings
 from thermocomp.recording.samples import stack
 
@@ -34,7 +35,7 @@ def main() -> int:
         return 0
     begin = time.perf_counter()
     targets = [f"ch{k}_um" for k in range(1, 6)]
-    samples = stack([recordings.read(path)], targets)
+    samples = stack([recordings.read(path)], targets, zeroing=FIRST_READING)  # as in the published study
     methods = ["ols", "partial-f", "mra", "dynamic"]
     result = compare(samples, methods, splits.parse("0.75/0.25", samples), robustness=False, jobs=-1)
     seconds = time.perf_counter() - begin

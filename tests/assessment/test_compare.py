@@ -8,18 +8,21 @@ import pytest
 
 from smallmachine import small_machine
 from thermocomp.assessment import splits, study
-from thermocomp.assessment.compare import ALL, compare, n_pieces
-from thermocomp.assessment.replay import replay
+from thermocomp.assessment.compare import ALL, compare, judge, n_pieces
+from thermocomp.assessment.replay import replay, run
 from thermocomp.assessment.robustness import Robustness, pooled, stress
 from thermocomp.compensation import online
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.machine import Channel
 from thermocomp.core.model import Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
+from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
@@ -150,6 +153,88 @@ def test_replay_is_what_the_online_step_commands(samples: Samples) -> None:
         state, result = online.step([model], limits, state, reading, reading.time)
         if k:
             assert result.corrections["z_um"].offset == -predicted[k]
+
+
+def test_judged_is_what_would_run(recording: Recording, samples: Samples) -> None:
+    """Gate and limits are in the figures; the model alone is beside them."""
+    everything = np.ones(len(samples), np.bool_)
+    model = train("dynamic", samples, 0, everything).model
+    limits = Limits(magnitude=8.0, rate=0.002, dead_band=0.5)
+    state, names, commanded = online.start([model]), [c.name for c in samples.inputs], []
+    for k in range(len(samples)):
+        reading = Reading(samples.time[k], dict(zip(names, samples.values[k].tolist(), strict=True)))
+        state, result = online.step([model], limits, state, reading, reading.time)
+        commanded.append(-result.corrections["z_um"].offset)
+    everywhere = splits.Split("all", ~everything, everything)
+    a = judge("dynamic", model, samples, everywhere, robustness=False, limits=limits)
+    assert a.predicted.tolist() == commanded
+    assert a.limits == limits
+    assert a.alone is not None
+    assert np.array_equal(a.alone, replay(model, samples, everything)[0])
+    assert a.metric("rms") > 3 * a.alone_metric("rms")
+    alone = judge("dynamic", model, samples, everywhere, robustness=False, limits=None)
+    assert np.array_equal(alone.predicted, a.alone)
+    spiked = recording.table.copy()
+    spiked.loc[500, "t1_C"] = 120.0
+    other = stack([replace(recording, table=spiked)], ["z_um", "x_um"])
+    b = judge("dynamic", model, other, everywhere, robustness=False)
+    assert b.rejected == 1
+    assert b.turned_away == "small: t1_C = 120.0 degC is not plausible"
+    assert b.predicted[500] == b.predicted[499]
+    assert b.alone is not None
+    assert abs(b.alone[500] - b.alone[499]) > 3.0
+
+
+def test_clipping_does_not_make_a_model_pass(samples: Samples) -> None:
+    """A model that says the contrary, held to 0.01 um: what runs does nothing, and the model is not let pass."""
+    everything = np.ones(len(samples), np.bool_)
+    good = train("dynamic", samples, 0, everything).model
+    assert isinstance(good, LinearDynamic)
+    wild = replace(good, direct=tuple(5 * v for v in good.direct), lagged=tuple(5 * v for v in good.lagged))
+    measured = samples.deviations[:, 0]
+    four_times = splits.Split("all", ~everything, everything)
+    a = judge("wild", wild, samples, four_times, robustness=False, limits=Limits(magnitude=3.0))
+    assert a.metric("rms") < a.none_metric("rms") < a.alone_metric("rms")
+    for cycle in range(len(samples.cycle_names)):  # clipped, it does good in every cycle
+        mine = samples.cycle == cycle
+        assert np.mean((measured - a.predicted)[mine] ** 2) < np.mean(measured[mine] ** 2)
+    assert a.word == "refused"
+    assert a.reason.startswith("does harm in")
+    # and the other way round: the limits that keep a good one from working are in its verdict
+    slow = judge("slow", good, samples, four_times, robustness=False, limits=Limits(magnitude=0.01))
+    for cycle, verdict in enumerate(slow.verdict.units):
+        mine = samples.cycle == cycle
+        assert verdict.rms == pytest.approx(np.sqrt(np.mean((measured - slow.predicted)[mine] ** 2)))
+        assert verdict.rms > 0.9 * verdict.none_rms
+
+
+def test_a_slowly_recorded_test_does_not_hold_the_compensator_back(recording: Recording) -> None:
+    """A row every 20 min: live, readings come in between, so the correction has all that time to move."""
+    every = np.arange(0, len(recording), 20)
+    sparse = replace(
+        recording,
+        time=recording.time[every],
+        table=recording.table.iloc[every].reset_index(drop=True),
+        cycles=(Cycle("1", 0, len(every)),),
+    )
+    samples = stack([sparse], ["z_um"])
+    model = train("ols", samples, 0, np.ones(len(samples), np.bool_)).model
+    everything = np.ones(len(samples), np.bool_)
+    ran = run(model, samples, everything, Limits(rate=0.1))
+    assert np.abs(np.diff(ran.deviation)).max() > 0.1 * 60.0  # the travel of one reading that comes on time
+    assert np.array_equal(ran.compensated[1:], ran.deviation[1:])
+
+
+def test_an_angle_has_no_limits_of_micrometres(recording: Recording) -> None:
+    tilt = replace(recording, channels=tuple(
+        Channel("z_urad", "angle", "urad") if c.name == "z_um" else c for c in recording.channels
+    ), table=recording.table.rename(columns={"z_um": "z_urad"}))  # fmt: skip
+    samples = stack([tilt], ["z_urad"])
+    everything = np.ones(len(samples), np.bool_)
+    model = train("dynamic", samples, 0, everything).model
+    ran = run(model, samples, everything, Limits(magnitude=0.01))
+    assert ran.limits is None
+    assert np.array_equal(ran.compensated, ran.deviation)
 
 
 def test_stress_finds_the_sensor_that_matters(samples: Samples) -> None:

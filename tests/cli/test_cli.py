@@ -184,12 +184,12 @@ def test_a_refused_model_gives_exit_code_one(tmp_path: Path, capsys: pytest.Capt
     table["z_um"] = 5.0 * (-1.0) ** (recording.table.index // 200)  # nothing the temperatures could explain
     path = tmp_path / "noise.csv"
     recordings.write(type(recording)(recording.name, recording.time, table, recording.channels, recording.cycles), path)
-    model = tmp_path / "model.json"
-    assert run(["fit", str(path), "--target", "z_um", "--model", "ols", "--jobs", "1", "-o", str(model)]) == 1
+    model, cold = tmp_path / "model.json", ["--start", "cold"]
+    assert run(["fit", str(path), "--target", "z_um", "--model", "ols", "--jobs", "1", *cold, "-o", str(model)]) == 1
     assert "refused" in capsys.readouterr().out
     (frozen,) = modelfile.read(model)
     assert not frozen.accepted
-    assert run(["compare", str(path), "--target", "z_um", "--models", "ols", "--jobs", "1"]) == 1
+    assert run(["compare", str(path), "--target", "z_um", "--models", "ols", "--jobs", "1", *cold]) == 1
     assert "no model may run yet" in capsys.readouterr().out
 
 

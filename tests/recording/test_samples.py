@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
+from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.recording import samples as stacking
 from thermocomp.recording.cycles import Cycle, whole
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.starts import COLD, Start
 
 CHANNELS = (
     Channel("t1_C", "temperature", "degC"),
@@ -20,6 +23,11 @@ CHANNELS = (
     Channel("t2_C", "temperature", "degC"),
     Channel("z_um", "displacement", "um"),
 )
+
+
+def stack(recordings: list[Recording], targets: list[str], inputs: list[str] | None = None, **how: bool) -> Samples:
+    """Stack tests of random numbers: their zero is the first row, and they begin cold whatever they measured there."""
+    return stacking.stack(recordings, targets, inputs, zeroing=FIRST_READING, starts=COLD, **how)
 
 
 def _test(name: str, steps: list[float], seed: int, first_missing: int = 0) -> Recording:
@@ -42,6 +50,7 @@ def test_the_first_row_of_each_test_has_no_row_before_it(steps: list[list[float]
     np.testing.assert_allclose(samples.dt()[~first], np.concatenate(steps), rtol=1e-9)
 
 
+@settings(deadline=None)
 @given(steps=TESTS, first_missing=st.integers(0, 2))
 def test_temperatures_are_counted_from_the_first_complete_row_of_their_test(
     steps: list[list[float]], first_missing: int
@@ -171,3 +180,102 @@ def test_a_recording_that_contradicts_itself_is_refused(
         Recording("a", np.array(time), table, CHANNELS, cycles)
     with pytest.raises(RecordingError, match="table columns and channels differ"):
         Recording("a", np.array([0.0, 1.0]), table, CHANNELS[:2], whole(2))
+
+
+def _drift(start: float = 0.0, *, at_rest: int = 30, interval: float = 15.0, stamp: str = "") -> Recording:
+    """Return a test that stands for some rows and then warms up; its readings are noisy."""
+    rng, n = np.random.default_rng(0), 200
+    warm = np.maximum(np.arange(n) - at_rest, 0) * 0.1
+    columns = [
+        20 + warm + 0.4 * rng.normal(size=n), np.where(np.arange(n) < at_rest, 0.0, 3000.0),
+        21 + warm + 0.4 * rng.normal(size=n), start + 3 * warm + 0.1 * rng.normal(size=n),
+    ]  # fmt: skip
+    table = pd.DataFrame(dict(zip((c.name for c in CHANNELS), columns, strict=True)))
+    return Recording(f"d{start:g}", np.array([interval * k for k in range(n)]), table, CHANNELS, whole(n), start=stamp)
+
+
+def test_the_zero_is_the_mean_over_five_minutes_at_rest() -> None:
+    recording = _drift()
+    values = recording.table[["t1_C", "t2_C"]].to_numpy()
+    found = stacking.stack([recording], ["z_um"])
+    assert found.zeroing == Zeroing(300.0, 10.0, "spindle_rpm")
+    assert found.reference()[0] == pytest.approx([*values[:21].mean(axis=0), 0.0], abs=1e-12)
+    assert found.deviations[:, 0].tolist() == recording.table["z_um"].tolist()  # what is measured stays as it is
+    longer = stacking.stack([recording], ["z_um"], zeroing=Zeroing(1e4, 0.0, "spindle_rpm"))
+    assert longer.reference()[0] == pytest.approx([*values[:30].mean(axis=0), 0.0], abs=1e-12)
+    short = stacking.stack([_drift(at_rest=5)], ["z_um"])
+    assert short.reference()[0][0] == pytest.approx(_drift(at_rest=5).table["t1_C"][:5].mean())
+
+
+def test_what_starts_at_once_has_its_first_row_for_a_zero() -> None:
+    for recording in (_drift(at_rest=0), replace(_drift(at_rest=0, interval=60.0), name="slow")):
+        assert stacking.stack([recording], ["z_um"]).reference()[0][0] == recording.table["t1_C"][0]
+    quick = _drift(at_rest=0, interval=2.0)
+    assert stacking.stack([quick], ["z_um"]).reference()[0][0] == pytest.approx(quick.table["t1_C"][:6].mean())
+    mute = stacking.stack([_drift()], ["z_um"], ["t1_C"], zeroing=Zeroing())  # nothing says that it stands
+    assert mute.reference()[0][0] == _drift().table["t1_C"][0]
+
+
+def test_an_outlier_and_a_gap_are_not_in_the_zero() -> None:
+    recording = _drift()
+    recording.table.loc[4, "t1_C"] = 85.0
+    recording.table.loc[6, "t2_C"] = np.nan
+    rows = [k for k in range(21) if k not in (4, 6)]
+    assert stacking.stack([recording], ["z_um"]).reference()[0][0] == pytest.approx(
+        recording.table["t1_C"][rows].mean()
+    )
+
+
+@pytest.mark.parametrize(("level", "word"), [(0.0, "cold"), (2.5, "cold"), (5.0, "cold"), (6.0, ""), (-20.0, "")])
+def test_a_displacement_that_does_not_begin_near_zero(level: float, word: str) -> None:
+    """Its range is 51 um: a tenth of it is taken for zero."""
+    recording = _drift(level)
+    if word:
+        assert stacking.stack([recording], ["z_um"]).starts[0].word == word
+        return
+    with pytest.raises(InputError, match=rf"d{level:g}: z_um begins at {level:.1f} um, so it was not zeroed"):
+        stacking.stack([recording], ["z_um"])
+    assert stacking.stack([recording], ["z_um"], rezero=False).starts[0].word == "known"  # its zero is that of 20 degC
+    anew = stacking.stack([recording], ["z_um"], starts=Start("rezeroed"))
+    assert anew.deviations[:21].mean() == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "level", "word"),
+    [
+        ("2026-03-01T08:49:55", 50.7, "continued"),
+        ("2026-03-01T08:49:55", 0.0, "rezeroed"),
+        ("2026-03-01T09:09:55", 50.7, ""),  # twenty minutes later is another day
+        ("2026-03-01T08:40:00", 50.7, ""),  # before the end of the first
+        ("2026-03-01T08:49:55", 20.0, ""),  # not where the first ended
+        ("", 50.7, ""),
+    ],
+)
+def test_files_that_follow_each_other(stamp: str, level: float, word: str) -> None:
+    first, second = _drift(stamp="2026-03-01T08:00:00"), _drift(level, stamp=stamp)
+    second = replace(second, name="second", time=second.time + 0.0)
+    second.table["t1_C"] += 0.01
+    if not word:
+        with pytest.raises(InputError, match="second: z_um begins at"):
+            stacking.stack([second, first], ["z_um"])
+        return
+    found = stacking.stack([second, first], ["z_um"])
+    assert [s.word for s in found.starts] == [word, "cold"]
+    assert (found.cycle < 0).sum() == (200 if word == "continued" else 0)
+    assert found.test.tolist() == sorted(found.test.tolist())
+    if word == "continued":
+        own = (found.test == 0) & (found.cycle >= 0)
+        assert found.time[own][0] == 2995.0
+        assert np.isnan(found.deviations[(found.test == 0) & ~own]).all()
+
+
+def test_three_files_of_one_test() -> None:
+    """What the last one goes on from is both others, in the order of time."""
+    first = _drift(stamp="2026-03-01T08:00:00")
+    second = replace(_drift(50.7, stamp="2026-03-01T08:49:55"), name="second")
+    second.table["z_um"] = 50.7
+    third = replace(_drift(50.7, stamp="2026-03-01T09:39:50"), name="third")
+    found = stacking.stack([third, first, second], ["z_um"])
+    assert [[r.name for r in s.earlier] for s in found.starts] == [["d0", "second"], [], ["d0"]]
+    assert found.reference()[0].tolist() == found.reference()[1].tolist() == found.reference()[2].tolist()
+    assert found.time[found.test == 0][[0, 200, 400]].tolist() == [0.0, 2995.0, 5990.0]

@@ -1,6 +1,6 @@
 """Compare methods on unseen blocks: train, replay, judge."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +12,11 @@ from thermocomp.assessment.coverage import cover
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
-from thermocomp.assessment.replay import replay
+from thermocomp.assessment.replay import run
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import pooled, stress
 from thermocomp.assessment.splits import Judging, Split, called, stretches
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel, Support
@@ -40,6 +41,7 @@ def compare(
     rules: Rules = Rules(),
     support: Support = Support(),
     robustness: bool = True,
+    limits: Limits | None = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
@@ -60,6 +62,8 @@ def compare(
         What the models do outside their trained range.
     robustness : bool
         Also replay with noise and lost sensors.
+    limits : Limits or None
+        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -82,7 +86,10 @@ def compare(
     targets, n = range(len(samples.targets)), len(judging.splits)
     pieces = [(k, name, split) for k in targets for name in names for split in judging.splits]
     done: list[Assessment] = []
-    work = (delayed(_assess_method)(samples, name, k, split, rules, support, robustness) for k, name, split in pieces)
+    work = (
+        delayed(_assess_method)(samples, name, k, split, rules, support, robustness, limits)
+        for k, name, split in pieces
+    )
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = _inners(names, judging, rules)
     try:
@@ -112,7 +119,14 @@ def compare(
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
-    return Comparison(judging, tuple(found), heat, left=len(pieces) // n - whole, recommended=tuple(recommended))
+    return Comparison(
+        judging,
+        tuple(found),
+        heat,
+        left=len(pieces) // n - whole,
+        recommended=tuple(recommended),
+        starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
+    )
 
 
 def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
@@ -162,8 +176,12 @@ def judge(
     rules: Rules = Rules(),
     fit_s: float = 0.0,
     robustness: bool = True,
+    limits: Limits | None = Limits(),
 ) -> Assessment:
-    """Judge a frozen model on a block.
+    """Judge a frozen model on a block: what a compensator with it would have left there.
+
+    The verdict is taken, in each part that is judged, on the worse of what would run and the model alone: a model does
+    not pass because limits clip what it says.
 
     Parameters
     ----------
@@ -182,6 +200,8 @@ def judge(
         The fit took [s].
     robustness : bool
         Also replay with noise and lost sensors.
+    limits : Limits or None
+        Of the compensator; None: the model alone is judged.
 
     Returns
     -------
@@ -196,9 +216,11 @@ def judge(
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
     stressed = stress(model, samples, measured, rows) if robustness else None
-    predicted = stressed.predicted if stressed else replay(model, samples, rows)[0]
-    if not np.isfinite(metrics.rms(measured, predicted)):
+    ran = run(model, samples, rows, limits or Limits())
+    predicted = ran.deviation if limits is None else ran.compensated
+    if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+    segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
     return Assessment(
         model=name,
         target=model.target,
@@ -210,16 +232,19 @@ def judge(
         cycle=samples.cycle[rows],
         verdict=harm.Verdict(
             units=tuple(
-                harm.measure(
-                    unit,
-                    measured[mine],
-                    predicted[mine],
-                    learned or samples.learned(target, rows),
-                    unit=model.unit,
-                    margin=rules.margin,
-                    stretch=split.stretch,
+                _worse(
+                    harm.measure(
+                        unit,
+                        measured[mine],
+                        run_or_alone[mine],
+                        learned or samples.learned(target, rows),
+                        unit=model.unit,
+                        margin=rules.margin,
+                        stretch=split.stretch,
+                    )
+                    for run_or_alone in (predicted, ran.deviation)
                 )
-                for unit, mine in ([(split.name, rows[rows])] if split.whole else _segments(samples, rows))
+                for unit, mine in segments
                 if mine.sum() >= harm.MIN_ROWS
             ),
             unit=model.unit,
@@ -232,7 +257,18 @@ def judge(
         n_effective=effective_sample_size(measured - predicted),
         robustness=stressed.robustness if stressed else None,
         frozen=model,
+        alone=ran.deviation,
+        limits=None if limits is None else ran.limits,
+        rejected=0 if limits is None else int(ran.rejected.sum()),
+        turned_away="" if limits is None else ran.why,
     )
+
+
+def _worse(both: Iterable[harm.Unit]) -> harm.Unit:
+    """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
+    ran, alone = both
+    rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
+    return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
 def _alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
@@ -266,6 +302,7 @@ def per_cycle(whole: Assessment) -> list[Assessment]:
                 block=f"cycle {unit.name}",
                 measured=measured,
                 predicted=predicted,
+                alone=None if whole.alone is None else whole.alone[rows],
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],
@@ -279,7 +316,14 @@ def per_cycle(whole: Assessment) -> list[Assessment]:
 
 
 def _assess_method(
-    samples: Samples, name: str, target: int, split: Split, rules: Rules, support: Support, robustness: bool
+    samples: Samples,
+    name: str,
+    target: int,
+    split: Split,
+    rules: Rules,
+    support: Support,
+    robustness: bool,
+    limits: Limits | None,
 ) -> Assessment:
     try:
         trained = train(name, samples, target, split.learn, support=support)
@@ -296,6 +340,7 @@ def _assess_method(
         rules=rules,
         fit_s=trained.seconds,
         robustness=robustness,
+        limits=limits,
     )
 
 
@@ -347,6 +392,9 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         fit_s=sum(a.fit_s for a in parts),
         n_effective=sum(a.n_effective for a in parts),
         robustness=pooled([(a.robustness, len(a.measured)) for a in parts]),
+        alone=np.concatenate([a.predicted if a.alone is None else a.alone for a in parts]),
+        rejected=sum(a.rejected for a in parts),
+        turned_away=next((a.turned_away for a in parts if a.turned_away), ""),
         frozen=None,
         failure=failures[0] if failures else "",
         overall=True,

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.averaging import WINDOW, course
-from thermocomp.assessment.leaks import learned_from
-from thermocomp.assessment.replay import replay
+from thermocomp.assessment.iso230_models import left_by
 from thermocomp.assessment.thermaltest import HOUR, Curve, Kind, Pair, Targets, ThermalTest, figures_of
 from thermocomp.assessment.timeconstants import Phase, drive, find_phases, settle
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]
 
@@ -92,6 +92,8 @@ def assess(
     pairs: Sequence[Pair] = (),
     ambient: str | None = None,
     models: Sequence[ErrorModel] = (),
+    start: Start | None = None,
+    limits: Limits = Limits(),
 ) -> tuple[ThermalTest, ...]:
     """Evaluate the thermal tests that a recording holds.
 
@@ -109,7 +111,11 @@ def assess(
         Temperature of the surroundings; that of `find_ambient` if not given.
     models : sequence of ErrorModel
         Of displacements or angles of the recording: what they leave is told beside each quantity. They are replayed
-        reading by reading from the start of the recording, as they would run at the machine.
+        reading by reading from the start of the recording, as a compensator would run them.
+    start : Start, optional
+        How the recording begins; found out if not given.
+    limits : Limits
+        Of the compensator.
 
     Returns
     -------
@@ -119,7 +125,8 @@ def assess(
     Raises
     ------
     InputError
-        There is no displacement, a channel is not there, or no model belongs to the recording.
+        There is no displacement, a channel is not there, no model belongs to the recording, or it cannot be told how
+        the recording begins, which matters to a model.
     """
     kind = detect(recording) if kind is None else kind
     if not _probes(recording):
@@ -134,7 +141,7 @@ def assess(
     if air is not None and air.quantity != "temperature":
         raise InputError(f"{recording.name}: {air.name} is a {air.quantity}; the ambient channel is a temperature")
     pairs = tuple(replace(p, tip=find_probe(recording, p.tip), spindle=find_probe(recording, p.spindle)) for p in pairs)
-    residuals, notes = _residuals(recording, models)
+    residuals, notes = left_by(recording, models, start, limits)
     notes += _about(recording, kind, pairs, air)
     phases = find_phases(recording) if kind != "etve" else ()
     starts = [k for k, p in enumerate(phases) if p.kind == "warm-up"]
@@ -249,39 +256,6 @@ def _evaluate(
         ambient_range=(float(known.min()), float(known.max())) if known.size else (float("nan"), float("nan")),
         notes=tuple(notes),
     )
-
-
-def _residuals(recording: Recording, models: Sequence[ErrorModel]) -> tuple[dict[str, FloatArray], list[str]]:
-    """Return what each model leaves of its channel, by channel, and what must be said of the models."""
-    found: dict[str, FloatArray] = {}
-    notes = []
-    names = {c.name for c in recording.channels}
-    for model in models:
-        target = recording.aliases.get(model.target, model.target)
-        if target not in names:
-            notes.append(f"the model of {model.target} has nothing to do here: there is no such channel")
-            continue
-        samples = stack(
-            [recording], [target], [i.name for i in model.inputs], rezero=any(i.rezero for i in model.inputs)
-        )
-        predicted, outside = replay(model, samples, np.ones(len(samples), dtype=np.bool_))
-        found[target] = samples.deviations[:, 0] - predicted
-        known = learned_from(model, samples)
-        if known.all():
-            notes.append(f"the model of {target} was fitted to this very recording: what it leaves is no honest test")
-        elif known.any():
-            told = f"{known.sum():,} of {len(known):,} rows were learned from"
-            notes.append(f"the model of {target}: {told}: what it leaves there is no honest test")
-        if model.honest_error is not None and not model.accepted:
-            notes.append(f"the model of {target} was refused when it was fitted: {model.honest_error.reason}")
-        if outside.mean() > 0.1:
-            share = f"{100 * outside.mean():.0f} % of the rows"
-            notes.append(f"the model of {target}: {share} are outside the range it was trained in")
-    if models and not found:
-        raise InputError(
-            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, none of them a channel here"
-        )
-    return found, notes
 
 
 def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel | None) -> list[str]:

@@ -1,11 +1,15 @@
-"""Replay: every prediction that is judged comes out of `ErrorModel.step`, reading by reading, as it would live."""
+"""Replay: what is judged comes out of `ErrorModel.step` and the compensator around it, as it would live."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.compensation import batch
+from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.zero import centre, first_rows
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -13,6 +17,77 @@ BoolArray = NDArray[np.bool_]
 
 #: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets the test's reference too
 Disturb = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """What would have run in the rows that are judged.
+
+    Parameters
+    ----------
+    deviation : ndarray of shape (n_wanted,)
+        What the model alone says: no gate but for missing values, no limits [its unit].
+    compensated : ndarray of shape (n_wanted,)
+        Minus the correction that the compensator had in force: gate, model, limits [its unit].
+    outside : ndarray of bool of shape (n_wanted,)
+        An input was outside the trained range.
+    rejected : ndarray of bool of shape (n_wanted,)
+        The gate turned the reading away, though it was complete.
+    why : str
+        The first reading it turned away; empty if none.
+    limits : Limits or None
+        None: they were not applied, because the model does not predict micrometres.
+    """
+
+    deviation: FloatArray
+    compensated: FloatArray
+    outside: BoolArray
+    rejected: BoolArray
+    why: str
+    limits: Limits | None
+
+
+def run(model: ErrorModel, samples: Samples, rows: BoolArray, limits: Limits = Limits()) -> Replayed:
+    """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
+
+    A live compensator gets its readings more often than every `Limits.reading_age`, however slowly a test was recorded:
+    rows that lie further apart count as so many readings on time, so the rate limit has the whole time between them.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+        Rows that are judged.
+    limits : Limits
+        Of the corrections [um]; a model of another unit runs without them, behind the gate.
+
+    Returns
+    -------
+    Replayed
+    """
+    columns, within = _columns(model, samples), limits if model.unit == "um" else None
+    n, why = len(samples), ""
+    deviation, compensated = np.zeros(n), np.zeros(n)
+    outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    for test in np.unique(samples.test[rows]):
+        mine = _until(samples, rows, test, model, columns)
+        time, anew = samples.time[mine], samples.anew(test)
+        step = float(np.median(np.diff(time))) if len(mine) > 1 else 0.0
+        found = batch.run(
+            model,
+            within and replace(within, reading_age=max(within.reading_age, step)),
+            time,
+            samples.values[mine][:, columns],
+            reference=_reference(samples, columns, test),
+            resting=samples.stands[mine],
+            anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
+        )
+        deviation[mine], compensated[mine] = found.deviation, found.compensated
+        outside[mine], rejected[mine] = found.outside, found.rejected
+        if found.why and not why:
+            why = f"{samples.test_names[test]}: {found.why}"
+    return Replayed(deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within)
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -42,9 +117,9 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
 def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
     """Step a model through the tests that hold `rows`; yield its state at each wanted row, in their order.
 
-    The compensator runs without a break from the start of a test, as it would on the machine; its only inputs are those
-    of `samples`, never a displacement. A row with a missing input is what the gate turns away live: the last deviation
-    is held.
+    The model runs without a break from the start of a test, or of the files that it goes on from, as it would on the
+    machine; its only inputs are those of `samples`, never a displacement. A row with a missing input is what the gate
+    turns away live: the last deviation is held. A test that counts anew is told minus what the model says there.
 
     Parameters
     ----------
@@ -59,30 +134,95 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     ------
     State
     """
-    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
-    values = samples.values[:, columns]
+    columns = _columns(model, samples)
+    values, reference = samples.values[:, columns], samples.reference()[:, columns]
     usable = np.all(np.isfinite(values), axis=1)
-    reference = samples.reference()[:, columns]
     for test in np.unique(samples.test[rows]):
-        mine = np.flatnonzero(samples.test == test)
-        mine = mine[: np.flatnonzero(rows[mine]).max() + 1]
-        state, last = model.init(None if samples.zero is None else reference[test]), samples.time[mine[0]]
-        for k, needed in zip(mine, _needed(model, usable[mine], rows[mine]), strict=True):
+        mine = _until(samples, rows, test, model, columns)
+        own = mine[mine >= anew] if (anew := samples.anew(test)) is not None else mine[:0]
+        window = _window(model, samples, own[usable[own]])
+
+        def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
+            return values[k] if disturb is None else disturb(values[k], zero)
+
+        state, head = _begun(model, samples, mine[usable[mine]], _reference(samples, columns, test), read)
+        last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
+        shift: FloatArray | float | None = None if window.size else 0.0
+        for k, needed in zip(
+            mine.tolist(), _needed(model, usable[mine], rows[mine] | np.isin(mine, window)), strict=True
+        ):
             if needed:
-                reading = values[k] if disturb is None else disturb(values[k], reference[test])
-                state, _ = model.step(state, reading, float(samples.time[k] - last))
+                state, _ = model.step(state, head.pop(k) if k in head else read(k), float(samples.time[k] - last))
                 last = samples.time[k]
+            if shift is None and k in window:
+                there.append(state.deviation)
+                shift = np.mean(there, axis=0) if k == window[-1] else None
             if rows[k]:
-                yield state
+                waiting.append(state)
+            if shift is not None:
+                yield from (s._replace(deviation=s.deviation - shift) for s in waiting)
+                waiting.clear()
+
+
+def absolute(models: Sequence[ErrorModel]) -> bool:
+    """Return whether models take temperatures as they are, so that the zero of a recording does not matter to them."""
+    heat = [i for m in models for i in m.inputs if i.quantity == "temperature"]
+    return bool(heat) and not any(i.rezero for i in heat)
+
+
+def _begun(
+    model: ErrorModel,
+    samples: Samples,
+    readings: NDArray[np.intp],
+    reference: FloatArray | None,
+    read: Callable[[int], FloatArray],
+) -> tuple[State, dict[int, FloatArray]]:
+    """Return the state that a test begins in, its zero being known, and the readings that the zero was taken of."""
+    state = model.init(reference)
+    if not np.isnan(state.reference).any():
+        return state, {}
+    head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
+    if head:
+        state = state._replace(
+            reference=np.where(np.isnan(state.reference), centre(list(head.values())), state.reference)
+        )
+    return state, head
+
+
+def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the first of some readings: those that a zero is taken of."""
+    return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
+
+
+def _columns(model: ErrorModel, samples: Samples) -> list[int]:
+    names = [c.name for c in samples.inputs]
+    return [names.index(i.name) for i in model.inputs]
+
+
+def _until(samples: Samples, rows: BoolArray, test: int, model: ErrorModel, columns: list[int]) -> NDArray[np.intp]:
+    """Return the rows of a test up to the last wanted one, at least those in which its zero is known."""
+    mine = np.flatnonzero(samples.test == test)
+    stop = int(np.flatnonzero(rows[mine]).max()) + 1
+    usable = np.flatnonzero(np.isfinite(samples.values[mine][:, columns]).all(axis=1))
+    begins = [usable, usable[mine[usable] >= anew]] if (anew := samples.anew(test)) is not None else [usable]
+    for own in begins:
+        _, known = first_rows(model.zeroing, samples.time[mine[own]], samples.stands[mine[own]])
+        stop = max(stop, int(own[min(known, len(own) - 1)]) + 1) if len(own) else stop
+    return mine[:stop]
+
+
+def _reference(samples: Samples, columns: list[int], test: int) -> FloatArray | None:
+    """Return what counts as zero in a test, if that is given; without it the first readings decide."""
+    given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
+    return samples.reference()[test, columns] if given else None
 
 
 def _needed(model: ErrorModel, usable: BoolArray, wanted: BoolArray) -> BoolArray:
     """Return the rows of a test that have to be stepped through to know the wanted ones."""
     if model.remembers or model.support.policy == "hold" or not usable.any():
         return usable
-    # A model without memory needs its zero, the wanted readings, and for a wanted row without one the reading before.
+    # A model without memory needs the wanted readings, and for a wanted row without one the reading before.
     needed = usable & wanted
-    needed[np.argmax(usable)] = True
     before = np.maximum.accumulate(np.where(usable, np.arange(len(usable)), 0))
     needed[before[wanted]] = True
     return needed & usable

@@ -11,9 +11,11 @@ from thermocomp.assessment.diagnostics import Collinearity
 from thermocomp.assessment.recommend import Recommendation
 from thermocomp.assessment.robustness import Robustness
 from thermocomp.assessment.splits import Judging
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
+from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -76,6 +78,14 @@ class Assessment:
         Fewest and most inputs with an influence in one model.
     learned : int
         Rows that the model had learned from: left out, unless there are no others (see `caveat`).
+    alone : ndarray of shape (n_judged,), optional
+        What the model alone predicts, without gate and limits; `predicted` is what would run, with them [um].
+    limits : Limits or None
+        That `predicted` keeps to; None: there are none, and it is the model behind the gate, or alone.
+    rejected : int
+        Judged readings that the gate turned away though they were complete.
+    turned_away : str
+        The first reading that it turned away, and why.
     """
 
     model: str
@@ -97,10 +107,19 @@ class Assessment:
     overall: bool = False
     n_sensors: tuple[int, int] = (0, 0)
     learned: int = 0
+    alone: FloatArray | None = None
+    limits: Limits | None = None
+    rejected: int = 0
+    turned_away: str = ""
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
+
+    def alone_metric(self, name: str) -> float:
+        """Return the metric of the model alone, without gate and limits."""
+        alone = self.predicted if self.alone is None else self.alone
+        return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
 
     def none_metric(self, name: str) -> float:
         """Return the metric without compensation."""
@@ -153,6 +172,8 @@ class Comparison:
         Pairs of method and target that were not judged, because the work was stopped.
     recommended : tuple of Recommendation
         Per target, where there was something to choose.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
     """
 
     judging: Judging
@@ -160,6 +181,7 @@ class Comparison:
     collinearity: Collinearity
     left: int = 0
     recommended: tuple[Recommendation, ...] = ()
+    starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per target and method: over all its blocks."""

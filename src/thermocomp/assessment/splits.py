@@ -71,9 +71,12 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
     """
     if not (0 < train < 1 and 0 < test < 1 and train + test <= 1 + 1e-9):
         raise InputError(f"split {train:g}/{test:g}: want two shares between 0 and 1 whose sum is at most 1")
-    n = len(samples)
-    first, stop = round(n * train), min(n, round(n * (train + test)))
-    return _consecutive(f"first {train:.0%} of the rows to learn, next {test:.0%} unseen", n, first, stop)
+    own = np.flatnonzero(samples.cycle >= 0)  # not those of earlier files, which tests go on from
+    n = len(own)
+    ends = [*own.tolist(), len(samples)]
+    first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
+    name = f"first {train:.0%} of the rows to learn, next {test:.0%} unseen"
+    return _consecutive(name, len(samples), first, stop)
 
 
 def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
@@ -88,7 +91,8 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
         [s]
     """
     steps = samples.dt()
-    steps[np.isinf(steps)] = 0.0
+    earlier = samples.cycle < 0  # a file that the test goes on from, and the break after it
+    steps[np.isinf(steps) | earlier | np.roll(earlier, 1)] = 0.0
     elapsed = np.cumsum(steps)
     first, stop = (int(np.searchsorted(elapsed, t)) for t in (train_s, train_s + test_s))
     if not 0 < first < stop:
@@ -118,7 +122,7 @@ def stretches(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[In
     for k in np.unique(test):
         mine: list[list[int]] = []
         short = True  # what came before is
-        for c in np.unique(cycle[test == k]).tolist():
+        for c in np.unique(cycle[(test == k) & (cycle >= 0)]).tolist():
             n = int((cycle == c).sum())
             if mine and (short or n < least):
                 mine[-1].append(c)

@@ -8,8 +8,10 @@ import numpy as np
 from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import compare, judge, per_cycle
 from thermocomp.assessment.leaks import learned_from
+from thermocomp.assessment.replay import absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.splits import Judging, Split, called, stretches
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
 from thermocomp.core.validity import Validity
@@ -18,6 +20,8 @@ from thermocomp.models.methods import method as find
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import Start
+from thermocomp.recording.starts import find as find_starts
 
 
 def _silent(_: str) -> None:
@@ -54,6 +58,7 @@ def fit(
     rules: Rules = Rules(),
     support: Support = Support(),
     recordings: Sequence[Recording] = (),
+    limits: Limits = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Fitted:
@@ -70,6 +75,8 @@ def fit(
         For the models.
     recordings : sequence of Recording
         The tests of `samples`, in their order: for the surroundings and the days in the models' validity.
+    limits : Limits
+        Of the compensator that is judged with them.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -86,7 +93,9 @@ def fit(
     """
     if not find(method).kind.freezable:
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
-    comparison = compare(samples, [method], judging, rules=rules, support=support, jobs=jobs, progress=progress)
+    comparison = compare(
+        samples, [method], judging, rules=rules, support=support, limits=limits, jobs=jobs, progress=progress
+    )
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
     covered = coverage.cover(samples, judging, recordings)
@@ -139,12 +148,15 @@ class Judged:
         Names of recordings that a model was fitted to, as they are: they are not judged on if there is another.
     validity : Validity or None
         What the thermal cycles of these recordings cover.
+    starts : tuple of (str, Start)
+        Names of the recordings, and how each begins.
     """
 
     models: tuple[ErrorModel, ...]
     assessments: tuple[Assessment, ...]
     seen: tuple[str, ...]
     validity: Validity | None = None
+    starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per model, over all cycles."""
@@ -156,6 +168,8 @@ def assess(
     recordings: Sequence[Recording],
     *,
     rules: Rules = Rules(),
+    limits: Limits = Limits(),
+    starts: Start | Sequence[Start] | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
@@ -170,6 +184,10 @@ def assess(
         With the models' inputs and targets.
     rules : Rules
         What is stated before judging.
+    limits : Limits
+        Of the compensator that is judged with them.
+    starts : Start or sequence of Start, optional
+        How each recording begins, or all of them; found out if not given.
     progress : callable
         Called with a line of text per model.
 
@@ -180,21 +198,36 @@ def assess(
     Raises
     ------
     InputError
-        A channel the models need is not in the recordings.
+        A channel the models need is not in the recordings, or it cannot be told how one of these begins.
     """
     found: list[Assessment] = []
     covered = None
     hashes = {h for m in models for h in _hashes(m)}
     seen = tuple(r.name for r in recordings if r.fingerprint in hashes)
+    if starts is None:
+        starts = find_starts(
+            recordings,
+            [r.channel(m.target) for r in recordings[:1] for m in models],
+            zeroing=models[0].zeroing,
+            absolute=absolute(models),
+        )
+    told: tuple[tuple[str, Start], ...] = ()
     for model in models:
         progress(f"{model.target} {model.family}")
-        rezero = any(i.rezero for i in model.inputs)
-        samples = stack(recordings, [model.target], [i.name for i in model.inputs], rezero=rezero)
+        samples = stack(
+            recordings,
+            [model.target],
+            [i.name for i in model.inputs],
+            rezero=any(i.rezero for i in model.inputs),
+            zeroing=model.zeroing,
+            starts=starts,
+        )
+        told = tuple(zip(samples.test_names, samples.starts, strict=True))
         covered = covered or coverage.cover(samples, units(samples), recordings)
-        overall = _assess(model, _called_as_in(model, samples), rules)
+        overall = _assess(model, _called_as_in(model, samples), rules, limits)
         cut = [replace(a, learned=0) for a in per_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
-    return Judged(tuple(models), tuple(found), seen, covered)
+    return Judged(tuple(models), tuple(found), seen, covered, told)
 
 
 def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
@@ -212,7 +245,7 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
     return model.provenance.data_sha256 if model.provenance else ()
 
 
-def _assess(model: ErrorModel, samples: Samples, rules: Rules) -> Assessment:
+def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -> Assessment:
     """Judge a model on what it has not learned from; on everything if there is nothing else, and say so."""
     known = learned_from(model, samples)
     judged = np.isfinite(samples.deviations[:, 0])
@@ -228,7 +261,9 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules) -> Assessment:
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
     name = model.provenance.method if model.provenance else model.family
-    return replace(judge(name, model, samples, split, rules=rules), overall=True, caveat=caveat, learned=n)
+    return replace(
+        judge(name, model, samples, split, rules=rules, limits=limits), overall=True, caveat=caveat, learned=n
+    )
 
 
 def units(samples: Samples) -> Judging:

@@ -11,8 +11,10 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 from rich.console import Console
 
+from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
+    Compensator,
     Flag,
     Json,
     Names,
@@ -248,6 +250,8 @@ def fit(
     support: Policy = "clip",
     margin: float = 0.25,
     accept_unproven: str | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     overwrite: Flag = False,
     json: Json = False,
     quiet: Quiet = False,
@@ -277,6 +281,10 @@ def fit(
     accept_unproven : str
         Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file and said
         wherever the model is shown. A refused one is never taken.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
     overwrite : bool
         Write over an existing model file.
     json : bool
@@ -301,7 +309,7 @@ def fit(
         from thermocomp.files import modelfile
     refuse_existing([output], overwrite, recordings, ".json")
     trouble = tell_trouble(tests)
-    samples = study.samples(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
     judging, how = study.judging(samples), Support(support, margin)
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
@@ -310,6 +318,7 @@ def fit(
             judging,
             rules=study.rules(),
             support=how,
+            limits=compensator.limits(),
             recordings=tests,
             jobs=study.jobs,
             progress=progress,
@@ -328,6 +337,8 @@ def assess(
     *,
     mapping: Path | None = None,
     harm_margin: float | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     json: Json = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
@@ -345,6 +356,10 @@ def assess(
         TOML file that says what the columns are.
     harm_margin : float
         Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
     json : bool
         Print results for a machine instead of a table.
 
@@ -363,7 +378,14 @@ def assess(
     models = modelfile.read(model)
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
-        judged = studies.assess(models, tests, rules=Rules(harm_margin), progress=progress)
+        judged = studies.assess(
+            models,
+            tests,
+            rules=Rules(harm_margin),
+            limits=compensator.limits(),
+            starts=beginning.of(tests, mapping),
+            progress=progress,
+        )
     out.show_assess(judged, trouble, _console, as_json=json)
     before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in judged.overall()} else 0
@@ -376,6 +398,8 @@ def compare(
     study: Study,
     models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
     primary: str | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -394,6 +418,10 @@ def compare(
     primary : str
         Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
         number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
+    compensator : Compensator
+        Its limits: what would run is judged, not the models alone.
+    beginning : Beginning
+        How the recordings begin.
     output : Path
         Report to write (.html).
     overwrite : bool
@@ -414,10 +442,12 @@ def compare(
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
-    samples = study.samples(tests)
-    judging, rules = study.judging(samples), study.rules(primary)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
+    judging, rules, limits = study.judging(samples), study.rules(primary), compensator.limits()
     with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
-        comparison = comparing.compare(samples, models, judging, rules=rules, jobs=study.jobs, progress=progress)
+        comparison = comparing.compare(
+            samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
+        )
     if output is not None:
         with needs("study"):
             from thermocomp.report import html

@@ -7,9 +7,11 @@ from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
 
+from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
+    Compensator,
     Flag,
     Json,
     OptionalNames,
@@ -45,6 +47,8 @@ def iso230(
     pairs: OptionalNames = None,
     ambient: str | None = None,
     model: Path | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     positioning: Tables = [],  # noqa: B006 - never changed
     mapping: Path | None = None,
     output: OptionalOutput = None,
@@ -69,6 +73,10 @@ def iso230(
         Temperature of the surroundings; the first whose name says air, ambient or room if not given.
     model : Path
         Model file from thermocomp fit: what it leaves of each displacement is told beside it.
+    compensator : Compensator
+        Its limits: what it would leave is told, not what the model alone would.
+    beginning : Beginning
+        How the recordings begin; it matters to a model.
     positioning : list of Path
         CSV tables of positioning tests, with the columns position_mm, deviation_um, direction (+ or -), run, and if
         there are several, state and axis.
@@ -110,11 +118,14 @@ def iso230(
         raise
     trouble = tell_trouble(tests)
     models = modelfile.read(model) if model is not None else ()
+    start, limits = beginning.of(tests, mapping), compensator.limits()
     thermal: list[ThermalTest] = []
     settlings: list[tuple[Recording, tuple[Settling, ...]]] = []
     for recording in tests:
         paired = _pairs(recording, distance, pairs)
-        mine = iso230_3.assess(recording, test, pairs=paired, ambient=ambient, models=models)
+        mine = iso230_3.assess(
+            recording, test, pairs=paired, ambient=ambient, models=models, start=start, limits=limits
+        )
         # where nothing was recorded of the drives, a test is told to be a warm-up
         phases = find_phases(recording) or tuple(Phase("warm-up", 1, t.start, t.stop) for t in mine if t.kind != "etve")
         thermal += mine

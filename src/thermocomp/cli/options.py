@@ -11,19 +11,23 @@ from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
 from thermocomp.cli.extras import needs
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.zero import Zeroing
 
 if TYPE_CHECKING:
     from thermocomp.assessment.results import Rules
     from thermocomp.assessment.splits import Judging
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
+    from thermocomp.recording.starts import Start
 
 _stderr = Console(stderr=True, highlight=False)
 
 Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
 Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
 OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
+OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
@@ -54,6 +58,8 @@ class Study:
     harm_margin : float
         Harm in a single cycle or file that is let pass [um]. If not given: three times the probe's noise or 5 % of the
         largest drift, at most 2 um.
+    zero_over : float
+        Average that start over so long, while the spindle stands [s]; 0: it is the first row.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     """
@@ -66,15 +72,20 @@ class Study:
     leave_one_file_out: Flag = False
     absolute: Flag = False
     harm_margin: float | None = None
+    zero_over: float = Zeroing.at_rest
     jobs: int = -1
 
-    def samples(self, tests: "list[Recording]") -> "Samples":
-        """Stack the tests."""
+    def samples(self, tests: "list[Recording]", start: "Start | None" = None) -> "Samples":
+        """Stack the tests, which begin as stated, or as found out."""
         from thermocomp.recording.samples import stack
 
         if self.jobs == 0:
             raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
-        return stack(tests, self.target, self.inputs, rezero=not self.absolute)
+        speed = tests[0].speed
+        zeroing = Zeroing(
+            self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
+        )
+        return stack(tests, self.target, self.inputs, rezero=not self.absolute, zeroing=zeroing, starts=start)
 
     def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""
@@ -93,6 +104,30 @@ class Study:
         from thermocomp.assessment.results import Rules
 
         return Rules(self.harm_margin, primary)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Compensator:
+    """What the compensator that is judged with a model may never do.
+
+    Parameters
+    ----------
+    magnitude : float
+        Largest correction in either direction [um].
+    rate : float
+        Fastest change of a correction [um/s].
+    dead_band : float
+        Changes smaller than this are not made [um].
+    """
+
+    magnitude: float = Limits.magnitude
+    rate: float = Limits.rate
+    dead_band: float = Limits.dead_band
+
+    def limits(self) -> Limits:
+        """Return them as the online step takes them."""
+        return Limits(self.magnitude, self.rate, self.dead_band)
 
 
 @Parameter(name="*")

@@ -21,16 +21,24 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.shown import mark
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.starts import Start
+from thermocomp.report.running import told
 from thermocomp.report.summary import cautions, unlike
 
 
 def show_comparison(
-    comparison: Comparison, report: Path | None, trouble: Sequence[str], console: Console, *, as_json: bool
+    comparison: Comparison,
+    report: Path | None,
+    trouble: Sequence[str],
+    console: Console,
+    *,
+    as_json: bool,
 ) -> None:
     """Print a comparison of methods on unseen blocks."""
     if as_json:
         content = {
             "judging": comparison.judging.name,
+            "starts": _starts(comparison.starts),
             "condition_number": comparison.collinearity.condition_number,
             "vif": dict(zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True)),
             "trouble": trouble,
@@ -50,6 +58,7 @@ def show_comparison(
         }
         print_json(content, console)
         return
+    _tell_starts(comparison.starts, console)
     console.print(f"Judged on: {comparison.judging.name}")
     console.print(_assessment_table(comparison.assessments))
     console.print(_cycle_table(comparison.assessments))
@@ -69,6 +78,8 @@ def show_comparison(
             )
     for caution in cautions(comparison):
         console.print(f"[yellow]but[/] {escape(caution)}")
+    for line in told(comparison.overall()):
+        console.print(escape(line))
     if comparison.left:
         console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
     if report is not None:
@@ -136,9 +147,16 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     """Print models that were fitted and written."""
     if as_json:
         models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
-        content = {"judging": fitted.comparison.judging.name, "file": str(path), "trouble": trouble, "models": models}
+        content = {
+            "judging": fitted.comparison.judging.name,
+            "starts": _starts(fitted.comparison.starts),
+            "file": str(path),
+            "trouble": trouble,
+            "models": models,
+        }
         print_json(content, console)
         return
+    _tell_starts(fitted.comparison.starts, console)
     console.print(f"Judged on: {fitted.comparison.judging.name}")
     table = Table()
     for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):
@@ -160,6 +178,8 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
             console.print(
                 f"{mark(m.honest_error.word)} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True
             )
+    for line in told(fitted.comparison.overall()):
+        console.print(escape(line))
     console.print(f"Model file: {path}", soft_wrap=True)
 
 
@@ -168,6 +188,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     if as_json:
         content = {
             "seen_in_training": judged.seen,
+            "starts": _starts(judged.starts),
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "trouble": trouble,
             "validity": asdict(judged.validity) if judged.validity is not None else None,
@@ -176,6 +197,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         }
         print_json(content, console)
         return
+    _tell_starts(judged.starts, console)
     console.print(_assessment_table(judged.assessments))
     console.print(_cycle_table(judged.assessments))
     table = Table(title="Robustness: RMS in um")
@@ -199,6 +221,8 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
+    for line in told(judged.overall()):
+        console.print(escape(line))
         if a.robustness is not None and a.robustness.unlike > 0.1:
             console.print(f"[yellow]but[/] {escape(a.target)}: {unlike(a.robustness)}")
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
@@ -211,6 +235,15 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if m.honest_error is not None and not m.accepted:
             word = mark(f"{m.honest_error.word} when it was fitted")
             console.print(f"{word} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True)
+
+
+def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
+    for name, start in begins:
+        console.print(f"Start of {escape(start.told(name))}")
+
+
+def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
+    return [start.content(name) for name, start in begins]
 
 
 def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: Console, *, as_json: bool) -> None:
@@ -292,6 +325,9 @@ def _result(a: Assessment) -> dict[str, Any]:
         "mae_um": a.metric("mae"),
         "rms_um": a.metric("rms"),
         "max_um": a.metric("max_abs"),
+        "alone_mae_um": a.alone_metric("mae"),
+        "alone_rms_um": a.alone_metric("rms"),
+        "alone_max_um": a.alone_metric("max_abs"),
         "peak_to_peak_um": a.metric("peak_to_peak"),
         "none_mae_um": a.none_metric("mae"),
         "none_rms_um": a.none_metric("rms"),
@@ -319,6 +355,9 @@ def _result(a: Assessment) -> dict[str, Any]:
         "n_rows": len(a.measured),
         "n_rows_learned_from": a.learned,
         "n_effective": a.n_effective,
+        "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
+        "readings_turned_away": a.rejected,
+        "first_turned_away": a.turned_away,
     }
     if a.robustness is not None:
         r = a.robustness

@@ -2,13 +2,15 @@
 
 The way of a reading: gate (complete? finite? plausible? fresh? later than the last?) -> minus the reference state and
 `ErrorModel.step` per component -> minus sign -> limits -> `Correction`. What the gate turns away changes nothing: every
-correction stays where it was.
+correction stays where it was. The first readings after a start are averaged: they are what temperatures count from, and
+the corrections stay zero until it is known, as long as the spindle stands (`ErrorModel.zeroing`).
 """
 
 import math
 import sys
 from collections.abc import Mapping, Sequence
 from numbers import Real
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +18,9 @@ import numpy as np
 from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, Input, State
+from thermocomp.core.model import ErrorModel, FloatArray, Input, State
 from thermocomp.core.reading import Reading
+from thermocomp.core.zero import Gathered
 
 #: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
 PLAUSIBLE: dict[str, tuple[float, float]] = {
@@ -29,9 +32,11 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
 #: any number at all; finite, so that an infinity is none
 ANY = (-sys.float_info.max, sys.float_info.max)
 #: how far the zero of a day may lie from the zero of the training [degC]
-DAY = 25.0
+DAY = 15.0
 #: least room beyond the trained range of a temperature [degC]
 MIN_SPAN = 10.0
+#: room beyond the trained range of what nature sets no bounds to (a displacement, a number), in widths of that range
+WIDE = 10.0
 #: how far ahead of the clock a reading may be stamped [s]
 CLOCK_SKEW = 1.0
 
@@ -42,7 +47,8 @@ class OnlineState(NamedTuple):
     models: tuple[State, ...]  #: one per model
     corrections: tuple[Correction, ...]  #: in force, one per model
     time: float | None  #: of the last reading that passed the gate [s]
-    clock: float | None  #: when the step was last taken, whatever the gate said [s]
+    clock: float | None  #: the latest at which the step was taken, whatever the gate said [s]
+    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
 
 
 class OnlineResult(NamedTuple):
@@ -68,14 +74,18 @@ def start(models: Sequence[ErrorModel]) -> OnlineState:
         if m.unit != "um":
             raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
         m.check_may_run()
-    return OnlineState(tuple(m.init() for m in models), tuple(Correction(0.0) for _ in models), None, None)
+    none = tuple(Correction(0.0) for _ in models)
+    return OnlineState(tuple(m.init() for m in models), none, None, None, tuple(Gathered() for _ in models))
 
 
 def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
     """Say why a reading must not be used; the empty string if it may.
 
-    A temperature is plausible while it stays within its trained range widened by the whole span of that range, and the
-    first one, which decides what counts as zero, while it is within `DAY` of the zero of the training.
+    A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
+    first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within `DAY`
+    of the zero of the training, and each of them as near to the others as it was then, give or take `MIN_SPAN` or its
+    trained span. What nature sets no bounds to, a displacement or a bare number, has its trained range, widened by
+    `WIDE` times its width.
 
     Parameters
     ----------
@@ -96,14 +106,49 @@ def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now
     if untimely:
         return untimely
     for model, memory in zip(models, state.models, strict=True):
-        for channel, zero in zip(model.inputs, memory.reference.tolist(), strict=True):
-            value = reading.values.get(channel.name)
-            if value is None:
-                return f"{channel.name} is missing"
-            low, high = _plausible(channel, zero)
-            # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
-            if not ((type(value) is float or _is_number(value)) and low <= value <= high):
-                return f"{channel.name} = {value} {channel.unit} is not plausible"
+        why = implausible(model, [reading.values.get(i.name) for i in model.inputs], memory.reference.tolist())
+        if why:
+            return why
+    return ""
+
+
+def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
+    """Say which value of a reading must not be used and why; the empty string if all may.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    values : sequence of shape (n_inputs,)
+        As a source gave them; None is a value that is missing.
+    reference : sequence of float of shape (n_inputs,)
+        What counts as zero; nan where it is not known yet.
+
+    Returns
+    -------
+    str
+    """
+    undecided = []
+    for channel, value, zero in zip(model.inputs, values, reference, strict=True):
+        if value is None:
+            return f"{channel.name} is missing"
+        low, high = plausible(channel, zero)
+        # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
+        if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
+            return f"{channel.name} = {value} {channel.unit} is not plausible"
+        if math.isnan(zero) and channel.quantity == "temperature":
+            undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
+    return _no_start(undecided) if undecided else ""
+
+
+def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
+    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
+    middle = median(offset for _, offset in offsets)
+    for channel, offset in offsets:
+        start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
+        if abs(middle) > DAY:
+            return f"{start}: the machine is {middle:+.1f} degC from the zero of its training"
+        if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
+            return f"{start}: {offset - middle:+.1f} degC off the others, counted from the zero of its training"
     return ""
 
 
@@ -123,19 +168,19 @@ def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) 
 TOGETHER = "inputs together"
 
 
-def _plausible(channel: Input, zero: float) -> tuple[float, float]:
+def plausible(channel: Input, zero: float) -> tuple[float, float]:
     """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
 
-    `zero` is what counts as zero now; nan before the first reading, which decides it.
+    `zero` is what counts as zero now; nan while it is not known.
     """
     low, high = PLAUSIBLE.get(channel.quantity, ANY)
-    if channel.quantity == "temperature":
-        if math.isnan(zero):
-            around, below, above = channel.reference, -DAY, DAY
-        else:
-            span = max(channel.high - channel.low, MIN_SPAN)
-            around, below, above = zero, channel.low - span, channel.high + span
-        low, high = max(low, around + below), min(high, around + above)
+    if channel.quantity == "temperature" and not math.isnan(zero):
+        span = max(channel.high - channel.low, MIN_SPAN)
+        low, high = max(low, zero + channel.low - span), min(high, zero + channel.high + span)
+    elif channel.quantity not in PLAUSIBLE:
+        around = channel.reference if math.isnan(zero) else zero
+        room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
+        low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
     return low, high
 
 
@@ -165,24 +210,59 @@ def step(
     """
     rejected = gate(models, reading, state, now, limits)
     if rejected:
-        waiting = state._replace(clock=now) if math.isfinite(now) else state
+        waiting = state._replace(clock=_later(state.clock, now)) if math.isfinite(now) else state
         return waiting, _result(models, state.corrections, rejected, ())
     dt = 0.0 if state.time is None else reading.time - state.time
     # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
     travel = 0.0 if state.clock is None else min(now - state.clock, limits.reading_age)
-    states, corrections, outside = [], [], []
-    for model, memory, current in zip(models, state.models, state.corrections, strict=True):
+    states, corrections, begins, outside = [], [], [], []
+    for k, (model, current) in enumerate(zip(models, state.corrections, strict=True)):
+        memory = state.models[k]
         values = np.array([reading.values[i.name] for i in model.inputs])
-        after, deviation = model.step(memory, values, dt)
-        wanted = Correction.opposing(Deviation(float(deviation)))
-        states.append(after)
-        corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
-        if after.outside.any():
-            outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-        elif not model.distance(after, values) <= 1.0:
-            outside.append(TOGETHER)
-    new = OnlineState(tuple(states), tuple(corrections), reading.time, now)
+        gathered, known = state.gathered[k], True
+        if memory.memory is None and np.isnan(memory.reference).any():
+            resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
+            memory, gathered, known = _zeroed(model, memory, gathered, (reading.time, values, resting))
+        begins.append(gathered)
+        if known:
+            after, deviation = model.step(memory, values, dt)
+            wanted = Correction.opposing(Deviation(float(deviation)))
+            states.append(after)
+            corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
+            if after.outside.any():
+                outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
+            elif not model.distance(after, values) <= 1.0:
+                outside.append(TOGETHER)
+        else:
+            states.append(memory)
+            corrections.append(current)
+    new = OnlineState(tuple(states), tuple(corrections), reading.time, _later(state.clock, now), tuple(begins))
     return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
+
+
+def _zeroed(
+    model: ErrorModel, memory: State, gathered: Gathered, reading: tuple[float, FloatArray, bool]
+) -> tuple[State, Gathered, bool]:
+    """Take a reading into the zero if it belongs there; return whether the zero is known now.
+
+    Once it is, the model goes through the readings before this one, as if it had been known from the first of them.
+    """
+    before = gathered
+    if gathered.belongs(model.zeroing, reading[0], reading[2]):
+        gathered = gathered.add(*reading)
+        if not gathered.complete(model.zeroing):
+            return memory, gathered, False
+    memory = memory._replace(reference=gathered.zero(memory.reference))
+    last = before.times[0] if before.times else 0.0
+    for time, values in zip(before.times, before.values, strict=True):
+        memory, _ = model.step(memory, values, time - last)
+        last = time
+    return memory, Gathered(), True
+
+
+def _later(clock: float | None, now: float) -> float:
+    """Return the clock, which never goes back: time that was travelled in must not be there to travel in again."""
+    return now if clock is None else max(clock, now)
 
 
 def _result(

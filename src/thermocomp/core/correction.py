@@ -112,6 +112,10 @@ class Limits:
         if not (self.dead_band >= 0 and math.isfinite(self.dead_band)):
             raise InputError(f"limit dead_band = {self.dead_band}: must be finite and not negative")
 
+    def in_words(self) -> str:
+        """Return what holds for corrections as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""
+        return f"at most {self.magnitude:g} um, {self.rate:g} um/s, dead band {self.dead_band:g} um"
+
 
 def _check_finite(what: str, offset: float, slope: float, reference_position: float) -> None:
     if not (math.isfinite(offset) and math.isfinite(slope) and math.isfinite(reference_position)):

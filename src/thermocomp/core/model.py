@@ -17,6 +17,7 @@ from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
 from thermocomp.core.prints import Prints
 from thermocomp.core.validity import Validity
+from thermocomp.core.zero import FIRST_READING, Zeroing
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -35,8 +36,9 @@ class Input:
     reference : float
         Value that counts as zero [unit].
     rezero : bool
-        True: the first reading after a start (or a re-zeroing) replaces `reference`, as the temperatures of a drift
-        test are counted from its start; False: `reference` is absolute, as for a spindle speed.
+        True: the mean of the first readings after a start (or a re-zeroing) replaces `reference`, as the temperatures
+        of a drift test are counted from its start (`ErrorModel.zeroing`); False: `reference` is absolute, as for a
+        spindle speed.
     low, high : float
         Trained range of value minus reference [unit].
     """
@@ -111,6 +113,8 @@ class Provenance:
         What those rows showed of the target.
     prints : Prints or None
         Fingerprints of the rows it was fitted to: they are known again in another file.
+    starts : tuple of str
+        How each of the recordings began: cold, continued, rezeroed or known; in the order of `data_sha256`.
     """
 
     method: str
@@ -122,6 +126,7 @@ class Provenance:
     source: str = ""
     learned: Learned | None = None
     prints: Prints | None = field(default=None, repr=False)
+    starts: tuple[str, ...] = ()
 
 
 #: version of the rules that a verdict is given by; files that do not say were judged by older ones
@@ -218,6 +223,8 @@ class ErrorModel(ABC):
         What these cycles covered.
     joint : JointSupport or None
         What of its inputs' space was trained; None: a range per input is all that is known.
+    zeroing : Zeroing
+        Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     """
 
     family: ClassVar[str]
@@ -232,6 +239,7 @@ class ErrorModel(ABC):
     honest_error: HonestError | None = None
     validity: Validity | None = None
     joint: JointSupport | None = None
+    zeroing: Zeroing = FIRST_READING
 
     def __post_init__(self) -> None:
         names = [i.name for i in self.inputs]

@@ -14,6 +14,7 @@ from thermocomp.core.model import ErrorModel, Provenance
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.terms import TermTable
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.geometric import ProfileFit, fit_profile
 from thermocomp.models.positionoptions import (
     POWERS,
@@ -29,6 +30,7 @@ from thermocomp.models.training import Trained, train
 from thermocomp.recording.profiles import QUANTITY, Profiles, Slopes
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -196,7 +198,7 @@ def slope_samples(
     )
     names = [f"{first.target}_k{k}" for k in slopes[0].powers]
     recordings = [_with_factors(test, s, names, options) for test, s in zip(tests, slopes, strict=True)]
-    samples = stack(recordings, names, options.inputs, rezero=options.rezero)
+    samples = stack(recordings, names, options.inputs, rezero=options.rezero, zeroing=FIRST_READING, starts=COLD)
     zero = np.stack(
         [
             _cold_inputs(samples, np.flatnonzero(samples.test == k)[test.reference_rows(options.reference)])

@@ -96,6 +96,7 @@ def train(
         raise FitError(
             f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
         )
+    _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
     estimator = how.build(speeds) if isinstance(name, str) else clone(name)
     begin = time.perf_counter()
@@ -126,8 +127,19 @@ def train(
         # of what the model needs: no file can be judged that has not got it
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
-    model = replace(model, joint=_joint(model, samples, seen))
+    model = replace(model, joint=_joint(model, samples, seen), zeroing=samples.zeroing)
     return Trained(how.name, estimator, model, seconds, r_squared, predicted)
+
+
+def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
+    """Refuse to learn from displacements whose zero lies somewhere on the way of a warm machine."""
+    for test in np.unique(samples.test[seen]).tolist() if samples.starts else []:
+        start = samples.starts[test]
+        if start.word == "rezeroed" and start.earlier:
+            raise FitError(
+                f"{samples.test_names[test]} was re-zeroed on a machine that went on from {start.earlier[-1].name}: "
+                "its displacements miss what had come until then. Such a test can judge (assess), not teach"
+            )
 
 
 def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport | None:
@@ -147,4 +159,5 @@ def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, targ
         rows=int(seen.sum()),
         version=__version__,
         learned=samples.learned(target, seen),
+        starts=tuple(samples.starts[t].word for t in tests) if samples.starts else (),
     )

@@ -10,12 +10,14 @@ from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
 from thermocomp.papers.common import Errors
 from thermocomp.papers.study import Claim, Curve, Figure, Panel, Progress, Study, Table, silent
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 #: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
 FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")
@@ -131,7 +133,7 @@ def virtual(experiment: Experiment, seed: int) -> Task:
     recordings = experiment.recordings(seed)
     target = experiment.target
     name = target if isinstance(target, str) else recordings[0].displacements[target].name
-    samples = stack(recordings, [name])
+    samples = stack(recordings, [name], zeroing=FIRST_READING, starts=COLD)
     unseen = samples.test >= len(recordings) - experiment.unseen
     split = Split("unseen tests", ~unseen, unseen)
     return Task(f"{experiment.name}, {name}", samples, Judging("whole tests left out", (split,)))
@@ -156,7 +158,7 @@ def measured(recordings: Sequence[Recording], target: str) -> Task:
     InputError
         There is no such channel, or fewer than two thermal cycles.
     """
-    samples = stack(recordings, [target])
+    samples = stack(recordings, [target], zeroing=FIRST_READING, starts=COLD)
     name = f"{samples.test_names[0]}{' ...' if len(recordings) > 1 else ''}, {target}"
     return Task(name, samples, leave_one_cycle_out(samples))
 
@@ -185,7 +187,7 @@ def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progre
         done += 1
         progress(done / pieces, f"{task.name}: {what}")
 
-    found = compare(task.samples, methods, task.judging, jobs=jobs, progress=tell)
+    found = compare(task.samples, methods, task.judging, limits=None, jobs=jobs, progress=tell)
     rows = []
     for overall in found.overall():
         blocks = [a for a in found.assessments if a.model == overall.model and a.frozen is not None]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,9 @@ from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input
+from thermocomp.core.zero import FIRST_READING, Zeroing, centre, first_rows
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.starts import Start, bridged, find, level, resting
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -44,15 +47,22 @@ class Samples:
     time : ndarray of shape (n_rows,)
         Seconds since the start of the row's test [s].
     test, cycle, row : ndarray of int of shape (n_rows,)
-        Index into `test_names`, index into `cycle_names`, row in the file's table.
+        Index into `test_names`, index into `cycle_names`, row in the file's table. The last two are -1 in rows of an
+        earlier file, which a test goes on from: they are gone through, and neither learned from nor judged.
     test_names, cycle_names : tuple of str
     hashes : tuple of str
         Fingerprint of each test: SHA-256 of its times and values.
     rezero : bool
-        Temperatures are counted from the first row of each test, or from `zero`.
+        Temperatures are counted from the start of each test, or from `zero`.
     zero : ndarray of shape (n_tests, n_inputs), optional
-        What they are counted from, if it is not the first complete row of each test; without `rezero` it is the same
-        for all tests, and holds live too.
+        What they are counted from, if it is not the start of each test; nan for a test whose start it is. Without
+        `rezero` it is the same for all tests, and holds live too.
+    zeroing : Zeroing
+        Over how long the start is averaged.
+    resting : ndarray of bool of shape (n_rows,), optional
+        The spindle is known to stand; None: it is known nowhere.
+    starts : tuple of Start
+        How each test begins; empty: cold.
     """
 
     inputs: tuple[Channel, ...]
@@ -68,6 +78,9 @@ class Samples:
     hashes: tuple[str, ...]
     rezero: bool = True
     zero: FloatArray | None = None
+    zeroing: Zeroing = FIRST_READING
+    resting: BoolArray | None = None
+    starts: tuple[Start, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time)
@@ -83,17 +96,33 @@ class Samples:
         return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
 
     def reference(self) -> FloatArray:
-        """Return what counts as zero, (n_tests, n_inputs): each test's first complete row, or 0 for absolute inputs."""
-        if self.zero is not None:
-            return np.where([c.quantity == "temperature" for c in self.inputs], self.zero, 0.0)
+        """Return what counts as zero, (n_tests, n_inputs): the mean over each test's start; 0 for absolute inputs."""
+        temperatures = [c.quantity == "temperature" for c in self.inputs]
+        if self.zero is not None and not self.rezero:
+            return np.where(temperatures, self.zero, 0.0)
         zero = np.zeros((len(self.test_names), len(self.inputs)))
         for k in range(len(self.test_names)):
+            if self.zero is not None and not np.isnan(self.zero[k]).any():
+                zero[k] = np.where(temperatures, self.zero[k], 0.0)
+                continue
             rows = np.flatnonzero((self.test == k) & self.valid)
             if rows.size == 0:
                 names = ", ".join(c.name for c in self.inputs)
                 raise RecordingError(f"{self.test_names[k]}: no row has a number in all of the inputs {names}")
-            zero[k] = np.where(self.rezeroed, self.values[rows[0]], 0.0)
+            count, _ = first_rows(self.zeroing, self.time[rows], self.stands[rows])
+            zero[k] = np.where(self.rezeroed, centre(self.values[rows[:count]]), 0.0)
         return zero
+
+    @property
+    def stands(self) -> BoolArray:
+        """Rows in which the spindle is known to stand."""
+        return np.zeros(len(self), dtype=np.bool_) if self.resting is None else self.resting
+
+    def anew(self, test: int) -> int | None:
+        """Return the row from which a test counts anew, what went before being known or not; None: it does not."""
+        if not self.starts or self.starts[test].word != "rezeroed":
+            return None
+        return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
 
     def change(self) -> FloatArray:
         """Return inputs minus their reference, (n_rows, n_inputs)."""
@@ -135,20 +164,15 @@ class Samples:
 
     def take(self, rows: BoolArray | IntArray) -> "Samples":
         """Return some of the rows, in their order."""
-        return Samples(
-            self.inputs,
-            self.targets,
-            self.values[rows],
-            self.deviations[rows],
-            self.time[rows],
-            self.test[rows],
-            self.cycle[rows],
-            self.row[rows],
-            self.test_names,
-            self.cycle_names,
-            self.hashes,
-            self.rezero,
-            self.zero,
+        return replace(
+            self,
+            values=self.values[rows],
+            deviations=self.deviations[rows],
+            time=self.time[rows],
+            test=self.test[rows],
+            cycle=self.cycle[rows],
+            row=self.row[rows],
+            resting=None if self.resting is None else self.resting[rows],
         )
 
     def only(self, names: Sequence[str]) -> "Samples":
@@ -185,6 +209,8 @@ def stack(
     inputs: Sequence[str] | None = None,
     *,
     rezero: bool = True,
+    zeroing: Zeroing | None = None,
+    starts: Start | Sequence[Start] | None = None,
 ) -> Samples:
     """Stack recordings of one machine.
 
@@ -198,6 +224,10 @@ def stack(
         Channels models may use; all temperatures and the spindle speed if not given.
     rezero : bool
         True: temperatures are counted from the start of each test (ISO 230-3); False: they are absolute.
+    zeroing : Zeroing, optional
+        Over how long the start is averaged; as `Zeroing` says if not given, by the first recording's spindle speed.
+    starts : Start or sequence of Start, optional
+        How each recording begins, or all of them; found out if not given.
 
     Returns
     -------
@@ -206,7 +236,8 @@ def stack(
     Raises
     ------
     InputError
-        A channel is missing in one of the recordings, or a displacement is asked for as an input.
+        A channel is missing in one of the recordings, a displacement is asked for as an input, or it cannot be told how
+        a recording begins.
     """
     if not recordings:
         raise InputError("no recording given")
@@ -233,28 +264,89 @@ def stack(
     names = [r.name for r in recordings]
     if len(set(names)) != len(names):
         names = [f"{n}#{k}" for k, n in enumerate(names, start=1)]
-    for r in recordings:
-        _refuse_the_absurd(r, [*input_channels, *target_channels])
+    speed = first.speed
+    zeroing = Zeroing(speed=speed.name if speed is not None else "") if zeroing is None else zeroing
+    if starts is None:
+        starts = find(recordings, target_channels, zeroing=zeroing, absolute=not rezero)
+    starts = [starts] * len(recordings) if isinstance(starts, Start) else starts
+    parts = [_part(r, s, input_channels, target_channels, zeroing) for r, s in zip(recordings, starts, strict=True)]
     cycle_names = [
         c.name if len(recordings) == 1 else f"{n}: {c.name}"
         for n, r in zip(names, recordings, strict=True)
         for c in r.cycles
     ]
-    cycle = [k for k, c in enumerate(c for r in recordings for c in r.cycles) for _ in range(len(c))]
+    first_cycle = np.cumsum([0, *(len(r.cycles) for r in recordings)])
     return Samples(
         inputs=input_channels,
         targets=target_channels,
-        values=np.concatenate([r.values([r.channel(c.name) for c in input_channels]) for r in recordings]),
-        deviations=np.concatenate([r.values([r.channel(c.name) for c in target_channels]) for r in recordings]),
-        time=np.concatenate([r.time for r in recordings]),
-        test=np.repeat(np.arange(len(recordings)), [len(r) for r in recordings]),
-        cycle=np.array(cycle, dtype=np.intp),
-        row=np.concatenate([np.arange(len(r)) for r in recordings]),
+        values=np.concatenate([p.values for p in parts]),
+        deviations=np.concatenate([p.deviations for p in parts]),
+        time=np.concatenate([p.time for p in parts]),
+        test=np.repeat(np.arange(len(parts)), [len(p.time) for p in parts]),
+        cycle=np.concatenate(
+            [np.where(p.cycle < 0, -1, p.cycle + n) for p, n in zip(parts, first_cycle[:-1], strict=True)]
+        ),
+        row=np.concatenate([p.row for p in parts]),
         test_names=tuple(names),
         cycle_names=tuple(cycle_names),
         hashes=tuple(r.fingerprint for r in recordings),
         rezero=rezero,
+        zero=_known(starts, input_channels, rezero),
+        zeroing=zeroing,
+        resting=np.concatenate([p.resting for p in parts]),
+        starts=tuple(p.start for p in parts),
     )
+
+
+class _Part(NamedTuple):
+    """The rows of one test, after those of the files that it goes on from."""
+
+    start: Start
+    values: FloatArray
+    deviations: FloatArray
+    time: FloatArray
+    cycle: IntArray
+    row: IntArray
+    resting: BoolArray
+
+
+def _part(
+    recording: Recording, start: Start, inputs: Sequence[Channel], targets: Sequence[Channel], zeroing: Zeroing
+) -> _Part:
+    start, begins = bridged(start, recording)
+    _refuse_the_absurd(recording, [*inputs, *targets])
+    deviations = recording.values([recording.channel(c.name) for c in targets])
+    if start.word == "rezeroed":
+        deviations = deviations - [level(recording, c.name, zeroing) for c in targets]
+    before = sum(len(r) for r in start.earlier)
+    for r in start.earlier:
+        _refuse_the_absurd(r, inputs)
+    every = (*start.earlier, recording)
+    return _Part(
+        start=start,
+        values=np.concatenate([r.values([r.channel(c.name) for c in inputs]) for r in every]),
+        deviations=np.concatenate([np.full((before, len(targets)), np.nan), deviations]),
+        time=np.concatenate([begin + r.time for begin, r in zip(begins, every, strict=True)]),
+        cycle=np.array(
+            [-1] * before + [k for k, c in enumerate(recording.cycles) for _ in range(len(c))], dtype=np.intp
+        ),
+        row=np.array([-1] * before + list(range(len(recording))), dtype=np.intp),
+        resting=np.concatenate([resting(r, zeroing) for r in every]),
+    )
+
+
+def _known(starts: Sequence[Start], inputs: Sequence[Channel], rezero: bool) -> FloatArray | None:
+    """Return the zeros that are stated, (n_tests, n_inputs); nan for tests that have their own."""
+    if not rezero or not any(s.word == "known" for s in starts):
+        return None
+    zero = np.full((len(starts), len(inputs)), np.nan)
+    for k, start in enumerate(starts):
+        if start.word == "known":
+            missing = [c.name for c in inputs if c.quantity == "temperature" and c.name not in start.zero]
+            if missing:
+                raise InputError(f"the known zero does not tell {', '.join(missing)}: give every temperature used")
+            zero[k] = [start.zero[c.name] if c.quantity == "temperature" else 0.0 for c in inputs]
+    return zero
 
 
 def _refuse_twins(recordings: Sequence[Recording]) -> None:

@@ -15,6 +15,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.report.running import told
 
 #: metrics of the big table, in its order
 TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
@@ -46,6 +47,8 @@ def summarise(
         if samples is None
         else coverage.table({"judged": coverage.cover(samples, comparison.judging, recordings)}),
         "cautions": cautions(comparison),
+        "running": told(comparison.overall()),
+        "starts": [start.told(name) for name, start in comparison.starts],
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t, samples) for t in targets],
         "recordings": [_recording(r) for r in recordings],
@@ -147,6 +150,7 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
         "model": a.model,
         "values": {m: a.metric(m) for m in TABLE},
         "word": a.word,
+        "alone": a.alone_metric("rms"),
         "reason": a.reason,
         "best": best is not None and a.model == best.model,
         "sensors": a.sensors,

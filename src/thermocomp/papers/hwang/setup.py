@@ -18,6 +18,7 @@ from thermocomp.assessment.sensitivity import Sensitivity, sensitivity
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import TermTable, Variable
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import lstsq
@@ -27,6 +28,7 @@ from thermocomp.papers.common import PAPERS_SUPPORT, Errors, predicted, renamed
 from thermocomp.papers.study import Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 from thermocomp.simulation.kits import HWANG_PLACES
 
 FloatArray = NDArray[np.float64]
@@ -78,7 +80,7 @@ class Fit:
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return tests with the paper's names, temperatures as they are."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
-    return stack([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False)
+    return stack([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False, zeroing=FIRST_READING, starts=COLD)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
@@ -232,9 +234,9 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> Fit:
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
-    learned = stack(tests[:1], [TARGET], inputs)
+    learned = stack(tests[:1], [TARGET], inputs, zeroing=FIRST_READING, starts=COLD)
     model = train("dynamic", learned, 0, np.ones(len(learned), dtype=np.bool_)).model
-    new = stack(tests[1:], [TARGET], inputs)
+    new = stack(tests[1:], [TARGET], inputs, zeroing=FIRST_READING, starts=COLD)
     return new.deviations[:, 0] - predicted(model, new)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import find, record
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
@@ -18,6 +19,7 @@ from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
 from thermocomp.papers.study import Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 from thermocomp.simulation.climate import Climate
 from thermocomp.simulation.protocol import Experiment
 
@@ -195,7 +197,7 @@ def compute(seed: int, progress: Progress) -> Computed:
 
 def samples_of(recording: Recording) -> Samples:
     """Return the drift of Z at all positions, the spindle speed being the only input (P-01)."""
-    return stack([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED])
+    return stack([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED], zeroing=FIRST_READING, starts=COLD)
 
 
 def in_a_workshop(experiment: Experiment) -> Experiment:

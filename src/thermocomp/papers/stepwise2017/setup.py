@@ -11,6 +11,7 @@ from thermocomp.assessment.robustness import Robustness, stress
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.numerics.stepwise import r_squared_of_f
@@ -19,6 +20,7 @@ from thermocomp.models.training import train
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
 from thermocomp.papers.study import Progress
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 FloatArray = NDArray[np.float64]
 
@@ -127,7 +129,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     """
     progress(0.0, "the two tests")
     test, online = record("stepwise2017", seed=seed)[0], record("stepwise2017-online", seed=seed)[0]
-    learn, judge = stack([test], [TARGET]), stack([online], [TARGET])
+    learn, judge = (stack([t], [TARGET], zeroing=FIRST_READING, starts=COLD) for t in (test, online))
     heat = [c.name for c in test.temperatures]
     warm, now = learn.only(heat), judge.only(heat)
     progress(0.1, "stepwise regression")
@@ -145,7 +147,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     shaken = {m: stress(found[m], judge, measured, rows).robustness for m in (STEPWISE, LEAST, PURSUIT)}
     progress(0.95, "fewer rows")
     thinned = tuple(_thinned(warm, now, every_so_many) for every_so_many in THINNED)
-    raw, new = (stack([r], [TARGET], heat, rezero=False) for r in (test, online))
+    raw, new = (stack([r], [TARGET], heat, rezero=False, zeroing=FIRST_READING, starts=COLD) for r in (test, online))
     absolute = fitted(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
     return Computed(
         learn,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment.replay import replay
 from thermocomp.core.model import Support
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.ace import ACE
 from thermocomp.models.ace_monotone import MonotoneACE
 from thermocomp.models.dynamic import DynamicRidge
@@ -16,6 +17,7 @@ from thermocomp.papers.common import Errors, errors_table, fitted, predicted
 from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -205,7 +207,9 @@ def stacked(
     """
     first = recordings[0]
     inputs = [first.temperatures[j].name for j in temperatures]
-    return stack(recordings, [first.displacements[displacement].name], inputs, rezero=rezero)
+    return stack(
+        recordings, [first.displacements[displacement].name], inputs, rezero=rezero, zeroing=FIRST_READING, starts=COLD
+    )
 
 
 def trial(
@@ -259,7 +263,9 @@ def _dynamic(recordings: Sequence[Recording], zeroed: tuple[Samples, Samples]) -
     speeds = [c.name for c in recordings[0].of_quantity("spindle_speed")]
     names = [*(c.name for c in zeroed[0].inputs), *speeds]
     target = zeroed[0].targets[0].name
-    learned, unseen = (stack(r, [target], names) for r in (recordings[:-1], recordings[-1:]))
+    learned, unseen = (
+        stack(r, [target], names, zeroing=FIRST_READING, starts=COLD) for r in (recordings[:-1], recordings[-1:])
+    )
     (model,) = fitted(
         DynamicRidge(speed=speeds), learned, [target], support=Support(), dt=learned.dt(), cycle=learned.cycle
     ).values()
@@ -326,7 +332,14 @@ def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> li
     """
     first = recordings[0]
     chosen = [first.temperatures[j] for j in temperatures]
-    everything = stack(recordings, [c.name for c in first.displacements], [c.name for c in chosen], rezero=False)
+    everything = stack(
+        recordings,
+        [c.name for c in first.displacements],
+        [c.name for c in chosen],
+        rezero=False,
+        zeroing=FIRST_READING,
+        starts=COLD,
+    )
     names = [place(c.name) for c in chosen], [place(c.name) for c in first.displacements]
     return [
         Panel(

@@ -1,0 +1,94 @@
+"""What models leave in a thermal test of ISO 230-3."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.assessment.leaks import learned_from
+from thermocomp.assessment.replay import absolute, run
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
+from thermocomp.recording.starts import Start, find
+
+FloatArray = NDArray[np.float64]
+
+
+def left_by(
+    recording: Recording, models: Sequence[ErrorModel], start: Start | None, limits: Limits
+) -> tuple[dict[str, FloatArray], list[str]]:
+    """Replay models over a thermal test, behind the gate and with limits, as a compensator would run them.
+
+    Parameters
+    ----------
+    recording : Recording
+    models : sequence of ErrorModel
+    start : Start or None
+        How the recording begins; found out if not given.
+    limits : Limits
+        Of the compensator.
+
+    Returns
+    -------
+    residuals : dict of str to ndarray of shape (n_rows,)
+        What each model leaves of its channel, by channel [its unit].
+    notes : list of str
+        What must be said of the models.
+
+    Raises
+    ------
+    InputError
+        No model is of a channel, or it cannot be told how the recording begins.
+    """
+    found: dict[str, FloatArray] = {}
+    notes = []
+    names = {c.name for c in recording.channels}
+    by_target = {recording.aliases.get(m.target, m.target): m for m in models}
+    mine = {target: m for target, m in by_target.items() if target in names}
+    if mine:
+        channels = [recording.channel(target) for target in mine]
+        used = list(mine.values())
+        if start is None:
+            (start,) = find([recording], channels, zeroing=used[0].zeroing, absolute=absolute(used))
+        notes.append(f"{start.told(recording.name)}; models run behind the gate, {limits.in_words()}")
+    for target, model in by_target.items():
+        if target not in names:
+            notes.append(f"the model of {model.target} has nothing to do here: there is no such channel")
+            continue
+        samples = stack(
+            [recording],
+            [target],
+            [i.name for i in model.inputs],
+            rezero=any(i.rezero for i in model.inputs),
+            zeroing=model.zeroing,
+            starts=start,
+        )
+        own = samples.cycle >= 0
+        ran = run(model, samples, own, limits)
+        found[target] = samples.deviations[own, 0] - ran.compensated
+        alone = samples.deviations[own, 0] - ran.deviation
+        left = [float(np.sqrt(np.nanmean(v**2))) for v in (found[target], alone)]
+        if f"{left[0]:.2f}" != f"{left[1]:.2f}":
+            notes.append(f"{target}: the model alone leaves {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
+        known = learned_from(model, samples)[own]
+        if known.all():
+            notes.append(f"the model of {target} was fitted to this very recording: what it leaves is no honest test")
+        elif known.any():
+            rows = f"{known.sum():,} of {len(known):,} rows were learned from"
+            notes.append(f"the model of {target}: {rows}: what it leaves there is no honest test")
+        honest = model.honest_error
+        if honest is not None and not model.accepted:
+            notes.append(f"the model of {target} was {honest.word} when it was fitted: {honest.why}")
+        if ran.rejected.any():
+            notes.append(f"the gate turned {int(ran.rejected.sum())} readings of {target} away; the first: {ran.why}")
+        if ran.outside.mean() > 0.1:
+            share = f"{100 * ran.outside.mean():.0f} % of the rows"
+            notes.append(f"the model of {target}: {share} are outside the range it was trained in")
+    if models and not found:
+        raise InputError(
+            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, none of them a channel here"
+        )
+    return found, notes

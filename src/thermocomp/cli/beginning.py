@@ -1,0 +1,89 @@
+"""How recordings begin, as said on the command line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from cyclopts import Parameter
+
+from thermocomp.cli.options import OptionalPaths, read_recordings
+from thermocomp.core.exceptions import InputError
+
+if TYPE_CHECKING:
+    from thermocomp.recording.recording import Recording
+    from thermocomp.recording.starts import Start
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Beginning:
+    """How the recordings begin; found out if nothing is said.
+
+    Parameters
+    ----------
+    start : str
+        cold: zeroed at rest at its start; continued: goes on from the files of --continues; rezeroed: counts from its
+        start, on a machine that may be warm; known: counts from the temperatures of --zero.
+    continues : list of Path
+        Files of the same test before the recording, in the order of time. With --start rezeroed the state of the
+        machine is known from them, and all is counted from the start of the recording.
+    gap : float
+        From the end of each of these to the start of what follows [s]; by time stamps, or one sampling interval, if not
+        given.
+    zero : str
+        Temperatures of the known zero, such as t1_C=20.1,t2_C=20.4, or a recording at the start of which they are.
+    """
+
+    start: Literal["cold", "continued", "rezeroed", "known"] | None = None
+    continues: OptionalPaths = None
+    gap: float | None = None
+    zero: str | None = None
+
+    def of(self, tests: "Sequence[Recording]", mapping: Path | None) -> "Start | None":
+        """Return how `tests` begin; None: to be found out.
+
+        Raises
+        ------
+        InputError
+            The options do not go together, or a file or a channel is not there.
+        """
+        from thermocomp.recording.starts import Start
+
+        if self.gap is not None and not self.continues:
+            raise InputError("--gap is the time between two files: name the earlier one with --continues")
+        if self.zero is not None and self.start not in (None, "known"):
+            raise InputError(f"--zero goes with --start known, not with {self.start}")
+        if self.continues and self.start not in (None, "continued", "rezeroed"):
+            raise InputError(f"--continues goes with --start continued or rezeroed, not with {self.start}")
+        if self.continues and len(tests) != 1:
+            raise InputError(f"--continues: {len(tests)} recordings are given; name the one that goes on")
+        word = self.start or ("continued" if self.continues else "known" if self.zero is not None else None)
+        if word is None:
+            return None
+        if not tests:
+            raise InputError(f"--start {word}: is told of a recording; name one")
+        earlier = tuple(read_recordings(self.continues, mapping)) if self.continues else ()
+        for e in earlier:
+            if e.fingerprint == tests[0].fingerprint:
+                raise InputError(f"--continues {e.source}: is the recording itself")
+        return Start(word, "stated", earlier, self.gap, _zero(self.zero, tests[0], mapping) if self.zero else {})
+
+
+def _zero(text: str, test: "Recording", mapping: Path | None) -> dict[str, float]:
+    """Return temperatures by channel, from a text or from the start of a recording."""
+    from thermocomp.core.zero import Zeroing
+    from thermocomp.recording.starts import level
+
+    if "=" not in text:
+        (other,) = read_recordings([Path(text)], mapping)
+        zeroing = Zeroing(speed=other.speed.name if other.speed is not None else "")
+        return {c.name: level(other, c.name, zeroing) for c in other.temperatures}
+    found = {}
+    for part in text.split(","):
+        name, _, value = part.partition("=")
+        try:
+            found[test.channel(name.strip()).name] = float(value)
+        except ValueError as e:
+            raise InputError(f"--zero {part!r}: write a channel and its temperature, such as t1_C=20.1") from e
+    return found

@@ -1,0 +1,45 @@
+"""What was judged besides the models: the gate and the limits of the compensator, in words."""
+
+from collections.abc import Sequence
+
+from thermocomp.assessment.results import Assessment
+
+#: models of which it is said what they leave without gate and limits; there is a number for each in the JSON
+MOST = 4
+
+
+def told(assessments: Sequence[Assessment]) -> list[str]:
+    """Return what the compensator around the models did to the figures.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+        The last words on models and targets.
+
+    Returns
+    -------
+    list of str
+        The limits and what the models alone leave; targets without limits; readings that the gate turned away.
+    """
+    judged = [a for a in assessments if a.alone is not None and not a.failure]
+    limited = [a for a in judged if a.limits is not None]
+    lines = []
+    if limited and limited[0].limits is not None:
+        off = [(a, a.metric("rms"), a.alone_metric("rms")) for a in limited]
+        other = sorted((x for x in off if f"{x[1]:.2f}" != f"{x[2]:.2f}"), key=lambda x: -abs(x[2] - x[1]))
+        shown = [f"{a.model} for {a.target} {alone:.2f} instead of {ran:.2f} um" for a, ran, alone in other[:MOST]]
+        more = f", {len(other) - MOST} more by less" if len(other) > MOST else ""
+        alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
+        lines.append(
+            f"Judged is what would run, behind the gate and with limits ({limited[0].limits.in_words()}). RMS of "
+            f"the models alone: {alone_words}."
+        )
+    if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
+        lines.append(f"No limits for {', '.join(without)}: they are limits of micrometres.")
+    lines += [
+        f"The gate turned {a.rejected} of {len(a.measured)} readings of {a.model} for {a.target} away; the first: "
+        f"{a.turned_away}."
+        for a in judged
+        if a.rejected
+    ]
+    return lines
