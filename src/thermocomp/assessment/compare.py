@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -133,7 +134,7 @@ class Comparison:
 
 def compare(
     samples: Samples,
-    methods: Sequence[str],
+    methods: Sequence[Any],
     judging: Judging,
     *,
     support: Support = Support(),
@@ -148,8 +149,8 @@ def compare(
     Parameters
     ----------
     samples : Samples
-    methods : sequence of str
-        ``all`` stands for all of them.
+    methods : sequence of str or estimator
+        ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
     judging : Judging
         What is learned from and what is judged.
     support : Support
@@ -188,7 +189,7 @@ def compare(
     return Comparison(judging, tuple(found), heat, left=len(pieces) // len(judging.splits) - whole)
 
 
-def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging) -> int:
+def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging) -> int:
     """Return the number of pieces of work of `compare`."""
     return len(samples.targets) * len(expand(methods)) * len(judging.splits)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, HonestError, Support
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.methods import method as find
+from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
@@ -44,7 +45,7 @@ class Fitted:
 
 def fit(
     samples: Samples,
-    method: str,
+    method: Any,
     judging: Judging,
     *,
     support: Support = Support(),
@@ -56,7 +57,8 @@ def fit(
     Parameters
     ----------
     samples : Samples
-    method : str
+    method : str or estimator
+        See `thermocomp.models.methods.expand`.
     judging : Judging
     support : Support
         For the models.
@@ -74,7 +76,8 @@ def fit(
     InputError
         The method is unknown, or cannot be frozen, so there would be no model.
     """
-    if not find(method).kind.freezable:
+    (method,) = expand([method])
+    if not deployable(method):
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
     comparison = compare(samples, [method], judging, support=support, robustness=False, jobs=jobs, progress=progress)
     models, estimators, r_squared = [], [], []

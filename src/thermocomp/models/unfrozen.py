@@ -1,7 +1,7 @@
 """Methods that no handful of numbers can stand for: compared with the others, never deployed."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NoReturn
 
@@ -54,6 +54,7 @@ class UnfrozenRegressor(ThermalRegressor):
         inputs: Sequence[Input] | None = None,
         support: Support = Support(),
         provenance: Provenance | None = None,
+        rows: FloatArray | None = None,
     ) -> "EstimatorModel":
         """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
 
@@ -61,6 +62,8 @@ class UnfrozenRegressor(ThermalRegressor):
         ----------
         target, unit, inputs, support, provenance
             As in `thermocomp.models.base.ThermalRegressor.freeze`.
+        rows : ndarray of shape (n_rows, n_features), optional
+            Inputs minus their reference that it will be asked for: predicted at once, which is much faster.
 
         Returns
         -------
@@ -75,6 +78,7 @@ class UnfrozenRegressor(ThermalRegressor):
             provenance=provenance,
             estimator=self,
             fingerprint=str(joblib.hash(self)),
+            known={} if rows is None else {r.tobytes(): v for r, v in zip(rows, self.evaluate(rows), strict=True)},
         )
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
@@ -93,6 +97,8 @@ class EstimatorModel(ErrorModel):
         Fitted.
     fingerprint : str
         Hash of its numbers; in its place when two models are compared.
+    known : dict of bytes to float
+        Predictions that were made before, by the bytes of the inputs minus their reference.
     """
 
     family: ClassVar[str] = "estimator"
@@ -100,6 +106,7 @@ class EstimatorModel(ErrorModel):
 
     estimator: UnfrozenRegressor = field(compare=False)
     fingerprint: str
+    known: Mapping[bytes, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def _check(self) -> None:
         check_is_fitted(self.estimator)
@@ -108,6 +115,8 @@ class EstimatorModel(ErrorModel):
         return np.empty((*change.shape[:-1], 0))
 
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        if change.ndim == 1 and (before := self.known.get(change.tobytes())) is not None:
+            return memory, before
         rows = change.reshape(-1, change.shape[-1])
         return memory, self.estimator.evaluate(rows).reshape(change.shape[:-1])
 

@@ -261,7 +261,12 @@ def _dynamic(recordings: Sequence[Recording], zeroed: tuple[Samples, Samples]) -
     target = zeroed[0].targets[0].name
     learned, unseen = (stack(r, [target], names) for r in (recordings[:-1], recordings[-1:]))
     (model,) = fitted(
-        DynamicRidge(speed=speeds), learned, [target], support=Support(), dt=learned.dt(), cycle=learned.cycle
+        DynamicRidge(speed=speeds, time="routed"),
+        learned,
+        [target],
+        support=Support(),
+        dt=learned.dt(),
+        cycle=learned.cycle,
     ).values()
     return predicted(model, learned), predicted(model, unseen)
 
