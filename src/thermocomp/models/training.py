@@ -18,6 +18,7 @@ from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.foreign import adopted, title
 from thermocomp.models.methods import Method, Named, given, method
+from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.samples import Samples
 
@@ -92,6 +93,8 @@ def train(
         )
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
     estimator = how.build(speeds) if own is None else clone(own)
+    if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
+        estimator.set_params(speed=speeds)  # the recording knows which inputs are
     begin = time.perf_counter()
     # a method with a memory also gets what the machine went through between the rows it learns from
     rows = samples.valid & np.isin(samples.test, samples.test[seen]) if "dt" in how.takes else seen

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pickle import PicklingError
 from typing import Any, ClassVar, NoReturn
 
 import joblib
@@ -70,15 +71,21 @@ class UnfrozenRegressor(ThermalRegressor):
         EstimatorModel
             With all of the inputs.
         """
+        given = self._inputs(inputs)
+        made = None if rows is None else self.evaluate(rows)
+        try:
+            fingerprint = str(joblib.hash(self))
+        except PicklingError:  # a class from inside a function: its predictions stand for it
+            fingerprint = str(joblib.hash((self.name, self.data_min_, self.data_max_, made)))
         return EstimatorModel(
             target=target,
             unit=unit,
-            inputs=self._inputs(inputs),
+            inputs=given,
             support=support,
             provenance=provenance,
             estimator=self,
-            fingerprint=str(joblib.hash(self)),
-            known={} if rows is None else {r.tobytes(): v for r, v in zip(rows, self.evaluate(rows), strict=True)},
+            fingerprint=fingerprint,
+            known={} if made is None or rows is None else {r.tobytes(): v for r, v in zip(rows, made, strict=True)},
         )
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> NoReturn:  # noqa: ARG002 - none is made
