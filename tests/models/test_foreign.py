@@ -97,6 +97,11 @@ def test_what_cannot_be_deployed_is_never_the_best(samples: Samples) -> None:
     ]
 
 
+def test_the_recording_tells_which_inputs_are_speeds(samples: Samples) -> None:
+    found = rms(samples, ["dynamic", DynamicRidge(), DynamicRidge(time="column")])
+    assert found["dynamic"] == found["DynamicRidge"] == found["DynamicRidge #2"]
+
+
 def test_the_replay_is_its_prediction(samples: Samples) -> None:
     """Predictions made at once and one by one are the same, and are those of the estimator that was given."""
     rows = samples.cycle < 2
