@@ -65,6 +65,9 @@ def test_the_time_is_kept_and_not_asked_about(crowded: Samples) -> None:
     plain = SensorSelector("partial-f").fit(X, y)
     found = SensorSelector("partial-f", time="column").fit(timed, y)
     assert found.get_feature_names_out().tolist() == ["time_s", *plain.get_feature_names_out()]
+    one = SensorSelector(BestSubset(size=1), time="column").fit(timed, y)
+    assert one.get_support()[0]
+    assert one.get_support().sum() == 2
 
 
 def test_cycles_by_routing(crowded: Samples) -> None:

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from thermocomp.models.arx_net import NetARX
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.methods import METHODS
 from thermocomp.models.timed import TimedRegressor, from_column
+from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples, stack
 
 FloatArray = NDArray[np.float64]
@@ -229,6 +231,13 @@ def test_a_pause_is_refused_in_a_column_and_told_by_dt() -> None:
     assert from_column(np.r_[0.0, 95, 100]).tolist() == [np.inf, 95, 5]
 
 
+def test_the_end_of_a_test_alone_is_refused_when_routed(tests: Samples) -> None:
+    dt: Any = pd.Series(tests.dt())
+    fitted: Any = MAKERS["dynamic"](time="routed").fit(tests.frame(), tests.deviations[:, 0], dt=dt)
+    with pytest.raises(InputError, match="first row comes 60 s after another, and its test must start with inf"):
+        fitted.predict(tests.frame().iloc[100:], dt=dt.iloc[100:])
+
+
 def test_at_rest_is_for_the_checks_alone(tests: Samples) -> None:
     still: Any = MAKERS["dynamic"](time="none")
     with pytest.raises(InputError, match="dt was given to DynamicRidge"):
@@ -287,3 +296,12 @@ def test_grid_search_and_pipeline_with_a_column(tests: Samples) -> None:
     ).fit(X, y, groups=groups)
     assert np.isfinite(search.cv_results_["mean_test_score"]).all()
     assert search.score(X, y) > 0.9
+
+
+def test_a_left_out_file_has_no_part_in_the_training() -> None:
+    """Not by its time steps either: the usual one is that of the files that are learned from."""
+    slow = small_machine()
+    slow = replace(slow, name="slow", time=10 * slow.time)
+    both = stack([small_machine((1000.0, 2500.0), seed=1), slow], ["z_um"])
+    trained: Any = train(ARX(inputs=["spindle_rpm"], interval=None), both, 0, both.test == 0).estimator
+    assert trained.interval_ == 60.0
