@@ -97,7 +97,7 @@ def main() -> int:
     inputs, z = machine()
     dt = np.full(N, INTERVAL)
     dt[0] = np.inf
-    model = ARX(interval=INTERVAL, k=K, m=LAGS - 1)
+    model = ARX(time="routed", interval=INTERVAL, k=K, m=LAGS - 1)
     X, y = lag_matrix(inputs, z, K, LAGS), z[K:]
     print(f"{'job, n = 10,000':<44} {'ours [ms]':>10} {'peer [ms]':>10} {'ratio':>8} {'goal':>6}  {'apart':>8}")
     reached = True
@@ -128,7 +128,7 @@ def main() -> int:
     )
 
     def all_orders() -> FloatArray:
-        found = ARX(interval=INTERVAL, k_max=K, m_max=LAGS - 1).fit(inputs, z, dt=dt).orders_
+        found = ARX(time="routed", interval=INTERVAL, k_max=K, m_max=LAGS - 1).fit(inputs, z, dt=dt).orders_
         return np.array([o.fpe for o in found])
 
     def refits() -> FloatArray:

@@ -60,7 +60,7 @@ def percentiles(job: Callable[[int], object], count: int) -> tuple[float, float]
 def main() -> int:
     X, y, dt, cycle = recording()
     speed = N_TEMPERATURES
-    estimator = DynamicRidge(speed=[speed]).fit(X, y, dt=dt, cycle=cycle)
+    estimator = DynamicRidge(speed=[speed], time="routed").fit(X, y, dt=dt, cycle=cycle)
     names = [f"t{k}" for k in range(N_TEMPERATURES)] + ["n"]
     quantities = [("temperature", "degC")] * N_TEMPERATURES + [("spindle_speed", "1/min")]
     inputs = [

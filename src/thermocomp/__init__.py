@@ -9,16 +9,52 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thermocomp.api.inputs import read, training_table
+    from thermocomp.api.verbs import assess, compare, fit, select, simulate
+    from thermocomp.cli.revisecall import revise
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
     from thermocomp.core.lineardynamic import LinearDynamic
     from thermocomp.core.model import ErrorModel
     from thermocomp.core.polynomial import Polynomial
     from thermocomp.core.reading import Reading
+    from thermocomp.models.ace import ACE
+    from thermocomp.models.ace_monotone import MonotoneACE
+    from thermocomp.models.arx import ARX
+    from thermocomp.models.arx_net import NetARX
+    from thermocomp.models.dynamic import DynamicRidge
+    from thermocomp.models.gp import GaussianProcess
+    from thermocomp.models.grouping import CorrelationGrouping
+    from thermocomp.models.lasso import ElasticNet, Lasso
+    from thermocomp.models.mlp import SigmoidNet
+    from thermocomp.models.mlp_sklearn import SklearnNet
+    from thermocomp.models.mra import StepwiseMRA
+    from thermocomp.models.ols import LeastSquares
+    from thermocomp.models.partial_f import PartialF
+    from thermocomp.models.pcr import PrincipalComponents
+    from thermocomp.models.pipelines import freeze
+    from thermocomp.models.pls import PartialLeastSquares
+    from thermocomp.models.ppr import ProjectionPursuit
+    from thermocomp.models.ridge import Ridge
+    from thermocomp.models.sensors import SensorSelector
+    from thermocomp.models.subsets import BestSubset
+    from thermocomp.recording.recording import Recording
 
 __version__ = version("thermocomp")
 
 _PUBLIC = {
+    # the main job
+    "read": "thermocomp.api.inputs",
+    "simulate": "thermocomp.api.verbs",
+    "select": "thermocomp.api.verbs",
+    "compare": "thermocomp.api.verbs",
+    "fit": "thermocomp.api.verbs",
+    "assess": "thermocomp.api.verbs",
+    "revise": "thermocomp.cli.revisecall",
+    "freeze": "thermocomp.models.pipelines",
+    "training_table": "thermocomp.api.inputs",
+    "Recording": "thermocomp.recording.recording",
+    # what runs at the machine
     "Correction": "thermocomp.core.correction",
     "Deviation": "thermocomp.core.correction",
     "ErrorModel": "thermocomp.core.model",
@@ -27,18 +63,69 @@ _PUBLIC = {
     "Polynomial": "thermocomp.core.polynomial",
     "Reading": "thermocomp.core.reading",
     "ThermocompError": "thermocomp.core.exceptions",
+    # the estimators
+    "ACE": "thermocomp.models.ace",
+    "ARX": "thermocomp.models.arx",
+    "BestSubset": "thermocomp.models.subsets",
+    "CorrelationGrouping": "thermocomp.models.grouping",
+    "DynamicRidge": "thermocomp.models.dynamic",
+    "ElasticNet": "thermocomp.models.lasso",
+    "GaussianProcess": "thermocomp.models.gp",
+    "Lasso": "thermocomp.models.lasso",
+    "LeastSquares": "thermocomp.models.ols",
+    "MonotoneACE": "thermocomp.models.ace_monotone",
+    "NetARX": "thermocomp.models.arx_net",
+    "PartialF": "thermocomp.models.partial_f",
+    "PartialLeastSquares": "thermocomp.models.pls",
+    "PrincipalComponents": "thermocomp.models.pcr",
+    "ProjectionPursuit": "thermocomp.models.ppr",
+    "Ridge": "thermocomp.models.ridge",
+    "SensorSelector": "thermocomp.models.sensors",
+    "SigmoidNet": "thermocomp.models.mlp",
+    "SklearnNet": "thermocomp.models.mlp_sklearn",
+    "StepwiseMRA": "thermocomp.models.mra",
 }
 
 __all__ = [
+    "ACE",
+    "ARX",
+    "BestSubset",
     "Correction",
+    "CorrelationGrouping",
     "Deviation",
+    "DynamicRidge",
+    "ElasticNet",
     "ErrorModel",
+    "GaussianProcess",
+    "Lasso",
+    "LeastSquares",
     "Limits",
     "LinearDynamic",
+    "MonotoneACE",
+    "NetARX",
+    "PartialF",
+    "PartialLeastSquares",
     "Polynomial",
+    "PrincipalComponents",
+    "ProjectionPursuit",
     "Reading",
+    "Recording",
+    "Ridge",
+    "SensorSelector",
+    "SigmoidNet",
+    "SklearnNet",
+    "StepwiseMRA",
     "ThermocompError",
     "__version__",
+    "assess",
+    "compare",
+    "fit",
+    "freeze",
+    "read",
+    "revise",
+    "select",
+    "simulate",
+    "training_table",
 ]
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import RecordingError, UnitError
-from thermocomp.files.columns import understand
+from thermocomp.core.headings import understand
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.files.recordings import read, read_all
 from thermocomp.recording.cycles import Cycle, whole

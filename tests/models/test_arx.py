@@ -28,7 +28,12 @@ QUICK: dict[str, Any] = {"hidden": (2, 4), "epochs": 400}
 
 
 @parametrize_with_checks(  # type: ignore[untyped-decorator]
-    [ARX(), ARX(criterion="free-run", k_max=2, m_max=2), ARX(fit_intercept=True), NetARX(epochs=200)]
+    [
+        ARX(time="none"),
+        ARX(time="none", criterion="free-run", k_max=2, m_max=2),
+        ARX(time="none", fit_intercept=True),
+        NetARX(epochs=200, time="none"),
+    ]
 )
 def test_contract_of_scikit_learn(estimator: ThermalRegressor, check: Callable[[ThermalRegressor], None]) -> None:
     check(estimator)
@@ -44,7 +49,7 @@ def test_orders_of_simulated_series(order: tuple[int, int]) -> None:
     for seed in range(20):
         u, z = series(order, seed)
         for criterion, chosen in found.items():
-            e = ARX(criterion=criterion).fit(u, z, dt=clock(len(z)))  # type: ignore[arg-type]
+            e = ARX(time="routed", criterion=criterion).fit(u, z, dt=clock(len(z)))  # type: ignore[arg-type]
             chosen.append((e.k_, e.m_))
     assert all(k >= order[0] and m >= order[1] for k, m in found["fpe"])
     assert Counter(found["fpe"]).most_common(1)[0][0] == order
@@ -64,7 +69,7 @@ def test_table_of_orders_equals_plain_fits(intercept: bool) -> None:
     """All orders from one triangle: the same SSE as a least-squares fit of each, on the same rows."""
     u, z = series((2, 1), 3, n=120)
     K, M = 4, 3
-    e = ARX(k_max=K, m_max=M, fit_intercept=intercept).fit(u, z + 1.0, dt=clock(len(z)))
+    e = ARX(time="routed", k_max=K, m_max=M, fit_intercept=intercept).fit(u, z + 1.0, dt=clock(len(z)))
     assert [(o.k, o.m) for o in e.orders_] == [(k, m) for k in range(K + 1) for m in range(M + 1)]
     y = (z + 1.0)[K:]
     for o in e.orders_:
@@ -84,7 +89,7 @@ def test_table_of_orders_equals_plain_fits(intercept: bool) -> None:
 
 def test_without_noise_the_smallest_exact_order_wins() -> None:
     u, z = series((2, 1), 0, equation=0.0)
-    e = ARX().fit(u, z, dt=clock(len(z)))
+    e = ARX(time="routed").fit(u, z, dt=clock(len(z)))
     assert (e.k_, e.m_) == (2, 1)
     np.testing.assert_allclose(e.a_, SYSTEMS[2, 1][0], rtol=1e-8)
     np.testing.assert_allclose(e.b_, SYSTEMS[2, 1][1], rtol=1e-8)
@@ -98,7 +103,7 @@ def test_coefficients_are_recovered(order: tuple[int, int], criterion: str) -> N
     u, z = series(order, 1, n=4000, equation=0.02 if criterion == "fpe" else 0.0)
     if criterion == "free-run":
         z = z + np.random.default_rng(1).normal(0, 0.05, len(z))
-    e = ARX(k=order[0], m=order[1], criterion=criterion)  # type: ignore[arg-type]
+    e = ARX(time="routed", k=order[0], m=order[1], criterion=criterion)  # type: ignore[arg-type]
     e.fit(u, z, dt=clock(len(z)))
     a, b = SYSTEMS[order]
     np.testing.assert_allclose(e.a_, a, atol=0.02 * np.abs(a).max())
@@ -110,8 +115,8 @@ def test_probe_noise_biases_one_step_errors_but_not_the_free_run() -> None:
     """E-P3: the probe's noise enters the past displacements; least squares on one step then decays too fast."""
     u, z = series((1, 0), 2, n=2000, equation=0.0)
     noisy = z + np.random.default_rng(0).normal(0, 4.0, len(z))
-    one = ARX(k=1, m=0).fit(u, noisy, dt=clock(len(z)))
-    free = ARX(k=1, m=0, criterion="free-run").fit(u, noisy, dt=clock(len(z)))
+    one = ARX(time="routed", k=1, m=0).fit(u, noisy, dt=clock(len(z)))
+    free = ARX(time="routed", k=1, m=0, criterion="free-run").fit(u, noisy, dt=clock(len(z)))
     assert one.a_[0] < 0.88
     assert free.a_[0] == pytest.approx(0.9, abs=0.002)
     assert free.free_run_rms_ < one.free_run_rms_
@@ -122,7 +127,7 @@ def test_probe_noise_biases_one_step_errors_but_not_the_free_run() -> None:
 def test_one_step_errors_are_trivially_small() -> None:
     """E-P3: in short steps, the last displacement is all one needs to look good; the free run tells."""
     u, z = series((1, 0), 4, equation=0.5)
-    e = ARX(k=1, m=0).fit(u, z, dt=clock(len(z)))
+    e = ARX(time="routed", k=1, m=0).fit(u, z, dt=clock(len(z)))
     both = e.one_step(u, z, dt=clock(len(z)))
     assert both.shape == (len(z) - 1, 2)
     np.testing.assert_allclose(both[:, 0], z[1:])
@@ -136,7 +141,15 @@ def test_one_step_errors_are_trivially_small() -> None:
 
 def test_intervals_and_orders_are_judged_on_cycles_left_out(samples: Samples) -> None:
     X, y, dt, cycle = samples.frame(), samples.deviations[:, 0], samples.dt(), samples.cycle
-    e = ARX(inputs=["spindle_rpm"], interval=(120.0, 600.0), criterion="free-run", k_max=2, m_max=1, fit_intercept=None)
+    e = ARX(
+        time="routed",
+        inputs=["spindle_rpm"],
+        interval=(120.0, 600.0),
+        criterion="free-run",
+        k_max=2,
+        m_max=1,
+        fit_intercept=None,
+    )
     e.fit(X, y, dt=dt, cycle=cycle)
     assert len(e.trials_) == 2 * 3 * 2 * 2
     best = min(e.trials_, key=lambda c: c.cv_rms)
@@ -148,7 +161,7 @@ def test_intervals_and_orders_are_judged_on_cycles_left_out(samples: Samples) ->
     errors = []
     for k in range(4):
         left = np.where(cycle == k, -1, cycle)
-        one = ARX(
+        one = ARX(time="routed",
             inputs=["spindle_rpm"], interval=best.interval, k=best.k, m=best.m, criterion="free-run",
             fit_intercept=best.intercept,
         ).fit(X, y, dt=dt, cycle=left)  # fmt: skip
@@ -161,23 +174,23 @@ def test_intervals_and_orders_are_judged_on_cycles_left_out(samples: Samples) ->
 def test_a_setting_that_cannot_be_fitted_without_a_cycle_is_not_chosen() -> None:
     u, z = series((1, 0), 3, n=120)
     dt, cycle = clock(120, 60.0), np.arange(120) // 60
-    e = ARX(interval=(60.0, 1200.0), k=3, m=3).fit(u, z, dt=dt, cycle=cycle)
+    e = ARX(time="routed", interval=(60.0, 1200.0), k=3, m=3).fit(u, z, dt=dt, cycle=cycle)
     assert [math.isfinite(c.cv_rms) for c in e.trials_] == [True, False]
     assert e.interval_ == 60.0
-    net = NetARX(interval=1800.0, k=2, hidden=(2, 3), epochs=50).fit(u, z, dt=dt, cycle=cycle)
+    net = NetARX(time="routed", interval=1800.0, k=2, hidden=(2, 3), epochs=50).fit(u, z, dt=dt, cycle=cycle)
     assert [c.cv_rms for c in net.trials_] == [math.inf, math.inf]
 
 
 def test_hidden_nodes_are_judged_on_cycles_left_out(samples: Samples) -> None:
     X, y, dt, cycle = samples.frame(), samples.deviations[:, 0], samples.dt(), samples.cycle
-    e = NetARX(inputs=["spindle_rpm"], **QUICK).fit(X, y, dt=dt, cycle=cycle)
+    e = NetARX(time="routed", inputs=["spindle_rpm"], **QUICK).fit(X, y, dt=dt, cycle=cycle)
     assert [c.hidden for c in e.trials_] == [2, 4]
     assert e.hidden_ == min(e.trials_, key=lambda c: c.cv_rms).hidden
     assert e.net_.shape == (2, e.hidden_, 1)
-    again = NetARX(inputs=["spindle_rpm"], **QUICK, jobs=1).fit(X, y, dt=dt, cycle=cycle)
+    again = NetARX(time="routed", inputs=["spindle_rpm"], **QUICK, jobs=1).fit(X, y, dt=dt, cycle=cycle)
     assert again.trials_ == e.trials_
-    linear = ARX(inputs=["spindle_rpm"]).fit(X, y, dt=dt, cycle=cycle)
-    searched = NetARX(inputs=["spindle_rpm"], k=None, m=None, **QUICK).fit(X, y, dt=dt, cycle=cycle)
+    linear = ARX(time="routed", inputs=["spindle_rpm"]).fit(X, y, dt=dt, cycle=cycle)
+    searched = NetARX(time="routed", inputs=["spindle_rpm"], k=None, m=None, **QUICK).fit(X, y, dt=dt, cycle=cycle)
     assert (searched.k_, searched.m_) == (linear.k_, linear.m_)  # E-P2: the same search
 
 
@@ -193,11 +206,11 @@ def test_measured_data(shared_data: Path) -> None:
         none = np.sqrt(np.mean(y[7711:] ** 2))
         print(f"\n{channel}: none {none:.2f} um", end="")
         for estimator in (
-            ARX(inputs=["spindle_rpm"], k=1, m=0, interval=None),
-            ARX(inputs=["spindle_rpm"], k=1, m=0),
-            ARX(inputs=["spindle_rpm"]),
-            ARX(inputs=["spindle_rpm"], criterion="free-run", k_max=2, m_max=2),
-            NetARX(inputs=["spindle_rpm"], hidden=4),
+            ARX(time="routed", inputs=["spindle_rpm"], k=1, m=0, interval=None),
+            ARX(time="routed", inputs=["spindle_rpm"], k=1, m=0),
+            ARX(time="routed", inputs=["spindle_rpm"]),
+            ARX(time="routed", inputs=["spindle_rpm"], criterion="free-run", k_max=2, m_max=2),
+            NetARX(time="routed", inputs=["spindle_rpm"], hidden=4),
         ):
             e = estimator.fit(X, y, dt=dt, cycle=cycle)
             rms = np.sqrt(np.mean((y - e.predict(X, dt=dt))[7711:] ** 2))
@@ -210,7 +223,7 @@ def test_measured_data(shared_data: Path) -> None:
 
 def test_no_spindle_speed() -> None:
     u, z = series((1, 0), 0, n=50)
-    for estimator in (ARX(inputs=()), NetARX(inputs=())):
+    for estimator in (ARX(time="routed", inputs=()), NetARX(time="routed", inputs=())):
         with pytest.raises(FitError, match=r"no spindle speed to predict from.*Record the spindle speed"):
             estimator.fit(u, z, dt=clock(50))
 
@@ -233,18 +246,24 @@ def test_no_spindle_speed() -> None:
 def test_bad_settings(settings_: dict[str, Any], message: str) -> None:
     u, z = series((1, 0), 0, n=50)
     with pytest.raises(InputError, match=message):
-        ARX(**settings_).fit(u, z, dt=clock(50))
+        ARX(time="routed", **settings_).fit(u, z, dt=clock(50))
 
 
 @pytest.mark.parametrize("settings_", [{"hidden": ()}, {"hidden": (0, 2)}, {"k": -2}, {"m": -2}, {"epochs": 0}])
 def test_bad_settings_of_the_net(settings_: dict[str, Any]) -> None:
     u, z = series((1, 0), 0, n=50)
     with pytest.raises(InputError):
-        NetARX(**settings_).fit(u, z, dt=clock(50))
+        NetARX(time="routed", **settings_).fit(u, z, dt=clock(50))
 
 
 @pytest.mark.parametrize(
-    "estimator", [ARX(k=2, m=1), ARX(k=2, m=1, criterion="free-run"), NetARX(k=2, **QUICK)], ids=str
+    "estimator",
+    [
+        ARX(time="routed", k=2, m=1),
+        ARX(time="routed", k=2, m=1, criterion="free-run"),
+        NetARX(time="routed", k=2, **QUICK),
+    ],
+    ids=str,
 )
 def test_bad_data(estimator: ARX | NetARX) -> None:
     u, z = series((1, 0), 0, n=50)
@@ -267,7 +286,7 @@ def test_bad_data(estimator: ARX | NetARX) -> None:
 def test_predict_checks_what_it_is_given() -> None:
     """Plain arrays take a short way in: the answers and the refusals are the same."""
     u, z = series((1, 0), 0, n=50)
-    e = ARX(k=1, m=0).fit(u, z, dt=clock(50))
+    e = ARX(time="routed", k=1, m=0).fit(u, z, dt=clock(50))
     expected = e.predict(u, dt=clock(50))
     for same in (u.tolist(), np.asfortranarray(u), u.astype(object), np.repeat(u, 2, axis=1)[:, ::2]):
         assert np.array_equal(e.predict(same, dt=clock(50)), expected)
@@ -281,33 +300,38 @@ def test_predict_checks_what_it_is_given() -> None:
     with pytest.raises(ValueError, match="0 sample"):
         e.predict(u[:0], dt=[])
     first = clock(50)
-    first[0] = 7.0  # the first row starts a test, whatever its step
-    assert np.array_equal(e.predict(u, dt=first), expected)
-    named = ARX(k=1, m=0).fit(pd.DataFrame({"n": u[:, 0]}), z, dt=clock(50))
+    first[0] = 7.0  # a part of a test, whose start was left out
+    with pytest.raises(InputError, match=r"first row comes 7 s after another.*leave whole tests out"):
+        e.predict(u, dt=first)
+    named = ARX(time="routed", k=1, m=0).fit(pd.DataFrame({"n": u[:, 0]}), z, dt=clock(50))
     with pytest.warns(UserWarning, match="feature names"):
         named.predict(u, dt=clock(50))
 
 
 def test_few_rows_shrink_the_search() -> None:
     u, z = series((1, 0), 0, n=9)
-    e = ARX().fit(u, z, dt=clock(9))
+    e = ARX(time="routed").fit(u, z, dt=clock(9))
     assert max(o.k for o in e.orders_) < 5
     assert all(o.n_parameters < o.n_rows for o in e.orders_ if o.admissible)
     with pytest.raises(FitError, match="only 0 ticks"):
-        ARX(k=1, m=0).fit(u, z)  # without dt, no row has a past
+        ARX(time="none", k=1, m=0).fit(u, z)  # no row has a past
 
 
 def test_constant_and_copied_inputs_and_a_dead_probe() -> None:
     u, z = series((1, 0), 0, n=300)
     X = np.hstack([u, u, np.zeros_like(u), np.full_like(u, 20.0)])
-    alone = ARX(k=1, m=0).fit(u, z, dt=clock(300))
-    for e in (ARX(k=1, m=0), ARX(k_max=2, m_max=2), ARX(criterion="free-run", k=1, m=0)):
+    alone = ARX(time="routed", k=1, m=0).fit(u, z, dt=clock(300))
+    for e in (
+        ARX(time="routed", k=1, m=0),
+        ARX(time="routed", k_max=2, m_max=2),
+        ARX(time="routed", criterion="free-run", k=1, m=0),
+    ):
         e.fit(X, z, dt=clock(300))
         assert np.isfinite(e.b_).all()
         assert e.free_run_rms_ <= alone.free_run_rms_ * 1.05
-    dead = ARX().fit(u, np.zeros(300), dt=clock(300))
+    dead = ARX(time="routed").fit(u, np.zeros(300), dt=clock(300))
     assert not dead.predict(u, dt=clock(300)).any()
-    still = ARX(fit_intercept=True).fit(np.zeros_like(u), np.full(300, 5.0), dt=clock(300))
+    still = ARX(time="routed", fit_intercept=True).fit(np.zeros_like(u), np.full(300, 5.0), dt=clock(300))
     assert np.isfinite(still.predict(u, dt=clock(300))).all()
 
 

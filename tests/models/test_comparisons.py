@@ -13,6 +13,7 @@ from sklearn import linear_model
 from sklearn.cross_decomposition import PLSRegression
 from sklearn.decomposition import PCA
 from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
@@ -377,3 +378,22 @@ def test_process_is_judged_beside_the_others(samples: Samples, monkeypatch: pyte
     monkeypatch.setattr(study, "compare", never)
     with pytest.raises(InputError, match="gp cannot be frozen to plain numbers: judge it with 'compare'"):
         study.fit(samples, "gp", judging)
+
+
+@pytest.mark.parametrize("make", [PartialLeastSquares, PrincipalComponents])
+def test_number_of_components_can_be_given(make: type[PartialLeastSquares | PrincipalComponents]) -> None:
+    rng = np.random.default_rng(8)
+    X = rng.normal(size=(120, 4)) * [3, 2, 1, 0.5]
+    y = X @ [1.0, -2.0, 0.5, 3.0] + rng.normal(size=120)
+    groups = np.arange(120) // 20
+    for k in (1, 2, 4):
+        given = make(components=k).fit(X, y)
+        chosen = make(max_components=k, rule="minimum").fit(X, y)
+        assert given.n_components_ == k
+        if chosen.n_components_ == k:
+            np.testing.assert_allclose(given.coef_, chosen.coef_)
+    assert make(components=9).fit(X, y).n_components_ == 4
+    search = GridSearchCV(make(), {"components": [1, 2, 3, 4]}, cv=LeaveOneGroupOut()).fit(X, y, groups=groups)
+    assert search.best_params_["components"] > 1
+    with pytest.raises(InputError):
+        make(components=-1).fit(X, y)

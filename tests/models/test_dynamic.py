@@ -17,7 +17,7 @@ LAGS = {"temperature_lags": ((), (20 * MINUTE,)), "speed_lags": ((20 * MINUTE,),
 
 
 def fitted(samples: Samples, target: int = 0, **settings: object) -> DynamicRidge:
-    estimator = DynamicRidge(speed=["spindle_rpm"], **{**LAGS, **settings})  # type: ignore[arg-type]
+    estimator = DynamicRidge(speed=["spindle_rpm"], **{**LAGS, "time": "routed", **settings})  # type: ignore[arg-type]
     return estimator.fit(samples.frame(), samples.deviations[:, target], dt=samples.dt(), cycle=samples.cycle)
 
 
@@ -72,14 +72,15 @@ def test_rows_that_are_not_learned_from_only_drive_the_lags(samples: Samples) ->
     models = []
     for value in (0.0, 1e9):
         y[samples.cycle == 1] = value
-        e = DynamicRidge(speed=["spindle_rpm"], **LAGS).fit(samples.frame(), y, dt=samples.dt(), cycle=cycle)  # type: ignore[arg-type]
+        e = DynamicRidge(speed=["spindle_rpm"], time="routed", **LAGS)  # type: ignore[arg-type]
+        e.fit(samples.frame(), y, dt=samples.dt(), cycle=cycle)
         models.append(e.freeze(target="z"))
     assert models[0] == models[1]
 
 
 def test_without_time_every_row_is_at_rest(samples: Samples) -> None:
-    estimator = fitted(samples)
     X = samples.frame()
+    estimator = DynamicRidge(time="none").fit(X, samples.deviations[:, 0])
     alone = np.array([estimator.predict(X.iloc[[k]])[0] for k in (0, 50, 600)])
     assert estimator.predict(X)[[0, 50, 600]] == pytest.approx(alone, rel=1e-12)
 
@@ -118,7 +119,7 @@ def left(estimator: DynamicRidge, every: int) -> float:
 
 def learned_slowly(**settings: object) -> DynamicRidge:
     temperatures, deviation = (values[::20] for values in network(3))
-    estimator = DynamicRidge(**settings)  # type: ignore[arg-type]
+    estimator = DynamicRidge(time="routed", **settings)  # type: ignore[arg-type]
     return estimator.fit(temperatures, deviation, dt=np.r_[np.inf, np.full(len(deviation) - 1, 20 * MINUTE)])
 
 
@@ -150,7 +151,7 @@ def test_constant_and_copied_channels_are_harmless(samples: Samples) -> None:
     X = samples.frame()
     X["dead_C"] = 0.0
     X["copy_C"] = X["t1_C"]
-    estimator = DynamicRidge(speed=["spindle_rpm"], **LAGS)  # type: ignore[arg-type]
+    estimator = DynamicRidge(speed=["spindle_rpm"], time="routed", **LAGS)  # type: ignore[arg-type]
     estimator.fit(X, samples.deviations[:, 0], dt=samples.dt(), cycle=samples.cycle)
     assert np.isfinite(estimator.coef_).all()
     model = estimator.freeze(target="z")
@@ -161,13 +162,13 @@ def test_constant_and_copied_channels_are_harmless(samples: Samples) -> None:
 def test_bad_input(samples: Samples) -> None:
     X, y = samples.frame(), samples.deviations[:, 0]
     with pytest.raises(InputError, match="speed column 'rpm'"):
-        DynamicRidge(speed=["rpm"]).fit(X, y)
+        DynamicRidge(speed=["rpm"], time="none").fit(X, y)
     with pytest.raises(InputError, match="time steps"):
-        DynamicRidge().fit(X, y, dt=[1.0, 2.0])
+        DynamicRidge(time="routed").fit(X, y, dt=[1.0, 2.0])
     with pytest.raises(InputError, match="cycle: want 800 numbers"):
-        DynamicRidge().fit(X, y, cycle=[0, 1])
+        DynamicRidge(time="none").fit(X, y, cycle=[0, 1])
     with pytest.raises(FitError, match="no row to learn from"):
-        DynamicRidge().fit(X, y, cycle=np.full(len(X), -1))
+        DynamicRidge(time="none").fit(X, y, cycle=np.full(len(X), -1))
 
 
 @settings(max_examples=30)
@@ -192,7 +193,7 @@ def test_published_block(shared_data: Path) -> None:
     errors = []
     for channel, published in zip(range(1, 6), (3.56, 3.76, 3.70, 3.46, 4.28), strict=True):
         y = table[f"ch{channel}_um"].to_numpy()
-        estimator = DynamicRidge(speed=["spindle_rpm"]).fit(X, y, dt=dt, cycle=cycle)
+        estimator = DynamicRidge(speed=["spindle_rpm"], time="routed").fit(X, y, dt=dt, cycle=cycle)
         errors.append(np.abs(y - estimator.predict(X, dt=dt))[6669:].mean())
         assert errors[-1] < published
     assert np.mean(errors) <= 1.9

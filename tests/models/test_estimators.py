@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 ALL = [LeastSquares(), PartialF(), StepwiseMRA(), StepwiseMRA(fit_intercept=True, hierarchy=True)]
 
 
-@parametrize_with_checks([*ALL, DynamicRidge(), DynamicRidge(fit_intercept=True)])  # type: ignore[untyped-decorator]
+@parametrize_with_checks([*ALL, DynamicRidge(time="none"), DynamicRidge(time="none", fit_intercept=True)])  # type: ignore[untyped-decorator]
 def test_contract_of_scikit_learn(estimator: ThermalRegressor, check: Callable[[ThermalRegressor], None]) -> None:
     check(estimator)
 

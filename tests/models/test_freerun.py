@@ -64,12 +64,12 @@ def stepped(model: ErrorModel, X: FloatArray, dt: FloatArray) -> FloatArray:
 
 
 ESTIMATORS = [
-    ARX(inputs=["n", "t"], k=2, m=1, interval=60.0),
-    ARX(inputs=["n"], interval=60.0, fit_intercept=True),
-    ARX(inputs=[1], interval=60.0, criterion="free-run", k_max=1, m_max=1),
-    ARX(inputs=["n"], k=0, m=0, interval=60.0),
-    NetARX(inputs=["n"], interval=60.0, **QUICK),
-    NetARX(inputs=["t", "n"], k=2, m=2, interval=180.0, hidden=3, epochs=400),
+    ARX(time="routed", inputs=["n", "t"], k=2, m=1, interval=60.0),
+    ARX(time="routed", inputs=["n"], interval=60.0, fit_intercept=True),
+    ARX(time="routed", inputs=[1], interval=60.0, criterion="free-run", k_max=1, m_max=1),
+    ARX(time="routed", inputs=["n"], k=0, m=0, interval=60.0),
+    NetARX(time="routed", inputs=["n"], interval=60.0, **QUICK),
+    NetARX(time="routed", inputs=["t", "n"], k=2, m=2, interval=180.0, hidden=3, epochs=400),
 ]
 
 
@@ -95,13 +95,14 @@ def test_frozen_is_the_estimator(estimator: ARX | NetARX) -> None:
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=str)
-def test_predict_without_time_is_where_it_settles(estimator: ARX | NetARX) -> None:
+def test_at_rest_is_where_it_settles(estimator: ARX | NetARX) -> None:
     u, z = series((1, 0), 5, n=240)
     X = pd.DataFrame({"t": np.sin(np.arange(len(z))), "n": u[:, 0]})
     grid = clock(len(z), 60.0)
     estimator.fit(X, z, dt=grid)
     some = X.iloc[[0, 17, 200]]
-    for row, settled in zip(range(3), estimator.predict(some), strict=True):
+    at_rest = estimator._recursion.settled(some.to_numpy()[:, estimator._columns])  # what time="none" predicts
+    for row, settled in zip(range(3), at_rest, strict=True):
         long = pd.concat([some.iloc[[row]]] * 2)
         assert estimator.predict(long, dt=[np.inf, 1e6])[1] == pytest.approx(settled, rel=1e-6, abs=1e-6)
 
@@ -113,7 +114,7 @@ def test_each_test_starts_cold_and_rows_not_learned_from_drive() -> None:
     models = []
     for value in (0.0, 1e6):
         y = np.where(cycle < 0, value, z)
-        e = ARX(k=2, m=1).fit(u, y, dt=clock(400), cycle=cycle)
+        e = ARX(time="routed", k=2, m=1).fit(u, y, dt=clock(400), cycle=cycle)
         models.append(e.freeze(target="z"))
         np.testing.assert_allclose(e.a_, SYSTEMS[2, 1][0], rtol=1e-2)
         assert np.abs(e.predict(u, dt=clock(400)) - z).max() < 0.1  # through the cycle it has not learned from
@@ -130,13 +131,13 @@ def test_averaged_onto_a_coarser_clock() -> None:
     for t in range(1, n + 1):
         z[t] = z[t - 1] * np.exp(-15 / tau) + 0.01 * speed[t] * (1 - np.exp(-15 / tau))
     dt = clock(n + 1, 15.0)
-    e = ARX(k=1, m=0, interval=300.0).fit(speed[:, None], z, dt=dt)
+    e = ARX(time="routed", k=1, m=0, interval=300.0).fit(speed[:, None], z, dt=dt)
     assert e.a_[0] == pytest.approx(np.exp(-300 / tau), rel=1e-9)
     assert e.b_[0, 0] == pytest.approx(0.01 * (1 - np.exp(-300 / tau)), rel=1e-9)
     free = e.predict(speed[:, None], dt=dt)
     np.testing.assert_allclose(free[::20], z[::20], atol=1e-9)
     assert np.abs(free - z).max() < 0.5  # straight lines between the ticks
-    assert ARX(interval=None, k=1, m=0).fit(speed[:, None], z, dt=dt).interval_ == 15.0
+    assert ARX(time="routed", interval=None, k=1, m=0).fit(speed[:, None], z, dt=dt).interval_ == 15.0
 
 
 def test_a_double_stamp_and_a_gap_are_not_a_grid() -> None:
@@ -222,9 +223,9 @@ def test_heat_flow_does_not_oscillate() -> None:
     a, z = np.array([1.8, -0.9]), np.zeros(600)
     for t in range(2, 600):
         z[t] = a[0] * z[t - 1] + a[1] * z[t - 2] + 0.001 * u[t, 0]
-    e = ARX(k=2, m=1, criterion="free-run").fit(u, z, dt=clock(600))
+    e = ARX(time="routed", k=2, m=1, criterion="free-run").fit(u, z, dt=clock(600))
     assert np.isreal(np.roots([1, *-e.a_])).all() or np.abs(np.roots([1, *-e.a_]).imag).max() < 1e-6
-    start = ARX(k=1, m=1, criterion="free-run").fit(u, z, dt=clock(600))
+    start = ARX(time="routed", k=1, m=1, criterion="free-run").fit(u, z, dt=clock(600))
     assert e.free_run_rms_ <= start.free_run_rms_ * (1 + 1e-6)
 
 
@@ -239,13 +240,13 @@ def test_a_free_run_never_runs_away() -> None:
     u, z = growing()
     dt = clock(len(z))
     with pytest.raises(FitError, match=r"largest root is 1\.0.* does not decay"):
-        ARX(k=1, m=0).fit(u, z, dt=dt)
-    chosen = ARX().fit(u, z, dt=dt)
+        ARX(time="routed", k=1, m=0).fit(u, z, dt=dt)
+    chosen = ARX(time="routed").fit(u, z, dt=dt)
     assert [o.admissible for o in chosen.orders_ if o.k == 1] == [False] * 6
     assert slowest(chosen.a_) < 1
-    free = ARX(k=2, m=1, criterion="free-run").fit(u, z, dt=dt)
+    free = ARX(time="routed", k=2, m=1, criterion="free-run").fit(u, z, dt=dt)
     assert slowest(free.a_) < np.exp(-1 / len(z))
-    net = NetARX(**QUICK).fit(u, z, dt=dt)
+    net = NetARX(time="routed", **QUICK).fit(u, z, dt=dt)
     far = net.predict(np.full((3, 1), 1000.0), dt=[np.inf, 1e5, 1e7])
     assert (np.abs(far) <= 1.25 * z.max()).all()
     for e in (chosen, free, net):
@@ -260,7 +261,7 @@ def test_whatever_the_data_the_polynomial_decays(seed: int, criterion: str) -> N
     z = np.cumsum(rng.normal(size=n)) * rng.choice([1.0, 1e-6, 1e6]) + rng.normal() * np.arange(n)
     u = np.repeat(rng.choice([0.0, 1000.0, 3000.0], n // 6 + 1), 6)[:n, None]
     fixed: dict[str, Any] = {"k": 2, "m": 1} if criterion == "free-run" else {}
-    e = ARX(criterion=criterion, **fixed)  # type: ignore[arg-type]
+    e = ARX(time="routed", criterion=criterion, **fixed)  # type: ignore[arg-type]
     e.fit(u, z, dt=clock(n))
     assert slowest(e.a_) < 1
     assert np.isfinite(e.predict(u, dt=clock(n))).all()

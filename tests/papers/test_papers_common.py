@@ -94,7 +94,7 @@ def test_a_net_learns_several_targets_at_once(tests: Samples) -> None:
 
 def test_a_method_with_a_memory_gets_its_clock(tests: Samples) -> None:
     speeds = [c.name for c in tests.inputs if c.quantity == "spindle_speed"]
-    estimator = DynamicRidge(speed=speeds)
+    estimator = DynamicRidge(speed=speeds, time="routed")
 
     model = common.fitted(estimator, tests, ["z_um"], dt=tests.dt(), cycle=tests.cycle)["z_um"]
 

@@ -142,7 +142,7 @@ def test_depth_difference_of_two_surfaces() -> None:
     table = test.table.assign(**{f"z_at_{p}_um": z for p in precompensation_setup.POSITIONS})
     learn = precompensation_setup.samples_of(made("precompensation", seed=1)[0])
     still = replace(learn, deviations=0 * learn.deviations)
-    estimator = ARX(inputs=("spindle_rpm",), k=0, m=0)
+    estimator = ARX(inputs=("spindle_rpm",), time="routed", k=0, m=0)
     nothing = [fitted(estimator, still, [c.name], dt=learn.dt(), cycle=learn.cycle)[c.name] for c in still.targets]
     found = precompensation_setup.cut(replace(test, table=table), nothing)
     assert found.without == pytest.approx([7.0] * 4)

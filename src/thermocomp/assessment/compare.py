@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -35,7 +36,7 @@ ALL = "all unseen cycles"
 
 def compare(
     samples: Samples,
-    methods: Sequence[str],
+    methods: Sequence[Any],
     judging: Judging,
     *,
     rules: Rules = Rules(),
@@ -52,8 +53,8 @@ def compare(
     Parameters
     ----------
     samples : Samples
-    methods : sequence of str
-        ``all`` stands for all of them.
+    methods : sequence of str or estimator
+        ``all`` stands for all of them; see `thermocomp.models.methods.expand`.
     judging : Judging
         What is learned from and what is judged.
     rules : Rules
@@ -159,7 +160,7 @@ def _scores(
     return found
 
 
-def n_pieces(samples: Samples, methods: Sequence[str], judging: Judging, rules: Rules = Rules()) -> int:
+def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
     """Return the number of pieces of work of `compare`."""
     names = expand(methods)
     inner = len(_inners(names, judging, rules)) * sum(deployable(n) for n in names)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
 from thermocomp.core.validity import Validity
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.methods import method as find
+from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
@@ -52,7 +53,7 @@ class Fitted:
 
 def fit(
     samples: Samples,
-    method: str,
+    method: Any,
     judging: Judging,
     *,
     rules: Rules = Rules(),
@@ -67,7 +68,8 @@ def fit(
     Parameters
     ----------
     samples : Samples
-    method : str
+    method : str or estimator
+        See `thermocomp.models.methods.expand`.
     judging : Judging
     rules : Rules
         What is stated before judging.
@@ -91,7 +93,8 @@ def fit(
     InputError
         The method is unknown, or cannot be frozen, so there would be no model.
     """
-    if not find(method).kind.freezable:
+    (method,) = expand([method])
+    if not deployable(method):
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
     comparison = compare(
         samples, [method], judging, rules=rules, support=support, limits=limits, jobs=jobs, progress=progress

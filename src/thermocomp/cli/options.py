@@ -89,15 +89,11 @@ class Study:
 
     def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""
-        from thermocomp.assessment import splits
+        from thermocomp.api.inputs import judging_of
 
         if (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out > 1:
             raise InputError("--split, --leave-one-cycle-out and --leave-one-file-out exclude each other: choose one")
-        if self.split is not None:
-            return splits.parse(self.split, samples)
-        if self.leave_one_file_out:
-            return splits.leave_one_file_out(samples)
-        return splits.leave_one_cycle_out(samples)
+        return judging_of(samples, split=self.split, leave_one="file" if self.leave_one_file_out else None)
 
     def rules(self, primary: str | None = None) -> "Rules":
         """Return what is stated before judging."""
@@ -189,14 +185,9 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
     list of str
         One line per trouble, and per column that was left out.
     """
-    from thermocomp.recording.quality import check
+    from thermocomp.api.inputs import trouble_of
 
-    lines = [
-        f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
-        for r in tests
-        for f in check(r)
-        if f.severity == "trouble" or f.kind == "left out"
-    ]
+    lines = trouble_of(tests)
     for line in lines:
         _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
     return lines

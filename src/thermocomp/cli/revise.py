@@ -73,6 +73,29 @@ def revise(
     int
         0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
+    job, notes = prepared(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    # a pipe gets its lines on stderr, whatever stdout is for
+    done = run(job, hidden=json and sys.stderr.isatty())
+    if json:
+        print_json(revisetables.content(job, done, notes), _console)
+    else:
+        revisetables.show(job, done, notes, _console)
+    return 0 if done.written else 1
+
+
+def prepared(
+    program: Path,
+    drifting: Drifting,
+    output: Path,
+    starting: Starting,
+    way: Way,
+    controller: Controller,
+    timing: Timing,
+    date: str | None,
+    *,
+    overwrite: bool,
+) -> tuple[reviserun.Job, list[str]]:
+    """Return what is to be done to a program, and notes, or refuse before any work; parameters as for `revise`."""
     if controller.controller is None:
         _refuse_number(program)
     ncprogram.opened(program).close()
@@ -109,17 +132,21 @@ def revise(
         travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
         overwrite=overwrite,
     )
+    return job, [*notes, *guesses]
+
+
+def run(job: reviserun.Job, *, hidden: bool) -> reviserun.Done:
+    """Revise a program.
+
+    Raises
+    ------
+    InputError
+        It cannot be revised or proved; the message begins with its name.
+    """
     try:
-        # a pipe gets its lines on stderr, whatever stdout is for
-        done = reviserun.revise(job, hidden=json and sys.stderr.isatty())
+        return reviserun.revise(job, hidden=hidden)
     except InputError as e:
-        raise InputError(f"{program}: {e}") from e
-    notes += guesses
-    if json:
-        print_json(revisetables.content(job, done, notes), _console)
-    else:
-        revisetables.show(job, done, notes, _console)
-    return 0 if done.written else 1
+        raise InputError(f"{job.program}: {e}") from e
 
 
 def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:

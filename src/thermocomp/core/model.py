@@ -5,9 +5,10 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,19 @@ from thermocomp.core.zero import FIRST_READING, Zeroing
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+
+
+class Columns(Protocol):
+    """A table that gives a column by its name: a DataFrame, or a dict of arrays."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a column."""
+
+    def __contains__(self, name: object, /) -> bool:
+        """Return whether there is a column of that name."""
+
+    def __iter__(self) -> Iterator[Any]:
+        """Return the names."""
 
 
 @dataclass(frozen=True)
@@ -368,6 +382,73 @@ class ErrorModel(ABC):
         beyond = np.maximum(excess.max(axis=-1, initial=0.0), (far - 1.0) / self.support.fade_over)
         return np.asarray(deviation * np.clip(1.0 - beyond, 0.0, 1.0))
 
+    def predict(
+        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    ) -> FloatArray:
+        """Replay the model through a table, row by row, as it would run at the machine without gate and limits.
+
+        Parameters
+        ----------
+        table : mapping of str to array-like of shape (n_rows,)
+            A DataFrame, or anything that gives a column by its name; columns of the same names as `inputs`, in their
+            units. A row in which one is missing (nan) is passed over: the deviation before it is held, 0 at the start.
+        time : str or array-like of shape (n_rows,), optional
+            Time [s], or the name of its column; without it the column ``time_s``. A row that is not later than the one
+            before starts a new test, from rest and from a zero of its own. A model without memory does without.
+        reference : array-like of shape (n_inputs,), optional
+            What counts as zero, as in `init`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+            Deviation [unit].
+
+        Raises
+        ------
+        InputError
+            A column is missing, or the time of a model with a memory.
+        """
+        columns = [_column(table, i.name, f"model of {self.target}") for i in self.inputs]
+        clock = self._clock(table, time)
+        n = len(columns[0]) if columns else len(clock) if clock is not None else _rows(table)
+        for name, values in [*zip((i.name for i in self.inputs), columns, strict=True), ("the time", clock)]:
+            if values is not None and values.shape != (n,):
+                raise InputError(f"model of {self.target}: {name} has shape {values.shape}, and there are {n} rows")
+        values = np.column_stack(columns) if columns else np.empty((n, 0))
+        steps: FloatArray = np.full(n, 1.0) if clock is None else np.diff(clock, prepend=np.inf)
+        starts = (steps <= 0).tolist()
+        usable: BoolArray = np.all(np.isfinite(values), axis=1)
+        found, state, since = np.empty(n), self.init(reference), 0.0
+        for k in range(n):
+            if starts[k]:
+                state, since = self.init(reference), 0.0
+            else:
+                since += float(steps[k]) if np.isfinite(steps[k]) else 0.0
+            if usable[k]:
+                state, _ = self.step(state, values[k], since)
+                since = 0.0
+            found[k] = state.deviation
+        return found
+
+    def _clock(self, table: Columns, time: ArrayLike | str | None) -> FloatArray | None:
+        if time is None and "time_s" in table:
+            time = "time_s"
+        if time is None:
+            if self.remembers:
+                raise InputError(
+                    f"model of {self.target} has a memory: give the time of the rows [s] by time=, the name of a "
+                    "column or an array, or as a column time_s"
+                )
+            return None
+        given = _column(table, time, f"model of {self.target}") if isinstance(time, str) else time
+        clock: NDArray[Any] = np.asarray(given)
+        if clock.dtype.kind in "mM":
+            clock = (clock - clock[:1]) / np.timedelta64(1, "s")
+        clock = np.asarray(clock, dtype=np.float64)
+        if not np.isfinite(clock).all():
+            raise InputError(f"model of {self.target}: the time must be finite numbers")
+        return clock
+
     # -- derived numbers ---------------------------------------------------------------------------------------------
 
     @cached_property
@@ -441,3 +522,16 @@ def check_finite(owner: str, **numbers: Any) -> None:
     for name, values in numbers.items():
         if not np.isfinite(np.asarray(values, dtype=np.float64)).all():
             raise InputError(f"{owner}: {name} must be finite numbers, found {values}")
+
+
+def _column(table: Columns, name: str, owner: str) -> NDArray[Any]:
+    try:
+        values = np.asarray(table[name])
+    except (KeyError, ValueError, IndexError) as e:
+        raise InputError(f"{owner}: the table has no column {name!r}") from e
+    return values if values.dtype.kind in "mM" else values.astype(np.float64)
+
+
+def _rows(table: Columns) -> int:
+    """Return the number of rows of a table of which no column is needed."""
+    return max((np.size(table[name]) for name in table), default=0)

@@ -1,6 +1,5 @@
 """What the columns of a recording are: understood by their headings' units, or by a mapping."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -9,47 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, Meaning, understand
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, unit
 from thermocomp.files.mapping import ColumnMap, Mapping
 
 FloatArray = NDArray[np.float64]
 
-# What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
-_SUFFIXES = {
-    **{s: s for s in ("C", "degC", "°C", "K", "F", "degF", "°F", "nm", "um", "µm", "μm", "mm", "urad", "µrad", "mrad")},
-    **{s: s for s in ("arcsec", "rpm", "s", "ms", "min", "h")},
-    "RPM": "rpm",
-    "mm_min": "mm/min",
-    "m_min": "m/min",
-}
-# In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
-_NOT_IN_BRACKETS = ("", "1")
-_FREQUENCIES = ("Hz", "1/s")
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
-_HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
-_BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
-_AXIS = re.compile(r"[xyzuvw]\d?")
 _TIMES = ("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed")
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """What a heading with a unit says.
-
-    Parameters
-    ----------
-    name : str
-        Channel name: the heading with the suffix of the house unit.
-    base : str
-        The heading without its unit.
-    unit : Unit
-    """
-
-    name: str
-    base: str
-    unit: Unit
 
 
 @dataclass(frozen=True)
@@ -128,46 +96,6 @@ class Plan:
     notes: tuple[str, ...] = ()
 
 
-def understand(heading: str) -> Meaning | None:
-    """Find the unit in a heading: ``t1_C``, ``drift_mm``, ``T1 [degC]``, ``Temp 1 (°C)``.
-
-    Returns
-    -------
-    Meaning or None
-        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``).
-
-    Raises
-    ------
-    UnitError
-        The brackets hold what looks like a mistyped unit.
-    """
-    heading = heading.strip()
-    found = _BRACKETS.fullmatch(heading)
-    if found:
-        base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
-        turning = any(word in base.casefold() for word in ("spindle", "speed"))
-        if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
-            return None
-        symbol = _SUFFIXES.get(symbol, symbol)
-        try:
-            meant = unit(symbol)
-        except UnitError:
-            # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-            if get_close_matches(symbol, _SUFFIXES, n=1, cutoff=0.6):
-                raise
-            return None
-    else:
-        ends = [s for s in _SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
-        if not ends:
-            return None
-        suffix = max(ends, key=len)
-        base, meant = heading[: -len(suffix) - 1], unit(_SUFFIXES[suffix])
-    if meant.quantity == "displacement" and _is_position(base, meant.symbol):
-        meant = unit(meant.symbol, "position")
-    # one word, so that the name can go into a formula or a controller
-    return Meaning(f"{'_'.join(base.split())}_{_HOUSE_SUFFIX[meant.house]}", base, meant)
-
-
 def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
     """Decide which columns are read, and as what.
 
@@ -236,7 +164,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
 
 def why_left_out(heading: str) -> str:
     """Say what a heading that `understand` makes nothing of lacks, and what to do."""
-    found = _BRACKETS.fullmatch(heading.strip())
+    found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
     ignore = 'role = "ignore" if it is of no use'
@@ -245,8 +173,8 @@ def why_left_out(heading: str) -> str:
     try:
         meant = unit(symbol)
     except UnitError:
-        near = get_close_matches(symbol, _SUFFIXES, n=3, cutoff=0.5)
-        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(_HOUSE_SUFFIX)} and others"
+        near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
+        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(HOUSE_SUFFIX)} and others"
         return (
             f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
             f"or {ignore}"
@@ -385,10 +313,3 @@ def _aliases(columns: Sequence[Column], headings: Sequence[str], meanings: Seque
         if [b for b, _ in bases].count(base) == 1:
             aliases.setdefault(base, name)
     return {alias: name for alias, name in aliases.items() if alias not in names}
-
-
-def _is_position(base: str, symbol: str) -> bool:
-    words = re.split(r"[\s_.-]+", base.casefold())
-    if any(w in ("pos", "position") for w in words):
-        return True
-    return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)

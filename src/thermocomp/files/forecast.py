@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thermocomp.core.exceptions import InputError, UnitError
+from thermocomp.core.headings import understand
 from thermocomp.core.units import Unit
-from thermocomp.files.columns import understand, why_left_out
+from thermocomp.files.columns import why_left_out
 
 _TIME = ("time", "t", "elapsed")
 

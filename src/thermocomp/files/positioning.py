@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.headings import understand
 from thermocomp.core.units import Unit, unit
-from thermocomp.files.columns import understand
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.textfile import CsvTable, open_csv
 from thermocomp.recording.positioning import Positioning

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.headings import understand
 from thermocomp.core.machine import Channel
-from thermocomp.files.columns import Plan, plan, understand, why_left_out
+from thermocomp.files.columns import Plan, plan, why_left_out
 from thermocomp.files.draft import draft
 from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.tables import EMBEDDED, Table, open_parquet, open_xlsx

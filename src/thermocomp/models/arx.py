@@ -16,6 +16,7 @@ from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
 from thermocomp.models.selection import orders
+from thermocomp.models.timed import Time
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -48,8 +49,8 @@ class ARX(ClockedRegressor):
     Rows with cycle -1 are not learned from, but their inputs drive the model. Inputs that depend on others, or never
     leave zero, get no coefficient of their own.
 
-    Without `dt`, every row is a machine at rest in that state: k = m = 0 is all that can be learned, and `predict`
-    gives the deviation at which the model settles.
+    With ``time="none"`` every row is a machine at rest: k = m = 0 is all that can be learned, and `predict` gives the
+    deviation at which the model settles.
 
     Parameters
     ----------
@@ -66,6 +67,8 @@ class ARX(ClockedRegressor):
     fit_intercept : bool or None
         False: no deviation without inputs, as in the paper. True: one that builds up from the start of each test, as
         what runs beside the spindle gives. None: judged in free run on cycles left out.
+    time : {'column', 'routed', 'none'} or None
+        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
 
     Attributes
     ----------
@@ -101,6 +104,7 @@ class ARX(ClockedRegressor):
         m_max: int = 5,
         criterion: Literal["fpe", "aic", "bic", "free-run"] = "fpe",
         fit_intercept: bool | None = False,
+        time: Time | None = None,
     ) -> None:
         self.inputs = inputs
         self.interval = interval
@@ -110,6 +114,7 @@ class ARX(ClockedRegressor):
         self.m_max = m_max
         self.criterion = criterion
         self.fit_intercept = fit_intercept
+        self.time = time
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> "ARX":
         """Fit.
@@ -145,7 +150,7 @@ class ARX(ClockedRegressor):
             for h in self._intervals(self.interval, step)
         ]
         constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
-        if dt is None:  # nothing to choose: no row has a past
+        if self.time == "none":  # nothing to choose: no row has a past
             ks, ms, data, constants = ks[:1], ms[:1], data[:1], constants[:1]
         # one-step criteria choose among all orders by themselves
         groups = [((k,), (m,)) for k in ks for m in ms] if self.criterion == "free-run" else [(ks, ms)]
@@ -165,14 +170,14 @@ class ARX(ClockedRegressor):
         self.interval_ = clocked.interval
         self.a_, self.b_, self.intercept_ = (c := self._coefficients).a, c.b, c.intercept
         self.k_, self.m_ = len(c.a), len(c.b) - 1
-        self.free_run_rms_ = rms(self._free_error(clocked, c, folds >= 0)) if dt is not None else math.nan
+        self.free_run_rms_ = rms(self._free_error(clocked, c, folds >= 0)) if self.time != "none" else math.nan
         return self
 
     @property
     def _recursion(self) -> Recursion:
         return self._coefficients
 
-    def one_step(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike) -> FloatArray:
+    def one_step(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
         """Predict each tick from the measured displacements before it: a diagnostic, not a prediction (E-P3).
 
         Parameters
@@ -180,15 +185,15 @@ class ARX(ClockedRegressor):
         X : array-like of shape (n_rows, n_features)
         y : array-like of shape (n_rows,)
             Measured deviation.
-        dt : array-like of shape (n_rows,)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`.
 
         Returns
         -------
         ndarray of shape (n_predicted, 2)
             Measured and predicted deviation at all ticks that have enough past.
         """
-        inputs = self._given(X)
-        step = ticks.steps(dt, len(inputs))
+        inputs, step = self._given(X, dt)
         runs = ticks.on_clock(inputs, step, self.interval_)
         measured = np.asarray(y, dtype=np.float64)
         data = Clocked(self.interval_, runs, measured, step, np.zeros(len(inputs), dtype=np.intp))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike, NDArray
+from sklearn import config_context
 from sklearn.utils import check_random_state
 
 from thermocomp.core.autoregressive import AutoregressiveNet
@@ -18,8 +19,10 @@ from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Tria
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.numerics.ticks import Run
+from thermocomp.models.timed import Time
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 #: ticks after which a row without time is taken to have settled
@@ -75,7 +78,7 @@ class NetARX(ClockedRegressor):
     paper's trial and error. Its sigmoid output keeps the free run within the trained displacements and an eighth more
     on either side: it cannot run away.
 
-    Without `dt`, every row is a machine at rest in that state: the net is trained with k = m = 0.
+    With ``time="none"`` every row is a machine at rest in that state: the net is trained with k = m = 0.
 
     Parameters
     ----------
@@ -97,6 +100,8 @@ class NetARX(ClockedRegressor):
         Of the initial weights and of the order of the patterns.
     jobs : int
         Threads that train nets.
+    time : {'column', 'routed', 'none'} or None
+        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
 
     Attributes
     ----------
@@ -128,6 +133,7 @@ class NetARX(ClockedRegressor):
         momentum: float = 0.0,
         random_state: int = 0,
         jobs: int = 2,
+        time: Time | None = None,
     ) -> None:
         self.inputs = inputs
         self.interval = interval
@@ -140,6 +146,7 @@ class NetARX(ClockedRegressor):
         self.momentum = momentum
         self.random_state = random_state
         self.jobs = jobs
+        self.time = time
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
@@ -174,10 +181,10 @@ class NetARX(ClockedRegressor):
         inputs, deviation, step, folds = self._start(X, y, dt, cycle)
         h = self._intervals(self.interval, step)[0]
         data = Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
-        self.k_, self.m_ = (0, 0) if dt is None else self._chosen_orders(inputs, deviation, dt, cycle)
+        self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
         best = 0
         self.trials_: tuple[Trial, ...] = ()
-        if len(sizes) > 1 and dt is not None:
+        if len(sizes) > 1 and self.time != "none":
             jobs = [(size, fold) for size in sizes for fold in range(int(folds.max()) + 1)]
             errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
             means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
@@ -189,7 +196,7 @@ class NetARX(ClockedRegressor):
         self.hidden_, self.interval_ = sizes[best], h
         self._net = self._train(data, self.hidden_, None)
         self.net_ = self._net.net
-        self.free_run_rms_ = rms(self._free_error(data, self._net, folds >= 0)) if dt is not None else math.nan
+        self.free_run_rms_ = rms(self._free_error(data, self._net, folds >= 0)) if self.time != "none" else math.nan
         return self
 
     @property
@@ -213,14 +220,13 @@ class NetARX(ClockedRegressor):
 
     # -- choice --------------------------------------------------------------------------------------------------------
 
-    def _chosen_orders(
-        self, inputs: FloatArray, y: FloatArray, dt: ArrayLike, cycle: ArrayLike | None
-    ) -> tuple[int, int]:
+    def _chosen_orders(self, inputs: FloatArray, y: FloatArray, step: FloatArray, cycle: IntArray) -> tuple[int, int]:
         self._orders(self.k, 0, "k")
         self._orders(self.m, 0, "m")
         if self.k is not None and self.m is not None:
             return self.k, self.m
-        linear = ARX(interval=self.interval, k=self.k, m=self.m).fit(inputs, y, dt=dt, cycle=cycle)
+        with config_context(enable_metadata_routing=False):  # the steps were checked
+            linear = ARX(interval=self.interval, k=self.k, m=self.m, time="routed").fit(inputs, y, dt=step, cycle=cycle)
         return linear.k_, linear.m_
 
     def _train(self, data: Clocked, size: int, without: int | None) -> _Net:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.ticks import Run
+from thermocomp.models.timed import TimedRegressor
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -118,7 +118,7 @@ class Recursion(Protocol):
         """Return its free run through a test, at the rows."""
 
 
-class ClockedRegressor(ThermalRegressor):
+class ClockedRegressor(TimedRegressor):
     """What the autoregressive estimators share: which inputs, on which clock, chosen by which cycles."""
 
     interval_: float
@@ -135,16 +135,16 @@ class ClockedRegressor(ThermalRegressor):
         ----------
         X : array-like of shape (n_rows, n_features)
         dt : array-like of shape (n_rows,), optional
-            As in `fit`. Without it, the deviation at which each row would settle is given.
+            As in `fit`. With ``time="none"``, the deviation at which each row would settle is given.
 
         Returns
         -------
         ndarray of shape (n_rows,)
         """
-        inputs = self._given(X)
-        if dt is None:
+        inputs, step = self._given(X, dt)
+        if self.time == "none":
             return self._recursion.settled(inputs)
-        runs = ticks.on_clock(inputs, ticks.steps(dt, len(inputs)), self.interval_)
+        runs = ticks.on_clock(inputs, step, self.interval_)
         parts = [self._recursion.at_rows(r) for r in runs]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -152,16 +152,17 @@ class ClockedRegressor(ThermalRegressor):
         self, X: ArrayLike, y: ArrayLike, dt: ArrayLike | None, cycle: ArrayLike | None
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
         """Check the training data; return inputs, y, time steps and folds."""
+        self._time = self.time
+        self._declared()
         checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        rows: FloatArray = checked[0]
-        step = ticks.steps(dt, len(rows))
-        folds, self.chosen_by_ = number_folds(cycle, len(rows))
+        rows, step = self._clock(X, checked[0], dt, fitting=True)
+        folds, self.chosen_by_ = number_folds(self._cycles(cycle, step), len(rows))
         learned = np.ascontiguousarray(rows.T)  # by column in memory: the next two are ten times as fast
         if folds.min() < 0:
             learned = learned[:, folds >= 0]
         self.data_min_, self.data_max_ = learned.min(axis=1), learned.max(axis=1)
         self._columns = self._resolve()
-        self._some = not np.array_equal(self._columns, np.arange(self.n_features_in_))
+        self._some = not np.array_equal(self._columns, np.arange(rows.shape[1]))
         names = ", ".join(self._names()[j] for j in self._columns)
         self.caution_ = (
             f"It knows {names} and nothing else: what comes from elsewhere, such as a change of the ambient "
@@ -171,32 +172,30 @@ class ClockedRegressor(ThermalRegressor):
         return self._used(rows), np.asarray(checked[1], dtype=np.float64), step, folds
 
     def _resolve(self) -> IntArray:
-        names, wanted = [str(n) for n in self._names()], self._wanted()
+        wanted = self._wanted()
         if wanted is None:
-            return np.arange(len(names))
+            return np.arange(len(self._names()))
         if not len(wanted):
             raise FitError(NO_SPEED)
-        found = []
-        for s in wanted:
-            if isinstance(s, str) and s not in names:
-                raise InputError(f"input {s!r}: the columns are {', '.join(names)}")
-            column = names.index(s) if isinstance(s, str) else int(s)
-            if not 0 <= column < len(names) or column in found:
-                raise InputError(f"input {s!r} is given twice or beyond the {len(names)} columns")
-            found.append(column)
+        found = [self._place(s, "input") for s in wanted]
+        if len(set(found)) < len(found):
+            raise InputError(f"inputs {list(wanted)}: one is given twice")
         return np.array(found, dtype=np.intp)
 
     @abstractmethod
     def _wanted(self) -> Sequence[str | int] | None:
         """Return the inputs asked for."""
 
-    def _given(self, X: ArrayLike) -> FloatArray:
-        """Check X against what was fitted and return the columns of the inputs."""
+    def _given(self, X: ArrayLike, dt: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
+        """Check X and time against what was fitted; return the columns of the inputs, and the time steps."""
+        self._declared()
         check_is_fitted(self)
         if _is_plain(X, self.n_features_in_) and not hasattr(self, "feature_names_in_"):
-            return self._used(X)
-        rows: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
-        return self._used(rows)
+            rows = X
+        else:
+            rows = validate_data(self, X, dtype=np.float64, reset=False)
+        inputs, step = self._clock(X, rows, dt)
+        return self._used(inputs), step
 
     def _used(self, rows: FloatArray) -> FloatArray:
         """Return the columns of the inputs; no copy if that is all: it takes as long as the rest."""
@@ -249,6 +248,5 @@ def too_few(n: int, k: int, m: int, data: Clocked) -> str:
     """
     return (
         f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} ticks have a known past, fewer than "
-        "there are coefficients or just as many; take a shorter interval, smaller orders or a longer recording (and "
-        "give dt)"
+        "there are coefficients or just as many; take a shorter interval, smaller orders or a longer recording"
     )

@@ -2,20 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core import lagbank
-from thermocomp.core.exceptions import InputError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import Input
 from thermocomp.core.terms import Term
-from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.numerics import moments as ridge
 from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.timed import Time, TimedRegressor
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -60,7 +59,7 @@ class _Candidate:
     columns: IntArray
 
 
-class DynamicRidge(ThermalRegressor):
+class DynamicRidge(TimedRegressor):
     """Ridge regression on temperatures, their lagged or high-passed copies, and the lagged spindle speed.
 
     Temperature sensors and structure do not have the same time constants, and the heat at a bearing grows faster than
@@ -71,12 +70,10 @@ class DynamicRidge(ThermalRegressor):
     lag of the temperatures below `SHORTEST_LAG` times the time between two rows (their median) is not tried; if none is
     left, the temperatures are not lagged.
 
-    Without `dt`, every row is taken to be a machine at rest in that state: all lags equal their signals.
-
     Parameters
     ----------
     speed : sequence of str or int
-        Names (or indices) of the columns that are spindle speeds; the others are temperatures.
+        Names (or indices into X) of the columns that are spindle speeds; the others are temperatures.
     temperature_lags, speed_lags : sequence of sequence of float
         Sets of time constants to choose from [s].
     speed_powers : sequence of int
@@ -89,6 +86,8 @@ class DynamicRidge(ThermalRegressor):
         How the strength is chosen.
     fit_intercept : bool
         False: the model gives zero in the reference state.
+    time : {'column', 'routed', 'none'} or None
+        Where it finds the time, see `thermocomp.models.timed.TimedRegressor`; without it, it refuses to work.
 
     Attributes
     ----------
@@ -106,6 +105,8 @@ class DynamicRidge(ThermalRegressor):
         What was left out to choose.
     """
 
+    columns: ClassVar[str] = "speed"
+
     def __init__(
         self,
         *,
@@ -117,6 +118,7 @@ class DynamicRidge(ThermalRegressor):
         strengths: Sequence[float] = STRENGTHS,
         rule: Literal["one-standard-error", "minimum"] = "one-standard-error",
         fit_intercept: bool = False,
+        time: Time | None = None,
     ) -> None:
         self.speed = speed
         self.temperature_lags = temperature_lags
@@ -126,6 +128,7 @@ class DynamicRidge(ThermalRegressor):
         self.strengths = strengths
         self.rule = rule
         self.fit_intercept = fit_intercept
+        self.time = time
 
     def fit(
         self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
@@ -135,14 +138,14 @@ class DynamicRidge(ThermalRegressor):
         Parameters
         ----------
         X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
+            Inputs minus their reference, in the order of time; with ``time="column"`` behind the time.
         y : array-like of shape (n_rows,)
             Deviation.
         dt : array-like of shape (n_rows,), optional
-            Time since the previous row [s], ``inf`` in the first row of each test.
+            With ``time="routed"``: time since the previous row [s], ``inf`` in the first row of each test.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row. Rows with -1 drive the lags but are not learned from. Without it, five stretches
-            of equal length take the place of the cycles.
+            Thermal cycle of each row. Rows with -1 drive the lags but are not learned from. Without it each test of
+            several is one (``time="column"``), or five stretches of equal length take the place of the cycles.
 
         Returns
         -------
@@ -152,11 +155,14 @@ class DynamicRidge(ThermalRegressor):
         ------
         FitError
             No row to learn from.
+        InputError
+            The time was not declared, or the rows are not those of whole tests.
         """
+        self._time = self.time
+        self._declared()
         checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        rows: FloatArray = checked[0]
-        steps = _steps(dt, len(rows))
-        folds, self.chosen_by_ = number_folds(cycle, len(rows))
+        rows, steps = self._clock(X, checked[0], dt, fitting=True)
+        folds, self.chosen_by_ = number_folds(self._cycles(cycle, steps), len(rows))
         learned = rows[folds >= 0]
         self.data_min_, self.data_max_ = learned.min(axis=0), learned.max(axis=0)
         self._split_columns()
@@ -183,16 +189,17 @@ class DynamicRidge(ThermalRegressor):
         -------
         ndarray of shape (n_rows,)
         """
+        self._declared()
         check_is_fitted(self)
-        rows: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
-        table = self._features(rows, _steps(dt, len(rows)))
+        rows, steps = self._clock(X, validate_data(self, X, dtype=np.float64, reset=False), dt)
+        table = self._features(rows, steps)
         parts = [features[:, self._columns] @ self.coef_ + self.intercept_ for features in table]
         return np.concatenate(parts)
 
     @property
     def feature_labels_(self) -> tuple[str, ...]:
         """Names of the features behind `coef_`."""
-        names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
+        names = [str(n) for n in self._names()]
         labels = [names[i] for i in self._temperatures]
         kind = "high-passed" if self.copies == "high-passed" else "lagged"
         labels += [f"{names[i]} {kind} {tau / MINUTE:g} min" for tau in self._t_taus for i in self._temperatures]
@@ -238,19 +245,10 @@ class DynamicRidge(ThermalRegressor):
     # -- features ------------------------------------------------------------------------------------------------------
 
     def _split_columns(self) -> None:
-        names = [str(n) for n in getattr(self, "feature_names_in_", [])]
-        speeds = []
-        for s in self.speed:
-            if isinstance(s, str):
-                if s not in names:
-                    raise InputError(f"speed column {s!r}: the inputs are {', '.join(names) or 'not named'}")
-                speeds.append(names.index(s))
-            else:
-                speeds.append(int(s))
-        self._speeds = speeds
-        self._temperatures = [i for i in range(self.n_features_in_) if i not in speeds]
+        self._speeds = [self._place(s, "speed column") for s in self.speed]
+        self._temperatures = [i for i in range(len(self._names())) if i not in self._speeds]
         self._t_taus = tuple(sorted({float(t) for lags in self.temperature_lags for t in lags}))
-        self._n_taus = tuple(sorted({float(t) for lags in self.speed_lags for t in lags})) if speeds else ()
+        self._n_taus = tuple(sorted({float(t) for lags in self.speed_lags for t in lags})) if self._speeds else ()
 
     def _candidates(self, dt: FloatArray) -> list[_Candidate]:
         n_t, n_n = len(self._temperatures), len(self._speeds) * len(self.speed_powers)
@@ -325,12 +323,3 @@ class DynamicRidge(ThermalRegressor):
             limit = mean[i, j] + rms[i, j].std(ddof=1) / np.sqrt(len(moments))
             j = int(np.flatnonzero(mean[i] <= limit).max())
         return candidates[i], strengths[j], float(mean[i, j])
-
-
-def _steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
-    if dt is None:
-        return np.full(n_rows, np.inf)
-    steps = np.asarray(dt, dtype=np.float64)
-    if steps.shape != (n_rows,) or not (steps >= 0).all():
-        raise InputError(f"dt: want {n_rows} time steps that are not negative")
-    return steps

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.foreign import adopted, title
 
 #: asks for every method where names of methods are given
 ALL_METHODS = "all"
@@ -50,7 +51,30 @@ class Method:
 
     def build(self, speeds: Sequence[str]) -> ThermalRegressor:
         """Make the estimator, given the names of the spindle speeds among its inputs."""
-        return self.kind(**self.settings, **({self.speed: tuple(speeds)} if self.speed else {}))
+        columns = {self.speed: tuple(speeds)} if self.speed else {}
+        return self.kind(**self.settings, **columns, **({"time": "routed"} if "dt" in self.takes else {}))
+
+
+class Named(str):
+    """The name of an estimator that was handed in, which it carries along: it stands where names of methods do.
+
+    Parameters
+    ----------
+    name : str
+    estimator : estimator
+        See `thermocomp.models.foreign.adopted`.
+    """
+
+    estimator: Any
+
+    def __new__(cls, name: str, estimator: Any) -> "Named":
+        """Make the string."""
+        made = super().__new__(cls, name)
+        made.estimator = estimator
+        return made
+
+    def __getnewargs__(self) -> tuple[str, Any]:  # type: ignore[override]
+        return str(self), self.estimator
 
 
 METHODS: dict[str, Method] = {
@@ -126,28 +150,46 @@ def method(name: str) -> Method:
     return found
 
 
-def given(estimator: ThermalRegressor) -> Method:
+def given(estimator: Any) -> Method:
     """Return what an estimator with settings of its own is as a method: it takes all inputs."""
     kind = type(estimator)
-    fits: Any = estimator
     known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
-    takes = tuple(p for p in known if p in signature(fits.fit).parameters)
-    place = kind.__module__.removeprefix("thermocomp.models.")
-    return Method(kind.__name__, "", f"{place}.{kind.__name__}", speed="inputs", takes=takes)
+    takes = tuple(p for p in known if p in signature(estimator.fit).parameters)
+    return Method(title(estimator), "", f"{kind.__module__}.{kind.__name__}", speed="inputs", takes=takes)
 
 
-def expand(names: Sequence[str]) -> list[str]:
+def expand(names: Sequence[Any]) -> list[str]:
     """Return names of methods once each, ``all`` standing for all of them.
+
+    Parameters
+    ----------
+    names : sequence of str or estimator
+        An estimator becomes a `Named`, called by its class; of several of one class the later ones get a number.
+
+    Returns
+    -------
+    list of str
 
     Raises
     ------
     InputError
-        There is no method of one of the names.
+        There is no method of one of the names, or something else is no regressor.
     """
-    listed = [n for name in names for n in (METHODS if name == ALL_METHODS else [name])]
-    return [method(name).name for name in dict.fromkeys(listed)]
+    listed: dict[str, None] = {}
+    for entry in names:
+        if isinstance(entry, Named):
+            listed[entry] = None
+        elif isinstance(entry, str):
+            listed.update(dict.fromkeys(METHODS if entry == ALL_METHODS else [method(entry).name]))
+        else:
+            estimator = adopted(entry)
+            same = sum(n.partition(" #")[0] == title(estimator) for n in listed)
+            listed[Named(title(estimator) + (f" #{same + 1}" if same else ""), estimator)] = None
+    return list(listed)
 
 
 def deployable(name: str) -> bool:
     """Return whether models of this name can run at a machine: False for methods that cannot be frozen."""
+    if isinstance(name, Named):
+        return bool(getattr(name.estimator, "freezable", True))
     return name not in METHODS or METHODS[name].kind.freezable

@@ -19,8 +19,10 @@ class PartialLeastSquares(ShrunkRegressor):
 
     Parameters
     ----------
+    components : int, optional
+        Do not choose: so many components, or as many as can be.
     max_components : int, optional
-        As many as inputs if not given.
+        Most to choose from; as many as inputs if not given.
     rule : {'one-standard-error', 'minimum'}
         How the number of components is chosen.
     fit_intercept : bool
@@ -37,16 +39,18 @@ class PartialLeastSquares(ShrunkRegressor):
     def __init__(
         self,
         *,
+        components: int | None = None,
         max_components: int | None = None,
         rule: Rule = "one-standard-error",
         fit_intercept: bool = True,
     ) -> None:
+        self.components = components
         self.max_components = max_components
         self.rule = rule
         self.fit_intercept = fit_intercept
 
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        most = most_components(self.max_components, Z.shape[1])
+        most = most_components(self.components or self.max_components, Z.shape[1])
         paths = np.zeros((most, Z.shape[1]))
         # beyond the rank, components would be made of rounding errors
         used = min(most, int(np.linalg.matrix_rank(Z, rtol=1e-8)))
@@ -58,7 +62,9 @@ class PartialLeastSquares(ShrunkRegressor):
                 model.fit(np.vstack([Z, -Z]), np.concatenate([y, -y]))
             paths[:used] = np.cumsum(model.x_rotations_ * model.y_loadings_[0], axis=1).T
             paths[used:] = paths[used - 1]
-        return paths[None]
+        return paths[None] if self.components is None else paths[None, -1:]
 
     def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.n_components_ = setting + 1
+        self.n_components_ = (
+            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
+        )

@@ -3,11 +3,13 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
-from sklearn.base import clone
+from sklearn.base import BaseEstimator, clone
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
@@ -16,7 +18,9 @@ from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import cover
-from thermocomp.models.methods import Method, given, method
+from thermocomp.models.foreign import adopted, title
+from thermocomp.models.methods import Method, Named, given, method
+from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.prints import fingerprint
 from thermocomp.recording.samples import Samples
@@ -52,7 +56,7 @@ class Trained:
 
 
 def train(
-    name: str | ThermalRegressor,
+    name: str | BaseEstimator,
     samples: Samples,
     target: int,
     learn: BoolArray,
@@ -64,8 +68,9 @@ def train(
 
     Parameters
     ----------
-    name : str or ThermalRegressor
-        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself.
+    name : str or estimator
+        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself, see
+        `thermocomp.models.foreign.adopted`.
     samples : Samples
     target : int
         Index into ``samples.targets``.
@@ -86,7 +91,12 @@ def train(
     FitError
         Too few rows, or the method cannot be fitted to them.
     """
-    how = method(name) if isinstance(name, str) else given(name)
+    own = name.estimator if isinstance(name, Named) else None if isinstance(name, str) else adopted(name)
+    how = (
+        method(str(name))
+        if own is None
+        else replace(given(own), name=str(name) if isinstance(name, str) else title(own))
+    )
     columns = [j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed"]
     if not columns:
         raise FitError(f"{how.name}: there is no temperature to predict from")
@@ -98,25 +108,30 @@ def train(
         )
     _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
-    estimator = how.build(speeds) if isinstance(name, str) else clone(name)
+    estimator = how.build(speeds) if own is None else clone(own)
+    if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
+        estimator.set_params(speed=speeds)  # the recording knows which inputs are
     begin = time.perf_counter()
-    rows = samples.valid if "dt" in how.takes else seen
+    # a method with a memory also gets what the machine went through between the rows it learns from
+    rows = samples.valid & np.isin(samples.test, samples.test[seen]) if "dt" in how.takes else seen
     X, learned = samples.frame().iloc[rows, columns], seen[rows]
     y = np.where(learned, samples.deviations[rows, target], 0.0)
     driven = samples.take(rows)
-    clock: dict[str, Any] = {"dt": driven.dt()} if "dt" in how.takes else {}
+    clock: dict[str, Any] = {"dt": pd.Series(driven.dt())} if "dt" in how.takes else {}
     cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
     try:
         estimator.fit(X, y, **clock, **cycles)
     except ValueError as e:  # what scikit-learn raises for data it cannot use
         raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
     seconds = time.perf_counter() - begin
-    everywhere = {"dt": samples.take(samples.valid).dt()} if "dt" in how.takes else {}
+    everywhere: dict[str, Any] = {"dt": pd.Series(samples.take(samples.valid).dt())} if "dt" in how.takes else {}
     predicted = np.full(len(samples), np.nan)
     predicted[samples.valid] = estimator.predict(samples.frame().iloc[samples.valid, columns], **everywhere)
     r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))
-    freeze = estimator.unfrozen if isinstance(estimator, UnfrozenRegressor) else estimator.freeze
-    model = freeze(
+    freeze: Any = estimator.freeze
+    if isinstance(estimator, UnfrozenRegressor):
+        freeze = partial(estimator.unfrozen, rows=samples.change()[samples.valid][:, columns])
+    model: ErrorModel = freeze(
         target=channel.name,
         unit=channel.unit,
         inputs=samples.model_inputs(columns, seen),

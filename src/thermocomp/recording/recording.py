@@ -9,7 +9,7 @@ from pathlib import PurePath
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
@@ -69,8 +69,67 @@ class Recording:
         if covered != sorted(covered) or covered[:1] != [0] or covered[-1:] != [len(self.time)]:
             raise RecordingError(f"{self.name}: cycles {self.cycles} do not cover the {len(self.time)} rows")
 
+    @classmethod
+    def from_dataframe(
+        cls,
+        table: pd.DataFrame,
+        *,
+        time: str | ArrayLike | None = None,
+        units: Mapping[str, str] | None = None,
+        cycles: str | Sequence[object] | None = None,
+        name: str = "table",
+    ) -> "Recording":
+        """Make a recording of a table.
+
+        Parameters
+        ----------
+        table : DataFrame of shape (n_rows, n_columns)
+            A column is a channel if its heading has a unit (``t1_C``, ``drift_um``, ``spindle_rpm``) or `units` tells
+            it; what is left out is told in `notes`.
+        time : str or array-like of shape (n_rows,), optional
+            Name of a column, or the time of each row: numbers (seconds without a unit), datetimes or timedeltas.
+            Without it the one column of times, such as ``time_s``, or an index of times.
+        units : mapping of str to str, optional
+            Column to unit, such as ``{"T1": "degC", "Z": "um"}``.
+        cycles : str or sequence of object of shape (n_rows,), optional
+            Name of a column, or the label of each row's thermal cycle. Without it a column ``cycle``, or the spindle
+            speed tells.
+        name : str
+            What the test is called.
+
+        Returns
+        -------
+        Recording
+            In house units.
+
+        Raises
+        ------
+        RecordingError
+            There is no time, or it does not rise; no column is a channel; a cell is no number.
+        UnitError
+            A unit is unknown.
+        InputError
+            A column that was named is not there, or an array has another length.
+        """
+        from thermocomp.recording.frames import from_dataframe
+
+        return from_dataframe(table, time=time, units=units, cycles=cycles, name=name)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table with the time since the first row in front, as ``time_s``."""
+        table = self.table.reset_index(drop=True)
+        table.insert(0, "time_s", self.time)
+        return table
+
     def __len__(self) -> int:
         return len(self.time)
+
+    def __repr__(self) -> str:
+        hours = self.time[-1] / 3600 if len(self) else 0.0
+        return (
+            f"<Recording {self.name}: {len(self)} rows, {hours:.1f} h, {len(self.temperatures)} temperatures, "
+            f"{len(self.displacements)} displacements, {len(self.cycles)} thermal cycle(s)>"
+        )
 
     def of_quantity(self, quantity: str) -> tuple[Channel, ...]:
         """Return the channels that measure `quantity`, in the order of the table."""

@@ -42,6 +42,12 @@ _STYLE = {
 }
 
 
+class Drawn(str):
+    """A figure as SVG text, which carries the figure along."""
+
+    figure: Figure
+
+
 def measured(recording: Recording) -> str:
     """Show what was measured in one test: speed, temperatures, displacements; thermal cycles shaded."""
     hours = recording.time / 3600
@@ -86,7 +92,7 @@ def measured(recording: Recording) -> str:
         return svg(figure)
 
 
-def overview(comparison: Comparison) -> str:
+def overview(comparison: Comparison) -> Drawn:
     """Show which model is best, and whether it is better than none: RMS on unseen blocks; hollow is refused."""
     overall = comparison.overall()
     targets = list(dict.fromkeys(a.target for a in overall))
@@ -116,7 +122,7 @@ def overview(comparison: Comparison) -> str:
         return svg(figure)
 
 
-def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Sequence[FloatArray]) -> str:
+def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Sequence[FloatArray]) -> Drawn:
     """Show how a model runs through each unseen block: measured, predicted and what is left.
 
     Parameters
@@ -239,9 +245,11 @@ def drawing(salt: str) -> Iterator[None]:
         yield
 
 
-def svg(figure: Figure) -> str:
+def svg(figure: Figure) -> Drawn:
     """Return a figure as SVG text."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
-    return text[text.index("<svg") :]
+    found = Drawn(text[text.index("<svg") :])
+    found.figure = figure
+    return found

@@ -9,10 +9,10 @@ from matplotlib.ticker import MaxNLocator
 from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.pareto import Budget
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.report.figures import COLOURS, NONE, drawing, svg
+from thermocomp.report.figures import COLOURS, NONE, Drawn, drawing, svg
 
 
-def draw(choice: Choice) -> tuple[str, str] | None:
+def draw(choice: Choice) -> tuple[Drawn, str] | None:
     """Return the figure of a choice and its caption; None if its tables say it all."""
     found = choice.details
     if isinstance(found, Budget):
@@ -28,7 +28,7 @@ def draw(choice: Choice) -> tuple[str, str] | None:
     return None
 
 
-def grouping(g: CorrelationGrouping, target: str) -> str:
+def grouping(g: CorrelationGrouping, target: str) -> Drawn:
     """Show which temperatures say the same, and how many are worth having: groups in the correlation matrix, MSE_p."""
     order = [i for members in g.groups_ for i in members]
     names = [str(n) for n in g.feature_names_in_[order]]
@@ -62,7 +62,7 @@ def grouping(g: CorrelationGrouping, target: str) -> str:
         return svg(figure)
 
 
-def budget(b: Budget) -> str:
+def budget(b: Budget) -> Drawn:
     """Show what each further sensor buys: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
     sizes = np.arange(1, len(b.sensors) + 1)
     names = [str(n) for n in b.sizes]

@@ -52,7 +52,10 @@ def summarise(
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t, samples) for t in targets],
         "recordings": [_recording(r) for r in recordings],
-        "models": [{"name": m, "summary": METHODS[m].summary} for m in _models(comparison)],
+        "models": [
+            {"name": m, "summary": METHODS[m].summary if m in METHODS else "an estimator that was handed in"}
+            for m in _models(comparison)
+        ],
         "metrics": [METRICS[name] for name in TABLE],
         "condition_number": comparison.collinearity.condition_number,
         "vif": sorted(

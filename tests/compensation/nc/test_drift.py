@@ -61,7 +61,7 @@ def test_free_run_is_the_core_stepped_by_hand(make: Callable[[], ErrorModel]) ->
 def test_free_run_is_the_replay_that_judges_models() -> None:
     learn, judge = (samples_of(r) for r in record("precompensation", seed=1))
     target = learn.targets[1].name
-    arx = ARX(inputs=("spindle_rpm",), interval=600.0, k=1, m=0)
+    arx = ARX(inputs=("spindle_rpm",), time="routed", interval=600.0, k=1, m=0)
     model = fitted(arx, learn, [target], dt=learn.dt(), cycle=learn.cycle)[target]
     replayed = predicted(model, judge)
     assert judge.values[0, 0] == 0  # a cold start

@@ -161,9 +161,9 @@ def compute(seed: int, progress: Progress) -> Computed:
     k, m = PAPERS_ORDERS
     for number, target in enumerate(targets):
         progress(0.1 + 0.1 * number, f"models at z = {POSITIONS[number]} mm")
-        chosen = ARX(inputs=(SPEED,), interval=INTERVAL, k_max=GREATEST, m_max=GREATEST)
-        paper = ARX(inputs=(SPEED,), interval=INTERVAL, k=k, m=m)
-        net = NetARX(inputs=(SPEED,), interval=INTERVAL, k=k, m=m, random_state=seed)
+        chosen = ARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k_max=GREATEST, m_max=GREATEST)
+        paper = ARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k=k, m=m)
+        net = NetARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k=k, m=m, random_state=seed)
         for name, estimator in ((CHOSEN, chosen), (LEAST, paper), (NET, net)):
             models[name].append(fitted(estimator, learn, [target], **timed)[target])
         tables.append(chosen.orders_)
@@ -257,8 +257,8 @@ def _clock(
 ) -> tuple[tuple[int, int], float, float]:
     target, errors = learn.targets[0].name, []
     k, m = PAPERS_ORDERS
-    chosen = ARX(inputs=(SPEED,), interval=interval, k_max=GREATEST, m_max=GREATEST)
-    for estimator in (chosen, ARX(inputs=(SPEED,), interval=interval, k=k, m=m)):
+    chosen = ARX(inputs=(SPEED,), time="routed", interval=interval, k_max=GREATEST, m_max=GREATEST)
+    for estimator in (chosen, ARX(inputs=(SPEED,), time="routed", interval=interval, k=k, m=m)):
         model = fitted(estimator, learn, [target], support=PAPERS_SUPPORT, **timed)[target]
         errors.append(Errors.of(judge.deviations[:, 0] - predicted(model, judge)).rms)
     return (chosen.k_, chosen.m_), errors[0], errors[1]

@@ -267,7 +267,12 @@ def _dynamic(recordings: Sequence[Recording], zeroed: tuple[Samples, Samples]) -
         stack(r, [target], names, zeroing=FIRST_READING, starts=COLD) for r in (recordings[:-1], recordings[-1:])
     )
     (model,) = fitted(
-        DynamicRidge(speed=speeds), learned, [target], support=Support(), dt=learned.dt(), cycle=learned.cycle
+        DynamicRidge(speed=speeds, time="routed"),
+        learned,
+        [target],
+        support=Support(),
+        dt=learned.dt(),
+        cycle=learned.cycle,
     ).values()
     return predicted(model, learned), predicted(model, unseen)
 

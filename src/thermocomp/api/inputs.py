@@ -1,0 +1,218 @@
+"""What is handed in: recordings, files, tables; and what is made of them before any work."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.assessment import splits
+from thermocomp.assessment.splits import Judging
+from thermocomp.core.exceptions import InputError
+from thermocomp.files import mapping as mappings
+from thermocomp.files import recordings as files
+from thermocomp.recording.quality import check
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples, stack
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: one test, or several
+Given = Recording | str | Path | pd.DataFrame | Sequence["Recording | str | Path | pd.DataFrame"]
+LeaveOne = Literal["cycle", "file"]
+
+
+def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None) -> Recording:
+    """Read one test from a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file ending in .csv, .tsv, .txt, .xlsx or .parquet.
+    mapping : str, Path or Mapping, optional
+        What the columns are, where their headings do not say: a TOML file, or what was read of one.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError, UnitError
+        See `thermocomp.files.recordings.read`.
+    """
+    return files.read(path, mappings.read_mapping(mapping) if isinstance(mapping, str | Path) else mapping)
+
+
+def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = None) -> list[Recording]:
+    """Return recordings, whatever they were given as.
+
+    Parameters
+    ----------
+    given : Recording, str, Path, DataFrame, or sequence of them
+        A table is taken by `Recording.from_dataframe` as it is.
+    mapping : str, Path or Mapping, optional
+        For files.
+
+    Returns
+    -------
+    list of Recording
+
+    Raises
+    ------
+    InputError
+        It is none of these, or there is none.
+    """
+    several = [given] if isinstance(given, Recording | str | Path | pd.DataFrame) else list(given)
+    if not several:
+        raise InputError("no recording given")
+    found = []
+    for k, one in enumerate(several, start=1):
+        if isinstance(one, Recording):
+            found.append(one)
+        elif isinstance(one, str | Path):
+            found.append(read(one, mapping))
+        elif isinstance(one, pd.DataFrame):
+            found.append(Recording.from_dataframe(one, name=f"table {k}" if len(several) > 1 else "table"))
+        else:
+            raise InputError(f"{type(one).__name__} is no recording: give a Recording, a path or a DataFrame")
+    return found
+
+
+def samples_of(
+    recordings: Sequence[Recording],
+    targets: str | Sequence[str] | None,
+    inputs: Sequence[str] | None = None,
+    *,
+    absolute: bool = False,
+) -> Samples:
+    """Stack recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    targets : str or sequence of str, optional
+        Displacement channels to predict; all of the first recording without it.
+    inputs : sequence of str, optional
+    absolute : bool
+
+    Returns
+    -------
+    Samples
+    """
+    named = [targets] if isinstance(targets, str) else targets
+    if named is None:
+        named = [c.name for c in recordings[0].displacements]
+    return stack(recordings, named, inputs, rezero=not absolute)
+
+
+def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
+    """Return what is learned from and what is judged.
+
+    Parameters
+    ----------
+    samples : Samples
+    split : str, optional
+        Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
+    leave_one : {'cycle', 'file'}, optional
+        Judge on each thermal cycle in turn, which is done if nothing is said, or on each recording.
+
+    Returns
+    -------
+    Judging
+
+    Raises
+    ------
+    InputError
+        Both were given, or there are too few cycles or files.
+    """
+    if split is not None and leave_one is not None:
+        raise InputError("split and leave_one exclude each other: choose one")
+    if split is not None:
+        return splits.parse(split, samples)
+    if leave_one not in (None, "cycle", "file"):
+        raise InputError(f"leave_one {leave_one!r}: want 'cycle' or 'file'")
+    return splits.leave_one_file_out(samples) if leave_one == "file" else splits.leave_one_cycle_out(samples)
+
+
+def trouble_of(recordings: Sequence[Recording]) -> list[str]:
+    """Return what is wrong with recordings, one line per trouble and per column that was left out."""
+    return [
+        f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
+        for r in recordings
+        for f in check(r)
+        if f.severity == "trouble" or f.kind == "left out"
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingTable:
+    """Complete rows of recordings as scikit-learn takes them.
+
+    Parameters
+    ----------
+    X : DataFrame of shape (n_rows, n_features)
+        Inputs minus their reference; in front of them the time since the start of the test [s], if asked for.
+    y : ndarray of shape (n_rows,)
+        Deviation [um].
+    test, cycle : ndarray of int of shape (n_rows,)
+        Which recording and which thermal cycle a row belongs to: the ``groups`` of scikit-learn.
+    dt : Series of shape (n_rows,)
+        Time since the row before [s]; inf where a test starts.
+    """
+
+    X: pd.DataFrame
+    y: FloatArray
+    test: IntArray
+    cycle: IntArray
+    dt: "pd.Series[float]"
+
+    def __repr__(self) -> str:
+        tests, cycles = len(np.unique(self.test)), len(np.unique(self.cycle))
+        return f"<TrainingTable: {len(self.y)} rows, {self.X.shape[1]} columns, {tests} test(s), {cycles} cycle(s)>"
+
+
+def training_table(
+    recordings: Given,
+    target: str,
+    *,
+    inputs: Sequence[str] | None = None,
+    time: bool = False,
+    absolute: bool = False,
+    mapping: str | Path | mappings.Mapping | None = None,
+) -> TrainingTable:
+    """Return recordings as scikit-learn takes them, for `cross_val_score`, Pipelines and estimators of one's own.
+
+    Parameters
+    ----------
+    recordings : Recording, path, DataFrame, or sequence of them
+    target : str
+        Displacement channel to predict.
+    inputs : sequence of str, optional
+        Channels to predict from; all temperatures and the spindle speed without it.
+    time : bool
+        The first column is ``time_s``, for an estimator with ``time="column"``.
+    absolute : bool
+        Take temperatures as they are; without it they are counted from the start of each test.
+    mapping : str, Path or Mapping, optional
+        For files.
+
+    Returns
+    -------
+    TrainingTable
+
+    Raises
+    ------
+    InputError
+        A channel is missing.
+    """
+    samples = samples_of(recordings_of(recordings, mapping), target, inputs, absolute=absolute)
+    rows = samples.take(samples.valid & np.isfinite(samples.deviations[:, 0]))
+    X = samples.frame()[samples.valid & np.isfinite(samples.deviations[:, 0])].reset_index(drop=True)
+    if time:
+        X.insert(0, "time_s", rows.time)
+    return TrainingTable(X, rows.deviations[:, 0], rows.test, rows.cycle, pd.Series(rows.dt()))

@@ -1,0 +1,341 @@
+"""What comes of the work, for a notebook: tables, figures, and one sentence."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.assessment.choice import Choice
+from thermocomp.assessment.results import Assessment, Comparison
+from thermocomp.assessment.study import Fitted, Judged
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import Columns, ErrorModel
+from thermocomp.models.methods import deployable
+from thermocomp.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+
+class Result(ABC):
+    """What all results can do."""
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """Return the figures as a table, a row for each of what was judged, fitted or chosen."""
+
+    @abstractmethod
+    def plot(self) -> "Figure":
+        """Return the figure that says most."""
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """Return the result in a sentence or two."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self}>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
+
+
+def verdict_of(a: Assessment) -> str:
+    """Return the verdict in one word."""
+    return "accepted" if a.accepted else "refused"
+
+
+def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
+    """Return assessments as a table.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+
+    Returns
+    -------
+    DataFrame
+        A row for each; errors and what was measured in um.
+    """
+    return pd.DataFrame(
+        {
+            "target": [a.target for a in assessments],
+            "model": [str(a.model) for a in assessments],
+            "block": [a.block for a in assessments],
+            "rms": [a.metric("rms") for a in assessments],
+            "mae": [a.metric("mae") for a in assessments],
+            "max_abs": [a.metric("max_abs") for a in assessments],
+            "none_rms": [a.none_metric("rms") for a in assessments],
+            "reduction_pct": [a.metric("reduction") for a in assessments],
+            "sensors": [a.n_sensors[1] for a in assessments],
+            "verdict": [verdict_of(a) for a in assessments],
+            "deployable": [deployable(a.model) for a in assessments],
+            "reason": [a.reason for a in assessments],
+        }
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Compared(Result):
+    """Methods judged on what they had not seen.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    recordings : tuple of Recording
+    trouble : tuple of str
+        What is wrong with the recordings.
+    """
+
+    comparison: Comparison
+    recordings: tuple[Recording, ...]
+    trouble: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> dict[str, str | None]:
+        """The accepted model with the smallest error that can be deployed, by target; None if there is none."""
+        targets = dict.fromkeys(a.target for a in self.comparison.assessments)
+        found = {t: self.comparison.best(t) for t in targets}
+        return {t: None if a is None else str(a.model) for t, a in found.items()}
+
+    def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
+        """Return a row per target and model, the best first; with `blocks` one per unseen block too.
+
+        Parameters
+        ----------
+        blocks : bool
+
+        Returns
+        -------
+        DataFrame
+        """
+        found = self.comparison.assessments if blocks else self.comparison.overall()
+        table = frame_of(found)
+        if blocks:
+            return table
+        order = {t: k for k, t in enumerate(dict.fromkeys(table["target"]))}
+        return table.sort_values(
+            ["target", "rms"], key=lambda c: c.map(order) if c.name == "target" else c, ignore_index=True
+        )
+
+    def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
+        """Return the errors of all models; or, for a target and a model, its run through the unseen blocks.
+
+        Parameters
+        ----------
+        target, model : str, optional
+            Both or none.
+
+        Returns
+        -------
+        Figure
+        """
+        from thermocomp.report import figures
+
+        if target is None and model is None:
+            return figures.overview(self.comparison).figure
+        return _run(self.comparison.assessments, self.recordings, target, model)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the page that ``thermocomp compare -o`` writes; return its path."""
+        from thermocomp.report import html
+
+        html.write(self.comparison, self.recordings, Path(path))
+        return Path(path)
+
+    def __str__(self) -> str:
+        from thermocomp.report.summary import verdict
+
+        return " ".join([verdict(self.comparison), *_told(self.trouble)])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedModels(Result):
+    """A method fitted to everything, with its error on what it had not seen.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    recordings : tuple of Recording
+    trouble : tuple of str
+    """
+
+    fitted: Fitted
+    recordings: tuple[Recording, ...]
+    trouble: tuple[str, ...] = ()
+
+    @property
+    def models(self) -> dict[str, ErrorModel]:
+        """The frozen models, by target."""
+        return {m.target: m for m in self.fitted.models}
+
+    @property
+    def model(self) -> ErrorModel:
+        """The frozen model, if there is one target.
+
+        Raises
+        ------
+        InputError
+            There are several.
+        """
+        if len(self.fitted.models) > 1:
+            raise InputError(f"there are models of {', '.join(self.models)}: take one of .models")
+        return self.fitted.models[0]
+
+    def predict(self, table: Columns, time: ArrayLike | str | None = None) -> pd.DataFrame:
+        """Replay all models through a table; see `thermocomp.core.model.ErrorModel.predict`.
+
+        Parameters
+        ----------
+        table : DataFrame or mapping
+        time : str or array-like, optional
+
+        Returns
+        -------
+        DataFrame
+            A column per target.
+        """
+        return pd.DataFrame({m.target: m.predict(table, time) for m in self.fitted.models})
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the model file that the compensator, ``assess`` and ``revise`` read; return its path."""
+        from thermocomp.files import modelfile
+
+        modelfile.write(self.fitted.models, Path(path), overwrite=overwrite)
+        return Path(path)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row per model: its error on unseen blocks, its sensors and its formula."""
+        table = frame_of(self.fitted.comparison.overall()).drop(columns=["block", "deployable", "sensors"])
+        table.insert(2, "r_squared", self.fitted.r_squared)
+        table["sensors"] = [" ".join(m.sensors) for m in self.fitted.models]
+        table["formula"] = [m.formula() for m in self.fitted.models]
+        return table
+
+    def plot(self, target: str | None = None) -> "Figure":
+        """Return how the method ran through the unseen blocks, for the first target or another."""
+        return _run(self.fitted.comparison.assessments, self.recordings, target or self.fitted.models[0].target, None)
+
+    def __str__(self) -> str:
+        return " ".join(
+            [
+                *(_judged(a) for a in self.fitted.comparison.overall()),
+                *_told(self.trouble),
+            ]
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Assessed(Result):
+    """Frozen models judged on recordings.
+
+    Parameters
+    ----------
+    judged : Judged
+    recordings : tuple of Recording
+    trouble : tuple of str
+    """
+
+    judged: Judged
+    recordings: tuple[Recording, ...]
+    trouble: tuple[str, ...] = ()
+
+    def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
+        """Return a row per model; with `blocks` one per thermal cycle too."""
+        return frame_of(self.judged.assessments if blocks else self.judged.overall()).drop(columns="deployable")
+
+    def plot(self, target: str | None = None) -> "Figure":
+        """Return how the model ran through the recordings, for the first target or another."""
+        return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
+
+    def __str__(self) -> str:
+        return " ".join([*(_judged(a) for a in self.judged.overall()), *_told(self.trouble)])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Selected(Result):
+    """Sensors that were chosen.
+
+    Parameters
+    ----------
+    choices : tuple of Choice
+    trouble : tuple of str
+    """
+
+    choices: tuple[Choice, ...]
+    trouble: tuple[str, ...] = ()
+
+    @property
+    def sensors(self) -> dict[str, tuple[str, ...]]:
+        """Names of the chosen sensors, by target."""
+        return {c.target: c.sensors for c in self.choices}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row per target; the tables behind it are in ``choices[k].tables``."""
+        return pd.DataFrame(
+            {
+                "target": [c.target for c in self.choices],
+                "method": [c.method for c in self.choices],
+                "sensors": [" ".join(c.sensors) for c in self.choices],
+                "reason": [c.reason for c in self.choices],
+            }
+        )
+
+    def plot(self, target: str | None = None) -> "Figure":
+        """Return the figure of the first choice, or of that of a target.
+
+        Raises
+        ------
+        InputError
+            The method has none: its tables say it all.
+        """
+        from thermocomp.report import selections
+
+        mine = [c for c in self.choices if target in (None, c.target)]
+        if not mine:
+            raise InputError(f"no choice for {target!r}; there are {', '.join(c.target for c in self.choices)}")
+        drawn = selections.draw(mine[0])
+        if drawn is None:
+            raise InputError(
+                f"{mine[0].method} has no figure: see its tables, choices[0].tables; pareto and grouping have"
+            )
+        return drawn[0].figure
+
+    def __str__(self) -> str:
+        chosen = (f"{c.target}: {', '.join(c.sensors) or 'no sensor'} ({c.reason})." for c in self.choices)
+        return " ".join([*chosen, *_told(self.trouble)])
+
+
+def _judged(a: Assessment) -> str:
+    if a.failure:
+        return f"{a.target}: {a.reason}."
+    return (
+        f"{a.target}: {a.model} {verdict_of(a)}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
+        f"({a.reason})."
+    )
+
+
+def _told(trouble: Sequence[str]) -> list[str]:
+    return [f"Trouble: {'; '.join(trouble)}."] if trouble else []
+
+
+def _run(
+    assessments: Sequence[Assessment], recordings: Sequence[Recording], target: str | None, model: str | None
+) -> "Figure":
+    from thermocomp.report import figures
+
+    overall = [a for a in assessments if a.overall and (target, model) in ((a.target, None), (a.target, str(a.model)))]
+    if not overall:
+        known = ", ".join(dict.fromkeys(f"{a.model} for {a.target}" for a in assessments if a.overall))
+        raise InputError(f"there is no {model or 'model'} for {target}; there are {known}")
+    blocks = [a for a in assessments if (a.target, a.model) == (overall[0].target, overall[0].model) and not a.overall]
+    times = [r.time for r in recordings]
+    return figures.prediction(overall[0], blocks or overall, times).figure

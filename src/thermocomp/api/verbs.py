@@ -1,0 +1,253 @@
+"""The main job in Python: simulate, select, compare, fit, assess. The commands' words are the keywords."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from thermocomp.api.inputs import Given, LeaveOne, judging_of, recordings_of, samples_of, trouble_of
+from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
+from thermocomp.assessment import compare as comparing
+from thermocomp.assessment import selecting
+from thermocomp.assessment import study as studies
+from thermocomp.assessment.choice import Settings
+from thermocomp.assessment.splits import Judging
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, Support
+from thermocomp.datasets import virtual
+from thermocomp.files import modelfile
+from thermocomp.files.mapping import Mapping
+from thermocomp.recording.recording import Recording
+
+DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
+SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
+Policy = Literal["clip", "hold", "fade"]
+
+
+def _silent(_: str, steps: int = 1) -> None:
+    """Say nothing."""
+
+
+def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | None = None) -> list[Recording]:
+    """Record an experiment on a virtual machine.
+
+    Parameters
+    ----------
+    experiment : str or Path
+        One that comes with the package, such as ``demo``, or a protocol of one's own (.toml).
+    seed : int
+        Of weather and noise.
+    noise : float, optional
+        Standard deviation of the temperature noise [degC]; the sensor's own without it.
+
+    Returns
+    -------
+    list of Recording
+        One per test.
+
+    Raises
+    ------
+    InputError
+        There is no such experiment.
+    """
+    return virtual.record(virtual.find(experiment), seed=seed, sensor_noise=noise)
+
+
+def compare(
+    recordings: Given,
+    targets: str | Sequence[str] | None = None,
+    models: Sequence[Any] = DEFAULT_MODELS,
+    *,
+    inputs: Sequence[str] | None = None,
+    split: str | None = None,
+    leave_one: LeaveOne | None = None,
+    absolute: bool = False,
+    mapping: str | Path | Mapping | None = None,
+    support: Policy = "clip",
+    margin: float = Support.margin,
+    robustness: bool = False,
+    jobs: int = 1,
+    progress: Callable[[str], None] = _silent,
+) -> Compared:
+    """Compare methods on thermal cycles they have not seen, beside no compensation.
+
+    Parameters
+    ----------
+    recordings : Recording, path, DataFrame, or sequence of them
+        Each is one test.
+    targets : str or sequence of str, optional
+        Displacement channels to predict; all of the first recording without it.
+    models : sequence of str or estimator
+        Names of methods, ``all``, and estimators of any kind: one of thermocomp's with settings of its own, any
+        regressor of scikit-learn, a Pipeline, a small class of one's own.
+    inputs : sequence of str, optional
+        Channels to predict from; all temperatures and the spindle speed without it.
+    split : str, optional
+        Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
+    leave_one : {'cycle', 'file'}, optional
+        Judge on each thermal cycle in turn, which is done if nothing is said, or on each recording.
+    absolute : bool
+        Take temperatures as they are; without it they are counted from the start of each test.
+    mapping : str, Path or Mapping, optional
+        What the columns of files are.
+    support, margin : str, float
+        What the models do outside their trained range, see `thermocomp.core.model.Support`.
+    robustness : bool
+        Also replay with noise and lost sensors.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+    progress : callable
+        Called with a line of text after each piece of work.
+
+    Returns
+    -------
+    Compared
+
+    Raises
+    ------
+    InputError
+        A recording, channel or model cannot be used.
+    """
+    tests = recordings_of(recordings, mapping)
+    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    judging = judging_of(samples, split=split, leave_one=leave_one)
+    found = comparing.compare(
+        samples,
+        [models] if isinstance(models, str) else models,
+        judging,
+        support=Support(support, margin),
+        robustness=robustness,
+        jobs=jobs,
+        progress=progress,
+    )
+    return Compared(found, tuple(tests), tuple(trouble_of(tests)))
+
+
+def fit(
+    recordings: Given,
+    targets: str | Sequence[str] | None = None,
+    model: Any = "dynamic",
+    *,
+    inputs: Sequence[str] | None = None,
+    split: str | None = None,
+    leave_one: LeaveOne | None = None,
+    absolute: bool = False,
+    mapping: str | Path | Mapping | None = None,
+    support: Policy = "clip",
+    margin: float = Support.margin,
+    jobs: int = 1,
+    progress: Callable[[str], None] = _silent,
+) -> FittedModels:
+    """Judge a method on thermal cycles it has not seen, then fit it to everything and freeze it.
+
+    Parameters
+    ----------
+    recordings, targets
+        As for `compare`.
+    model : str or estimator
+        A method, or an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
+    inputs, split, leave_one, absolute, mapping, support, margin, jobs, progress
+        As for `compare`.
+
+    Returns
+    -------
+    FittedModels
+
+    Raises
+    ------
+    InputError
+        A recording, channel or model cannot be used, or the model cannot be frozen.
+    """
+    tests = recordings_of(recordings, mapping)
+    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    judging = judging_of(samples, split=split, leave_one=leave_one)
+    found = studies.fit(samples, model, judging, support=Support(support, margin), jobs=jobs, progress=progress)
+    return FittedModels(found, tuple(tests), tuple(trouble_of(tests)))
+
+
+def assess(
+    models: ErrorModel | FittedModels | str | Path | Sequence[ErrorModel],
+    recordings: Given,
+    *,
+    mapping: str | Path | Mapping | None = None,
+    progress: Callable[[str], None] = _silent,
+) -> Assessed:
+    """Judge frozen models on recordings: per cycle, with noise, with each sensor lost, outside their range.
+
+    Parameters
+    ----------
+    models : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel
+    recordings : Recording, path, DataFrame, or sequence of them
+    mapping : str, Path or Mapping, optional
+        What the columns of files are.
+    progress : callable
+        Called with a line of text per model.
+
+    Returns
+    -------
+    Assessed
+
+    Raises
+    ------
+    InputError
+        A file or a channel the models need cannot be used.
+    """
+    if isinstance(models, str | Path):
+        models = modelfile.read(models)
+    elif isinstance(models, FittedModels):
+        models = models.fitted.models
+    elif isinstance(models, ErrorModel):
+        models = (models,)
+    tests = recordings_of(recordings, mapping)
+    return Assessed(studies.assess(models, tests, progress=progress), tuple(tests), tuple(trouble_of(tests)))
+
+
+def select(
+    recordings: Given,
+    targets: str | Sequence[str] | None = None,
+    method: SelectionMethod = "pareto",
+    *,
+    inputs: Sequence[str] | None = None,
+    split: str | None = None,
+    leave_one: LeaveOne | None = None,
+    absolute: bool = False,
+    mapping: str | Path | Mapping | None = None,
+    jobs: int = 1,
+    progress: Callable[..., None] = _silent,
+    **settings: Any,
+) -> Selected:
+    """Choose the few temperature sensors that a model needs.
+
+    Parameters
+    ----------
+    recordings, targets
+        As for `compare`.
+    method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
+        How to choose; see :doc:`/methods`.
+    inputs, split, leave_one, absolute, mapping, jobs, progress
+        As for `compare`.
+    **settings
+        Of the method, see `thermocomp.assessment.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
+
+    Returns
+    -------
+    Selected
+
+    Raises
+    ------
+    InputError
+        A recording, channel, method or setting cannot be used.
+    """
+    if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
+        raise InputError(f"method {method!r}: want pareto, subsets, grouping, partial-f, stepwise or ace")
+    try:
+        chosen = Settings(**settings)
+    except TypeError as e:
+        known = ", ".join(Settings.__dataclass_fields__)
+        raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
+    chosen.check(method)
+    tests = recordings_of(recordings, mapping)
+    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    wanted = method == "pareto" or split is not None or leave_one is not None
+    judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
+    found = selecting.select(method, samples, judging, chosen, jobs=jobs, progress=progress)
+    return Selected(found, tuple(trouble_of(tests)))

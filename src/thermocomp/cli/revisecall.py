@@ -1,0 +1,110 @@
+"""`thermocomp.revise`: the command as a function."""
+
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from thermocomp.cli import reviserun, revisetables
+from thermocomp.cli.revise import prepared, run
+from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
+from thermocomp.core.exceptions import InputError
+
+_GROUPS = (Drifting, Starting, Way, Controller, Timing)
+#: words of the command that name files
+_PATHS = ("model", "forecast", "carried", "machine", "subroutines")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RevisedProgram:
+    """An NC program that was revised, or was not because nothing was taken off.
+
+    Parameters
+    ----------
+    path : Path
+        The program that was written.
+    written : bool
+        False: nothing was taken off, so there are no files.
+    files : tuple of Path
+        All that was written.
+    summary : dict
+        What ``thermocomp revise --json`` says.
+    """
+
+    path: Path
+    written: bool
+    files: tuple[Path, ...]
+    summary: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<RevisedProgram: {self.path if self.written else 'nothing was taken off, nothing was written'}>"
+
+
+def revise(
+    program: str | Path,
+    model: str | Path | Sequence[str | Path],
+    output: str | Path,
+    *,
+    overwrite: bool = False,
+    date: str | None = None,
+    **words: Any,
+) -> RevisedProgram:
+    """Correct an NC program by the drift it will cause, before it is run.
+
+    Parameters
+    ----------
+    program : str or Path
+        NC program.
+    model : str, Path, or sequence of them
+        Model files of `fit`.
+    output : str or Path
+        Program to write.
+    overwrite : bool
+        Write over existing files; never over the program.
+    date : str, optional
+        For the header; today without it.
+    **words
+        The options of ``thermocomp revise`` with underscores: ``cold=True``, ``controller="fanuc"``,
+        ``axis=["ch3=Z"]``.
+
+    Returns
+    -------
+    RevisedProgram
+
+    Raises
+    ------
+    InputError
+        An option, the program or something else cannot be used.
+    """
+    models = [model] if isinstance(model, str | Path) else list(model)
+    given = {"model": models, **words}
+    for name in given.keys() & set(_PATHS):
+        value = given[name]
+        given[name] = [Path(v) for v in value] if isinstance(value, list | tuple) else value and Path(value)
+    known = {f.name for group in _GROUPS for f in fields(group)}
+    for name in given.keys() - known:
+        near = get_close_matches(name, known, n=3, cutoff=0.5)
+        raise InputError(f"revise: there is no option {name!r}; the nearest are {', '.join(near) or ', '.join(known)}")
+    groups: list[Any] = []
+    for group in _GROUPS:
+        mine = {f.name: given[f.name] for f in fields(group) if f.name in given}
+        missing = [
+            f.name
+            for f in fields(group)
+            if f.default is MISSING and f.default_factory is MISSING and f.name not in given
+        ]
+        if missing:
+            raise InputError(f"revise: give {', '.join(missing)}")
+        groups.append(group(**mine))
+    drifting, starting, way, controller, timing = groups
+    job, notes = prepared(
+        Path(program), drifting, Path(output), starting, way, controller, timing, date, overwrite=overwrite
+    )
+    done: reviserun.Done = run(job, hidden=True)
+    return RevisedProgram(
+        Path(output),
+        done.written,
+        tuple(job.paths.all()) if done.written else (),
+        revisetables.content(job, done, notes),
+    )

@@ -1,0 +1,88 @@
+"""What a heading says: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
+
+import re
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from thermocomp.core.exceptions import UnitError
+from thermocomp.core.units import Unit, unit
+
+# What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
+SUFFIXES = {
+    **{s: s for s in ("C", "degC", "°C", "K", "F", "degF", "°F", "nm", "um", "µm", "μm", "mm", "urad", "µrad", "mrad")},
+    **{s: s for s in ("arcsec", "rpm", "s", "ms", "min", "h")},
+    "RPM": "rpm",
+    "mm_min": "mm/min",
+    "m_min": "m/min",
+}
+# In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
+_NOT_IN_BRACKETS = ("", "1")
+_FREQUENCIES = ("Hz", "1/s")
+HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
+BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
+_AXIS = re.compile(r"[xyzuvw]\d?")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a heading with a unit says.
+
+    Parameters
+    ----------
+    name : str
+        Channel name: the heading with the suffix of the house unit.
+    base : str
+        The heading without its unit.
+    unit : Unit
+    """
+
+    name: str
+    base: str
+    unit: Unit
+
+
+def understand(heading: str) -> Meaning | None:
+    """Find the unit in a heading: ``t1_C``, ``drift_mm``, ``T1 [degC]``, ``Temp 1 (°C)``.
+
+    Returns
+    -------
+    Meaning or None
+        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``).
+
+    Raises
+    ------
+    UnitError
+        The brackets hold what looks like a mistyped unit.
+    """
+    heading = heading.strip()
+    found = BRACKETS.fullmatch(heading)
+    if found:
+        base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
+        turning = any(word in base.casefold() for word in ("spindle", "speed"))
+        if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
+            return None
+        symbol = SUFFIXES.get(symbol, symbol)
+        try:
+            meant = unit(symbol)
+        except UnitError:
+            # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
+            if get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
+                raise
+            return None
+    else:
+        ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
+        if not ends:
+            return None
+        suffix = max(ends, key=len)
+        base, meant = heading[: -len(suffix) - 1], unit(SUFFIXES[suffix])
+    if meant.quantity == "displacement" and _is_position(base, meant.symbol):
+        meant = unit(meant.symbol, "position")
+    # one word, so that the name can go into a formula or a controller
+    return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
+
+
+def _is_position(base: str, symbol: str) -> bool:
+    words = re.split(r"[\s_.-]+", base.casefold())
+    if any(w in ("pos", "position") for w in words):
+        return True
+    return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)

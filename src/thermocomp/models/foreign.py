@@ -1,0 +1,142 @@
+"""Regressors of others: any of scikit-learn's, or a small class of one's own, judged beside the methods."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone, is_regressor
+from sklearn.pipeline import Pipeline
+from sklearn.utils.validation import validate_data
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.pipelines import PipelineRegressor, freezes
+from thermocomp.models.timed import TimedRegressor
+from thermocomp.models.unfrozen import UnfrozenRegressor
+
+FloatArray = NDArray[np.float64]
+
+
+class ForeignRegressor(UnfrozenRegressor):
+    """A regressor without `freeze`: replayed and judged like the others, never deployed.
+
+    Parameters
+    ----------
+    estimator : estimator
+        With `fit` and `predict`; is not changed itself. It gets a table with the inputs' names.
+
+    Attributes
+    ----------
+    estimator_ : estimator
+        Fitted.
+    data_min_, data_max_ : ndarray of shape (n_features,)
+        Trained range.
+    """
+
+    def __init__(self, estimator: Any) -> None:
+        self.estimator = estimator
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name of the class, or of the steps of a Pipeline."""
+        return title(self.estimator)
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "ForeignRegressor":
+        """Fit a copy of the estimator.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        ForeignRegressor
+        """
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        change: FloatArray = checked[0]
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        self.estimator_ = clone(self.estimator).fit(self._table(change), checked[1])
+        return self
+
+    def evaluate(self, change: FloatArray) -> FloatArray:
+        """Predict for rows that were checked before.
+
+        Parameters
+        ----------
+        change : ndarray of shape (n_rows, n_features)
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+
+        Raises
+        ------
+        InputError
+            It does not give one number per row.
+        """
+        found = np.asarray(self.estimator_.predict(self._table(change)), dtype=np.float64)
+        if found.size != len(change):
+            raise InputError(f"{self.name}: predict gave an array of shape {found.shape} for {len(change)} rows")
+        return found.reshape(len(change))
+
+    def _table(self, change: FloatArray) -> FloatArray | pd.DataFrame:
+        return pd.DataFrame(change, columns=self._names()) if hasattr(self, "feature_names_in_") else change
+
+    def _bulk(self) -> str:
+        return "it is no method of thermocomp and has no 'freeze'"
+
+
+def adopted(estimator: Any) -> Any:
+    """Return an estimator that was handed in as one that can be trained and judged.
+
+    Parameters
+    ----------
+    estimator : estimator
+        One of thermocomp's, one with a `freeze` of its own, a Pipeline, or any regressor of scikit-learn's manner.
+
+    Returns
+    -------
+    estimator
+        Itself if it freezes; a Pipeline of parts that freeze as a `PipelineRegressor`; all others as a
+        `ForeignRegressor`.
+
+    Raises
+    ------
+    InputError
+        It is no regressor, or a part of it has a memory and could not be told the time.
+    """
+    if isinstance(estimator, type):
+        raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")
+    if isinstance(estimator, TimedRegressor):
+        return estimator.routed()
+    if isinstance(estimator, ThermalRegressor):
+        return estimator
+    if isinstance(estimator, Pipeline) and freezes(estimator):
+        return PipelineRegressor(estimator)
+    if not isinstance(estimator, BaseEstimator) or not (is_regressor(estimator) or hasattr(estimator, "freeze")):
+        raise InputError(
+            f"{type(estimator).__name__} is no regressor: name a method, or give an instance of a class derived from "
+            "sklearn.base.RegressorMixin and BaseEstimator, with fit(X, y) and predict(X)"
+        )
+    for name, part in estimator.get_params().items():
+        if isinstance(part, TimedRegressor):
+            raise InputError(
+                f"{type(part).__name__} ({name}) has a memory, and {title(estimator)} cannot tell it the time here: "
+                "give it alone, or in a Pipeline of selectors and one method that freezes"
+            )
+    return estimator if hasattr(estimator, "freeze") else ForeignRegressor(estimator)
+
+
+def title(estimator: Any) -> str:
+    """Return what to call an estimator: its class, or the classes of the steps of a Pipeline."""
+    if isinstance(estimator, ForeignRegressor):
+        return title(estimator.estimator)
+    if isinstance(estimator, PipelineRegressor):
+        return title(estimator.pipeline)
+    if isinstance(estimator, Pipeline):
+        return " + ".join(title(step) for _, step in estimator.steps if step not in (None, "passthrough"))
+    return type(estimator).__name__

@@ -1,0 +1,211 @@
+"""Pipelines of selectors and one method, as one model of plain numbers."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import clone
+from sklearn.feature_selection import SelectorMixin
+from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.exceptions import FitError
+from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.timed import TimedRegressor
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+def freezes(pipeline: Pipeline) -> bool:
+    """Return whether a Pipeline can be frozen: selectors or a `StandardScaler`, then a method that can be frozen."""
+    *before, last = _steps(pipeline)
+    return (
+        isinstance(last, ThermalRegressor)
+        and last.freezable
+        and all(isinstance(s, SelectorMixin | StandardScaler) for s in before)
+    )
+
+
+def freeze(
+    estimator: Any,
+    *,
+    target: str,
+    unit: str = "um",
+    inputs: Sequence[Input] | None = None,
+    support: Support = Support(),
+    provenance: Provenance | None = None,
+) -> ErrorModel:
+    """Return a fitted method, or a fitted Pipeline of selectors and a method, as plain numbers.
+
+    A selector is any `SelectorMixin`; a `StandardScaler` may stand before a method without products of inputs.
+
+    Parameters
+    ----------
+    estimator : estimator
+        Fitted.
+    target, unit, inputs, support, provenance
+        As in `thermocomp.models.base.ThermalRegressor.freeze`; the inputs are those of the Pipeline, without the time.
+
+    Returns
+    -------
+    ErrorModel
+
+    Raises
+    ------
+    FitError
+        It cannot be frozen.
+    """
+    header: dict[str, Any] = {"target": target, "unit": unit, "support": support, "provenance": provenance}
+    if not isinstance(estimator, Pipeline):
+        if not hasattr(estimator, "freeze"):
+            raise FitError(f"{type(estimator).__name__} has no 'freeze': compare it, deploy another")
+        frozen: ErrorModel = estimator.freeze(inputs=inputs, **header)
+        return frozen
+    if not freezes(estimator):
+        raise FitError(
+            "a Pipeline can be frozen if it is selectors or a StandardScaler, and then one method of thermocomp's that "
+            f"can be frozen; this one is {', '.join(type(s).__name__ for s in _steps(estimator))}"
+        )
+    check_is_fitted(estimator)
+    last = _steps(estimator)[-1]
+    columns, mean, scale = _passed(estimator)
+    hidden = last.n_features_in_ - len(last.data_min_)  # the time
+    if (columns[:hidden] != np.arange(hidden)).any():
+        raise FitError(
+            "a step before the last has not kept the time, the first column: give its selector time='column'"
+        )
+    columns, mean, scale = columns[hidden:], mean[hidden:], scale[hidden:]
+    if inputs is None:
+        first = _steps(estimator)[0]
+        names = getattr(first, "feature_names_in_", [f"x{i}" for i in range(first.n_features_in_)])
+        ranges = zip(last.data_min_ * scale + mean, last.data_max_ * scale + mean, strict=True)
+        mine = [
+            Input(str(names[c]), "dimensionless", "1", reference=0.0, rezero=False, low=float(low), high=float(high))
+            for c, (low, high) in zip(columns.tolist(), ranges, strict=True)
+        ]
+    else:
+        mine = [inputs[c - hidden] for c in columns.tolist()]
+    model: ErrorModel = last.freeze(inputs=mine, **header)
+    if not mean.any() and (scale == 1).all():
+        return model
+    return _unscaled(model, {i.name: (m, s) for i, m, s in zip(mine, mean.tolist(), scale.tolist(), strict=True)})
+
+
+class PipelineRegressor(ThermalRegressor):
+    """A Pipeline that can be frozen, trained as one method: its selectors see the rows that are learned from alone.
+
+    Parameters
+    ----------
+    pipeline : Pipeline
+        Is not changed itself.
+
+    Attributes
+    ----------
+    pipeline_ : Pipeline
+        Fitted.
+    """
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
+    ) -> "PipelineRegressor":
+        """Fit each step to what the step before has passed on.
+
+        Parameters
+        ----------
+        X : DataFrame of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        dt, cycle : array-like of shape (n_rows,), optional
+            As in `thermocomp.models.dynamic.DynamicRidge.fit`; rows with cycle -1 are not learned from.
+
+        Returns
+        -------
+        PipelineRegressor
+        """
+        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        deviation = np.asarray(checked[1])
+        folds = np.zeros(len(deviation), dtype=np.intp) if cycle is None else np.asarray(cycle)
+        learned = folds >= 0
+        self.data_min_, self.data_max_ = checked[0][learned].min(axis=0), checked[0][learned].max(axis=0)
+        *before, last = (clone(s) for s in _steps(self.pipeline))
+        table: Any = X
+        for step in before:
+            if "time" in step.get_params():
+                step.set_params(time=None)  # here the time is no column
+            step.set_output(transform="pandas").fit(table[learned], deviation[learned])
+            table = step.transform(table)
+        if isinstance(last, TimedRegressor):
+            last = last.routed()
+            last.fit(table, deviation, dt=dt, cycle=cycle)
+        else:
+            last.fit(table[learned], deviation[learned])
+        self.pipeline_ = Pipeline([(str(k), s) for k, s in enumerate([*before, last])])
+        return self
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : DataFrame of shape (n_rows, n_features)
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        check_is_fitted(self)
+        *before, last = _steps(self.pipeline_)
+        for step in before:
+            X = step.transform(X)
+        return np.asarray(last.predict(X, dt=dt) if isinstance(last, TimedRegressor) else last.predict(X))
+
+    def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> ErrorModel:
+        return freeze(self.pipeline_, inputs=inputs, **header)
+
+
+def _steps(pipeline: Pipeline) -> list[Any]:
+    return [step for _, step in pipeline.steps if step not in (None, "passthrough")]
+
+
+def _passed(pipeline: Pipeline) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return which columns reach the last step, and what was taken off and divided by on the way."""
+    *before, last = _steps(pipeline)
+    n = (before or [last])[0].n_features_in_
+    columns, mean, scale = np.arange(n), np.zeros(n), np.ones(n)
+    for step in before:
+        if isinstance(step, SelectorMixin):
+            kept = step.get_support()
+            columns, mean, scale = columns[kept], mean[kept], scale[kept]
+        else:
+            mean = mean + scale * (0.0 if step.mean_ is None else step.mean_)
+            scale = scale * (1.0 if step.scale_ is None else step.scale_)
+    return columns, mean, scale
+
+
+def _unscaled(model: ErrorModel, scaling: dict[str, tuple[float, float]]) -> Polynomial:
+    """Return a model of scaled inputs as one of the inputs themselves."""
+    if not isinstance(model, Polynomial) or any(len(term) > 1 for term in model.terms):
+        raise FitError(
+            f"a StandardScaler before a model of the family {model.family} cannot be frozen: its inputs are multiplied "
+            "or remembered. Leave the scaler out; the methods scale by themselves"
+        )
+    variables, constants = [], []
+    for v in model.variables:
+        of = [(i, factor, *scaling[model.inputs[i].name]) for i, factor in v.weights]
+        variables.append(Variable(v.name, tuple((i, factor / scale) for i, factor, _, scale in of)))
+        constants.append(sum(factor * mean / scale for _, factor, mean, scale in of))
+    taken = sum(c * constants[v] for (v,), c in zip(model.terms, model.coefficients, strict=True))
+    return replace(model, variables=tuple(variables), intercept=model.intercept - taken)

@@ -1,0 +1,130 @@
+"""`SensorSelector`: any way to choose sensors as a step of a scikit-learn Pipeline."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, clone
+from sklearn.feature_selection import SelectorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.grouping import CorrelationGrouping
+from thermocomp.models.lasso import Lasso
+from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.partial_f import PartialF
+from thermocomp.models.subsets import BestSubset
+
+#: the methods that choose, as on the command line
+SELECTORS: dict[str, type[ThermalRegressor]] = {
+    "grouping": CorrelationGrouping,
+    "partial-f": PartialF,
+    "stepwise": StepwiseMRA,
+    "subsets": BestSubset,
+    "lasso": Lasso,
+}
+
+
+class SensorSelector(SelectorMixin, BaseEstimator):
+    """Keeps the sensors that a method chooses.
+
+    Parameters
+    ----------
+    method : str or estimator
+        ``grouping``, ``partial-f``, ``stepwise``, ``subsets``, ``lasso``; or such an estimator with settings of its
+        own, such as ``CorrelationGrouping(threshold=0.95)``. Whatever its frozen model has a use for is kept.
+    keep : sequence of str or int
+        Names (or indices) of columns that are kept without being asked about, such as the spindle speed.
+    time : {'column'} or None
+        ``"column"``: the first column is the time, for a model with a memory further on; it is kept.
+
+    Attributes
+    ----------
+    estimator_ : ThermalRegressor
+        The method, fitted to the candidates.
+    n_features_in_ : int
+    """
+
+    def __init__(
+        self,
+        method: str | ThermalRegressor = "subsets",
+        *,
+        keep: Sequence[str | int] = (),
+        time: Literal["column"] | None = None,
+    ) -> None:
+        self.method = method
+        self.keep = keep
+        self.time = time
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "SensorSelector":
+        """Choose.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row, for a method that chooses by cycles left out.
+
+        Returns
+        -------
+        SensorSelector
+
+        Raises
+        ------
+        InputError
+            The method or a column is unknown, or there is nothing to choose from.
+        """
+        values, deviation = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
+        given = self._kept()
+        if self.time not in (None, "column"):
+            raise InputError(f"SensorSelector: time={self.time!r}: give 'column' or None")
+        free = np.flatnonzero(~given)
+        if not free.size:
+            raise InputError("SensorSelector: every column is kept, so there is none to choose from")
+        cycles = {} if cycle is None or not self._takes_cycle() else {"cycle": cycle}
+        names = [str(n) for n in getattr(self, "feature_names_in_", range(self.n_features_in_))]
+        candidates = pd.DataFrame(values[:, free], columns=[names[j] for j in free])
+        self.estimator_ = self._method().fit(candidates, deviation, **cycles)
+        chosen = self.estimator_.freeze(target="y").sensors
+        self._support = given | np.isin(names, chosen)
+        return self
+
+    def _get_support_mask(self) -> NDArray[np.bool_]:
+        check_is_fitted(self)
+        return self._support
+
+    def _kept(self) -> NDArray[np.bool_]:
+        names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
+        mask = np.zeros(self.n_features_in_, dtype=np.bool_)
+        mask[:1] = self.time == "column"
+        for column in self.keep:
+            if isinstance(column, str) and column not in names:
+                raise InputError(f"SensorSelector: keep {column!r}: the columns are {', '.join(names)}")
+            place = names.index(column) if isinstance(column, str) else int(column)
+            if not 0 <= place < len(names):
+                raise InputError(f"SensorSelector: keep {column!r}: there are {len(names)} columns, the first is 0")
+            mask[place] = True
+        return mask
+
+    def _method(self) -> Any:
+        if isinstance(self.method, ThermalRegressor):
+            return clone(self.method)
+        if self.method not in SELECTORS:
+            raise InputError(f"SensorSelector: method {self.method!r}: want one of {', '.join(SELECTORS)}")
+        return SELECTORS[self.method]()
+
+    def _takes_cycle(self) -> bool:
+        from inspect import signature
+
+        return "cycle" in signature(self._method().fit).parameters
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.target_tags.required = True
+        return tags

@@ -1,0 +1,267 @@
+"""Time in scikit-learn's hands: how an estimator with a memory is told it, and when it refuses.
+
+scikit-learn takes rows as exchangeable and hands any part of them on. A model with a memory that is given a part
+without its past predicts something else and no warning comes; so it demands a declaration, and rows it can follow from
+the start of each test.
+"""
+
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn import get_config
+from sklearn.base import clone
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.numerics.ticks import steps as checked_steps
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+Time = Literal["column", "routed", "none"]
+
+#: a step this many times the usual one is no pause of the logger: rows are missing
+GAP = 10.0
+#: a column that ends before this is no time [s] of a thermal test: it was scaled, or counts hours
+LEAST = 60.0
+
+REMEDY = (
+    "time='column' if the first column of X is the time since the start of the row's test [s], or time='routed' to "
+    "pass dt by scikit-learn's metadata routing"
+)
+_WHOLE = "give every test from its start: leave whole tests out (groups=, LeaveOneGroupOut)"
+_OURS = "thermocomp.compare(..., leave_one='cycle') judges a thermal cycle from the middle of a test"
+
+
+class TimedRegressor(ThermalRegressor):
+    """A regressor with a memory; ``time`` says where it finds the time.
+
+    ``"column"``
+        The first column of X is the time since the start of the row's test [s]. A row that is not later than the one
+        before starts a new test, at 0.
+    ``"routed"``
+        `fit`, `predict` and `score` get ``dt``, the time since the row before [s], ``inf`` where a test starts; from
+        scikit-learn by ``set_fit_request(dt=True)`` and the like. With metadata routing enabled it must be a pandas
+        Series: its index shows rows that were left out.
+    ``"none"``
+        Every row is a machine at rest in that state. For scikit-learn's own checks: it cannot be frozen or compared.
+    ``None``
+        Nothing was declared: `fit`, `predict` and `score` refuse.
+    """
+
+    columns: ClassVar[str] = "inputs"  #: its parameter that names columns of X
+    time: Time | None
+
+    def routed(self) -> Self:
+        """Return an unfitted copy with ``time="routed"``, for those who pass dt themselves.
+
+        Raises
+        ------
+        InputError
+            It was given ``time="none"``, so it was not meant for a machine.
+        """
+        if self.time == "none":
+            raise InputError(
+                f"{type(self).__name__}(time='none') takes every row for a machine at rest; give it {REMEDY}"
+            )
+        named = getattr(self, self.columns)
+        if named is not None:
+            named = tuple(c if isinstance(c, str) else c - self._hidden for c in named)
+        copy: Self = clone(self).set_params(time="routed", **{self.columns: named})
+        return copy
+
+    def score(
+        self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, *, dt: ArrayLike | None = None
+    ) -> float:
+        """Return R2 of the prediction.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+        y : array-like of shape (n_rows,)
+        sample_weight : array-like of shape (n_rows,), optional
+        dt : array-like of shape (n_rows,), optional
+            With ``time="routed"`` only, as in `fit`.
+
+        Returns
+        -------
+        float
+        """
+        from sklearn.metrics import r2_score
+
+        timed: Any = self
+        return float(r2_score(y, timed.predict(X, dt=dt), sample_weight=sample_weight))
+
+    def freeze(self, **header: Any) -> ErrorModel:
+        """Return the fitted model as plain numbers; see `thermocomp.models.base.ThermalRegressor.freeze`.
+
+        Parameters
+        ----------
+        **header
+            As there. The time is no input.
+
+        Returns
+        -------
+        ErrorModel
+
+        Raises
+        ------
+        FitError
+            It was fitted with ``time="none"``: it has learned nothing of time.
+        """
+        if self.time == "none":
+            raise FitError(
+                f"{type(self).__name__}(time='none') takes every row for a machine at rest; fit it with {REMEDY}"
+            )
+        return super().freeze(**header)
+
+    # -- for the methods -----------------------------------------------------------------------------------------------
+
+    def _declared(self) -> None:
+        """Refuse to work without a declaration of time, or with another than in `fit`."""
+        name = type(self).__name__
+        if self.time is None:
+            raise InputError(f"{name} has a memory and was not told the time: give it {REMEDY}")
+        if self.time not in ("column", "routed", "none"):
+            raise InputError(f"{name}: time={self.time!r} is not known; give it {REMEDY}")
+        fitted = getattr(self, "_time", self.time)
+        if fitted != self.time:
+            raise InputError(f"{name} was fitted with time={fitted!r} and has time={self.time!r} now: fit it again")
+
+    def _clock(
+        self, X: ArrayLike, rows: FloatArray, dt: ArrayLike | None, *, fitting: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the inputs without the time, and the time since the row before [s], inf where a test starts."""
+        if self.time == "routed":
+            return rows, _routed(dt, len(rows), type(self).__name__)
+        if dt is not None:
+            raise InputError(
+                f"dt was given to {type(self).__name__}(time={self.time!r}): it takes it with time='routed'"
+            )
+        if self.time == "none":
+            return rows, np.full(len(rows), np.inf)
+        if rows.shape[1] < 2:
+            raise InputError("time='column': X has one column, the time, and no input beside it")
+        return rows[:, 1:], from_column(rows[:, 0], getattr(X, "index", None), fitting=fitting)
+
+    def _cycles(self, cycle: ArrayLike | None, step: FloatArray) -> ArrayLike | None:
+        """Return the thermal cycles to choose settings by: those given, else the tests if there are several."""
+        if cycle is not None or self.time != "column":
+            return cycle
+        tests = np.cumsum(np.isinf(step)) - 1
+        return tests if tests[-1] > 0 else None
+
+    def _names(self) -> tuple[str, ...]:
+        return super()._names()[self._hidden :]
+
+    def _place(self, column: str | int, what: str) -> int:
+        """Return which input a name or an index into the columns of X means.
+
+        Raises
+        ------
+        InputError
+            There is none of that name, or it is the time.
+        """
+        names = [str(n) for n in self._names()]
+        if isinstance(column, str):
+            if column not in names:
+                raise InputError(f"{what} {column!r}: the columns are {', '.join(names)}")
+            return names.index(column)
+        place = int(column) - self._hidden
+        if not 0 <= place < len(names):
+            wrong = "is the time" if place == -1 and self._hidden else f"is beyond the {len(names)} columns"
+            raise InputError(f"{what} {column!r} {wrong}")
+        return place
+
+    @property
+    def _hidden(self) -> int:
+        """Columns of X in front of the inputs."""
+        return int(self.time == "column")
+
+
+def from_column(time: FloatArray, index: object = None, *, fitting: bool = False) -> FloatArray:
+    """Return the time since the row before from a column that counts from the start of each test.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]; a row that is not later than the one before starts a new test.
+    index : pandas.Index, optional
+        Of the rows; whole numbers show rows that were left out.
+    fitting : bool
+        Also refuse what is too short to be learned from.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+        [s]; inf in the first row of each test.
+
+    Raises
+    ------
+    InputError
+        It is no time, or a test does not begin at 0, or rows are missing.
+    """
+    step = np.diff(time, prepend=np.inf)
+    step[step <= 0] = np.inf
+    step[0] = np.inf
+    starts = np.isinf(step)
+    if len(time) > 1 and starts.all():
+        raise InputError("time='column': the first column of X rises nowhere, so it is not the time [s]")
+    late = np.flatnonzero(starts & (np.abs(time) > 1e-6))
+    if late.size:
+        raise InputError(
+            f"time='column': at row {late[0]} a test begins at {time[late[0]]:g} s and not at 0. Either the first "
+            "column of X is not the time since the start of the test [s], or the start was left out: "
+            f"{_WHOLE}; {_OURS}"
+        )
+    if fitting and time.max() < LEAST:
+        raise InputError(
+            f"time='column': the first column of X ends at {time.max():g} s, which is no thermal test. It must be "
+            "seconds, and not scaled: in a Pipeline let it through by a ColumnTransformer"
+        )
+    inside = step[~starts]
+    if inside.size and inside.max() > GAP * np.median(inside):
+        row = int(np.flatnonzero(~starts & (step > GAP * np.median(inside)))[0])
+        raise InputError(
+            f"time='column': {step[row]:g} s pass before row {row}, {np.median(inside):g} s as a rule, so rows are "
+            f"missing: {_WHOLE}; {_OURS}. A pause that is in the recording itself needs time='routed'"
+        )
+    _refuse_holes(index, starts)
+    return step
+
+
+def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
+    if dt is None:
+        raise InputError(
+            f"{name}(time='routed') was given no dt. Under scikit-learn: set_config(enable_metadata_routing=True) and "
+            ".set_fit_request(dt=True).set_predict_request(dt=True).set_score_request(dt=True); a scorer by name "
+            "passes none to predict: score with scoring=None, or take time='column'"
+        )
+    step = checked_steps(dt, n_rows)
+    if n_rows and not np.isinf(step[0]):
+        raise InputError(
+            f"dt: the first row comes {step[0]:g} s after another, and its test must start with inf. Its start was "
+            f"left out: {_WHOLE}; {_OURS}"
+        )
+    if not hasattr(dt, "index") and get_config()["enable_metadata_routing"]:
+        raise InputError(f"{name}: give dt as a pandas Series, pd.Series(dt): its index shows rows that were left out")
+    _refuse_holes(getattr(dt, "index", None), np.isinf(step))
+    return step
+
+
+def _refuse_holes(index: Any, starts: NDArray[np.bool_]) -> None:
+    """Refuse rows that are no longer beside each other; labels that are no whole numbers say nothing."""
+    labels = None if index is None or callable(index) else np.asarray(index)
+    if labels is None or labels.ndim != 1 or not np.issubdtype(labels.dtype, np.integer):
+        return
+    apart = np.diff(labels, prepend=labels[:1])[~starts]
+    if not apart.size:
+        return
+    usual = np.median(apart)
+    if (apart != usual).any():
+        row = int(np.flatnonzero(~starts)[np.argmax(apart != usual)])
+        raise InputError(
+            f"rows are missing between index {labels[row - 1]} and {labels[row]}: {_WHOLE}; {_OURS}. "
+            "If they never were there: reset_index(drop=True)"
+        )

@@ -1,0 +1,147 @@
+"""Recordings from tables that are in memory already."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.headings import Meaning, understand
+from thermocomp.core.machine import Channel
+from thermocomp.core.units import unit
+from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+
+def from_dataframe(
+    table: pd.DataFrame,
+    *,
+    time: str | ArrayLike | None = None,
+    units: Mapping[str, str] | None = None,
+    cycles: str | Sequence[object] | None = None,
+    name: str = "table",
+) -> Recording:
+    """Make a recording of a table; see `thermocomp.recording.recording.Recording.from_dataframe`.
+
+    Parameters
+    ----------
+    table : DataFrame of shape (n_rows, n_columns)
+    time : str or array-like of shape (n_rows,), optional
+    units : mapping of str to str, optional
+    cycles : str or sequence of object of shape (n_rows,), optional
+    name : str
+
+    Returns
+    -------
+    Recording
+    """
+    units = dict(units or {})
+    columns = [str(c) for c in table.columns]
+    twice = sorted({c for c in columns if columns.count(c) > 1})
+    if twice:
+        raise RecordingError(f"{name}: two columns are named {twice[0]!r}; rename one of them")
+    for column in units:
+        if column not in columns:
+            raise InputError(f"{name}: units tells of {column!r}, and the columns are {', '.join(columns)}")
+    if not len(table):
+        raise RecordingError(f"{name}: the table has no row")
+    plain = table.set_axis(columns, axis=1)
+    labelled = cycles if isinstance(cycles, str) else "cycle" if cycles is None and "cycle" in columns else None
+    if labelled is not None and labelled not in columns:
+        raise InputError(f"{name}: cycles: no column is named {labelled!r}; there are {', '.join(columns)}")
+    clock, used = _time(plain, time, units, name)
+    data: dict[str, FloatArray] = {}
+    aliases: dict[str, str] = {}
+    channels, notes = [], []
+    for column in columns:
+        if column in (used, labelled):
+            continue
+        meaning = _meaning(column, units)
+        if meaning is None or meaning.unit.quantity == "time":
+            notes.append(f"left out: {column!r} has no unit of a channel; tell it by units={{{column!r}: 'degC'}}")
+            continue
+        values = _numbers(plain[column], f"{name}: column {column!r}")
+        data[meaning.name] = values * meaning.unit.scale + meaning.unit.shift
+        channels.append(Channel(meaning.name, meaning.unit.quantity, meaning.unit.house))
+        aliases |= {alias: meaning.name for alias in (column, meaning.base) if alias != meaning.name}
+    if not channels:
+        raise RecordingError(
+            f"{name}: none of the columns {', '.join(columns)} is understood as a channel: name them like t1_C, "
+            "drift_um or spindle_rpm, or tell their units by units={'T1': 'degC'}"
+        )
+    if len(data) < len(channels):
+        raise RecordingError(f"{name}: two columns would become the same channel; rename one of them")
+    recording = Recording(
+        name, clock, pd.DataFrame(data), tuple(channels), whole(len(clock)), aliases=aliases, notes=tuple(notes)
+    )
+    labels = plain[labelled].tolist() if labelled is not None else cycles
+    return recording.with_cycles(_cycles(recording, labels))
+
+
+def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str | None]:
+    """Return the time since the first row [s], and the column it was taken from."""
+    used = None
+    symbol = "s"
+    if given is None:
+        named = [c for c in table.columns if (m := _meaning(c, units)) is not None and m.unit.quantity == "time"]
+        if len(named) == 1:
+            given = named[0]
+        elif not named and isinstance(table.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+            given = table.index
+        else:
+            found = f"there are {', '.join(named)}" if named else "no column such as time_s and no index of times"
+            raise RecordingError(
+                f"{name}: which is the time? {found}: name it by time=, the name of a column or an array"
+            )
+    if isinstance(given, str):
+        if given not in table.columns:
+            raise InputError(f"{name}: time: no column is named {given!r}; there are {', '.join(table.columns)}")
+        used, meaning = given, _meaning(given, units)
+        symbol = meaning.unit.symbol if meaning is not None else units.get(given, "s")
+        given = table[given]
+    values = np.asarray(given)
+    if values.shape != (len(table),):
+        raise InputError(f"{name}: time: want {len(table)} values, found an array of shape {values.shape}")
+    if values.dtype.kind in "mM":
+        seconds = (values - values[0]) / np.timedelta64(1, "s")
+    else:
+        scaled = _numbers(values, f"{name}: the time") * unit(symbol, "time").scale
+        seconds = scaled - scaled[0]
+    wrong = np.flatnonzero(~np.isfinite(seconds))
+    if wrong.size:
+        raise RecordingError(f"{name}: the time is missing in row {wrong[0]}")
+    return np.asarray(seconds, dtype=np.float64), used
+
+
+def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:
+    """Return what a column is, by `units` or by its heading."""
+    if column not in units:
+        return understand(column)
+    meant = unit(units[column])
+    told = understand(column)
+    if told is not None and told.unit.quantity == meant.quantity:
+        return Meaning(told.name, told.base, meant)
+    return Meaning("_".join(column.split()), column, meant)
+
+
+def _numbers(values: Any, what: str) -> FloatArray:
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as e:
+        raise RecordingError(f"{what} holds something that is no number: {e}") from e
+    return np.where(np.isinf(found), np.nan, found)
+
+
+def _cycles(recording: Recording, labels: Sequence[object] | None) -> Sequence[Cycle]:
+    if labels is not None:
+        if len(labels) != len(recording):
+            raise InputError(f"{recording.name}: cycles: {len(labels)} labels for {len(recording)} rows")
+        return given_cycles(labels)
+    speed = recording.speed
+    if speed is None:
+        return whole(len(recording))
+    return find_cycles(recording.time, recording.table[speed.name].to_numpy())

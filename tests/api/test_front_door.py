@@ -1,0 +1,229 @@
+"""The top of the package: what is there, how little it loads, and the main job through it."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.ensemble import HistGradientBoostingRegressor
+from sklearn.pipeline import make_pipeline
+
+import thermocomp as tc
+from reviseruns import PLATE
+from smallmachine import small_machine
+from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
+from thermocomp.assessment import splits
+from thermocomp.assessment.compare import compare as own_compare
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.methods import METHODS
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
+
+FAST = ("ols", "partial-f")
+
+
+def test_importing_it_loads_next_to_nothing() -> None:
+    code = (
+        "import sys, thermocomp\n"
+        "thermocomp.ErrorModel, thermocomp.Polynomial\n"
+        "print([m for m in sys.modules if m.split('.')[0] in ('pandas', 'sklearn', 'scipy', 'matplotlib', 'numba', "
+        "'joblib', 'rich', 'cyclopts', 'pydantic') or m.startswith(('thermocomp.models', 'thermocomp.api'))])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_name_is_there_and_every_method() -> None:
+    for name in tc.__all__:
+        assert getattr(tc, name) is not None
+    assert set(dir(tc)) == set(tc.__all__)
+    assert {m.kind.__name__ for m in METHODS.values()} <= set(tc.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'compere'"):
+        tc.compere  # noqa: B018
+
+
+# -- the main job ------------------------------------------------------------------------------------------------------
+
+
+def test_three_kinds_of_models_in_one_comparison(recording: Recording) -> None:
+    """HistGradientBoostingRegressor, a Pipeline and a class of one's own: fewer than fifteen lines."""
+
+    class Mean(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+        def fit(self, X: ArrayLike, y: ArrayLike) -> "Mean":
+            self.mean_ = np.mean(np.asarray(y))
+            return self
+
+        def predict(self, X: pd.DataFrame) -> NDArray[np.float64]:
+            return np.full(len(X), self.mean_)
+
+    pipeline = make_pipeline(tc.SensorSelector("partial-f"), tc.LeastSquares())
+    found = tc.compare(recording, "z_um", ["ols", HistGradientBoostingRegressor(max_iter=5), pipeline, Mean()])
+    table = found.to_frame().set_index("model")
+    assert set(table.index) == {"ols", "HistGradientBoostingRegressor", "SensorSelector + LeastSquares", "Mean"}
+    assert not table.loc["HistGradientBoostingRegressor", "deployable"]
+    assert table.loc["SensorSelector + LeastSquares", "deployable"]
+    assert (table["none_rms"] > 15).all()
+    ours = own_compare(stack([recording], ["z_um"]), ["ols"], splits.leave_one_cycle_out(stack([recording], ["z_um"])))
+    assert table.loc["ols", "rms"] == pytest.approx(ours.overall()[0].metric("rms"), rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Result]:
+    """Each kind of result, of the same small machine."""
+    test = small_machine()
+    fitted = tc.fit(test, ["z_um", "x_um"], "ols")
+    return {
+        "compare": tc.compare(test, models=FAST),
+        "fit": fitted,
+        "assess": tc.assess(fitted, small_machine((2000.0, 1500.0), seed=3)),
+        "select": tc.select(test, "z_um", "grouping", threshold=0.95),
+    }
+
+
+@pytest.mark.parametrize("name", ["compare", "fit", "assess", "select"])
+def test_every_result_is_a_table_a_figure_and_a_sentence(name: str, results: dict[str, Result]) -> None:
+    found = results[name]
+    table = found.to_frame()
+    assert len(table) == {"compare": 4, "fit": 2, "assess": 2, "select": 1}[name]
+    assert isinstance(found.plot(), Figure)
+    assert len(repr(found)) < 700
+    assert repr(found).startswith(f"<{type(found).__name__}: ")
+    assert "array(" not in repr(found)
+    html = found._repr_html_()
+    assert html.count("<tr") == len(table) + 1
+    assert str(table["target"].iloc[0]) in html
+
+
+def test_comparison(results: dict[str, Result], tmp_path: Path) -> None:
+    found = results["compare"]
+    assert isinstance(found, Compared)
+    assert list(found.best) == ["z_um", "x_um"]
+    assert found.best["z_um"] in FAST
+    table = found.to_frame()
+    assert table["target"].tolist() == ["z_um", "z_um", "x_um", "x_um"]
+    assert (table.groupby("target")["rms"].diff().dropna() >= 0).all()
+    assert len(found.to_frame(blocks=True)) == 4 * 5
+    assert isinstance(found.plot("z_um", "ols"), Figure)
+    with pytest.raises(InputError, match="no dynamic for z_um; there are ols for z_um"):
+        found.plot("z_um", "dynamic")
+    assert "<svg" in found.report(tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -> None:
+    found = tc.compare(recording, "z_um", [tc.Ridge(strengths=(0.1,)), "gp"], split="0.5/0.5", robustness=True)
+    assert "an estimator that was handed in" in found.report(tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
+    found, test = results["fit"], small_machine()
+    assert isinstance(found, FittedModels)
+    with pytest.raises(InputError, match=r"models of z_um, x_um: take one of \.models"):
+        found.model  # noqa: B018
+    predicted = found.predict(test.to_frame())
+    assert list(predicted) == ["z_um", "x_um"]
+    expected = found.fitted.estimators[0].predict(stack([test], ["z_um"]).frame()[["t1_C", "t2_C", "t3_C"]])
+    np.testing.assert_allclose(predicted["z_um"], expected, atol=1e-9)
+    judged = tc.assess(found.save(tmp_path / "m.json"), small_machine((2000.0, 1500.0), seed=3))
+    other = results["assess"]
+    assert isinstance(other, Assessed)
+    assert judged.to_frame()["rms"].tolist() == other.to_frame()["rms"].tolist()
+    assert len(other.to_frame(blocks=True)) == 6
+    again = tc.assess(found.models["z_um"], test)
+    assert "no honest test: fitted to small" in str(again)
+
+
+def test_selection(results: dict[str, Result], recording: Recording) -> None:
+    found = results["select"]
+    assert isinstance(found, Selected)
+    assert set(found.sensors["z_um"]) <= {"t1_C", "t2_C", "t3_C"}
+    steps = tc.select(recording, "z_um", "partial-f")
+    with pytest.raises(InputError, match="partial-f has no figure: see its tables"):
+        steps.plot()
+    for wrong, message in (
+        ({"method": "best"}, "method 'best': want pareto"),
+        ({"threshold": 0.5}, "--threshold is for --method grouping"),
+        ({"sensors": 3}, "unexpected keyword argument 'sensors'; the settings are threshold"),
+    ):
+        with pytest.raises(InputError, match=message):
+            tc.select(recording, "z_um", **wrong)
+
+
+def test_recordings_come_as_anything(recording: Recording, tmp_path: Path) -> None:
+    from thermocomp.files.recordings import write
+
+    write(recording, tmp_path / "r.csv")
+    ways: list[Any] = [
+        recording,
+        str(tmp_path / "r.csv"),
+        [tmp_path / "r.csv"],
+        recording.to_frame(),
+        tc.read(tmp_path / "r.csv"),
+    ]
+    found = [tc.compare(w, "z_um", "ols", split="0.75/0.25").to_frame()["rms"].item() for w in ways]
+    assert found == pytest.approx([found[0]] * len(ways), rel=1e-9)
+    files: list[Any] = [small_machine((1000.0, 2500.0), seed=1), small_machine((3000.0, 1500.0), seed=2).to_frame()]
+    assert len(tc.compare(files, "z_um", ["ols"], leave_one="file").to_frame(blocks=True)) == 3
+    with pytest.raises(InputError, match="no recording given"):
+        tc.compare([])
+    with pytest.raises(InputError, match="int is no recording: give a Recording, a path or a DataFrame"):
+        tc.compare([3])  # type: ignore[list-item]
+    with pytest.raises(InputError, match="split and leave_one exclude each other"):
+        tc.compare(recording, split="0.5/0.5", leave_one="cycle")
+    with pytest.raises(InputError, match="leave_one 'day': want 'cycle' or 'file'"):
+        tc.compare(recording, leave_one="day")  # type: ignore[arg-type]
+
+
+def test_trouble_is_told(recording: Recording) -> None:
+    table = recording.to_frame()
+    table.loc[400:, "t2_C"] = 22.0
+    found = tc.compare(table, "z_um", ["ols"], split="0.75/0.25")
+    assert found.trouble
+    assert "Trouble: table: t2_C" in repr(found)
+
+
+def test_simulate() -> None:
+    (found,) = tc.simulate("demo", seed=3)
+    assert len(found.cycles) > 1
+    with pytest.raises(InputError, match="no experiment 'demos'"):
+        tc.simulate("demos")
+
+
+def test_what_cannot_be_frozen_is_not_fitted(recording: Recording) -> None:
+    with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be frozen to plain numbers"):
+        tc.fit(recording, "z_um", HistGradientBoostingRegressor())
+    for still in (tc.DynamicRidge(time="none"), make_pipeline(tc.SensorSelector(), tc.DynamicRidge(time="none"))):
+        with pytest.raises(InputError, match="takes every row for a machine at rest"):
+            tc.compare(recording, "z_um", [still])
+
+
+def test_a_fitted_pipeline(recording: Recording) -> None:
+    pipeline = make_pipeline(tc.SensorSelector("partial-f"), tc.LeastSquares())
+    fitted = tc.fit(recording, "z_um", pipeline)
+    assert fitted.model.family == "polynomial"
+    assert fitted.model.provenance is not None
+    assert fitted.model.provenance.method == "SensorSelector + LeastSquares"
+
+
+# -- revise ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("job_folder")
+def test_revise() -> None:
+    done = tc.revise("part.ngc", "model.json", "out.ngc", cold=True, unproved=True, date="2026-01-31")
+    assert done.written
+    assert all(p.exists() for p in done.files)
+    assert Path("out.ngc").read_text(encoding="ascii") != PLATE
+    assert done.summary["files"]
+    with pytest.raises(InputError, match="exists already"):
+        tc.revise("part.ngc", "model.json", "out.ngc", cold=True, unproved=True)
+    with pytest.raises(InputError, match="no option 'colde'; the nearest are cold"):
+        tc.revise("part.ngc", "model.json", "out2.ngc", colde=True)
+    with pytest.raises(InputError, match="how warm is the machine"):
+        tc.revise("part.ngc", "model.json", "out2.ngc", unproved=True)
+    assert not Path("out2.ngc").exists()

@@ -1,0 +1,235 @@
+"""Regressors of others beside the methods: scikit-learn's, a Pipeline, a small class of one's own."""
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.ensemble import HistGradientBoostingRegressor
+from sklearn.feature_selection import SelectKBest, f_regression
+from sklearn.linear_model import Ridge
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from thermocomp.assessment import splits
+from thermocomp.assessment.compare import compare, n_pieces
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.model import Input, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.models.dynamic import DynamicRidge
+from thermocomp.models.foreign import ForeignRegressor, adopted
+from thermocomp.models.methods import METHODS, Named, deployable, expand
+from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.ols import LeastSquares
+from thermocomp.models.partial_f import PartialF
+from thermocomp.models.pipelines import PipelineRegressor, freeze
+from thermocomp.models.sensors import SensorSelector
+from thermocomp.models.training import train
+from thermocomp.models.unfrozen import EstimatorModel
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+DYNAMIC = DynamicRidge(speed=["spindle_rpm"], temperature_lags=((1200.0,),), speed_lags=((1200.0, 5400.0),))
+
+
+class Plane(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """A small class of a user's: the least squares plane through zero."""
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "Plane":
+        self.slopes_ = np.linalg.lstsq(np.asarray(X), np.asarray(y), rcond=None)[0]
+        return self
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        return np.asarray(np.asarray(X) @ self.slopes_)
+
+
+class Deployable(Plane):
+    """The same with a `freeze` of its own."""
+
+    def freeze(self, *, target: str, unit: str, inputs: tuple[Input, ...], support: Any, provenance: Any) -> Polynomial:
+        like = LeastSquares(fit_intercept=False).fit(np.eye(len(inputs)), self.slopes_)
+        return like.freeze(  # type: ignore[return-value]
+            target=target, unit=unit, inputs=inputs, support=support, provenance=provenance
+        )
+
+
+def rms(samples: Samples, models: list[Any]) -> dict[str, float]:
+    found = compare(samples, models, splits.leave_one_cycle_out(samples), robustness=False).overall()
+    assert not any(a.failure for a in found)
+    return {str(a.model): a.metric("rms") for a in found if a.target == "z_um"}
+
+
+def test_anything_stands_beside_the_methods(samples: Samples) -> None:
+    models = [
+        "ols",
+        HistGradientBoostingRegressor(max_iter=5),
+        Plane(),
+        Plane(),
+        Deployable(),
+        make_pipeline(StandardScaler(), Ridge()),
+    ]
+    found = rms(samples, models)
+    assert list(found) == [
+        "ols", "HistGradientBoostingRegressor", "Plane", "Plane #2", "Deployable", "StandardScaler + Ridge"
+    ]  # fmt: skip
+    assert found["Plane"] == found["Plane #2"] == pytest.approx(found["Deployable"], rel=1e-9)
+    assert found["Plane"] < 3  # of about 16 um
+    assert n_pieces(samples, models, splits.leave_one_cycle_out(samples)) == 2 * 6 * 4
+
+
+def test_what_cannot_be_deployed_is_never_the_best(samples: Samples) -> None:
+    comparison = compare(samples, [Plane(), DYNAMIC], splits.leave_one_cycle_out(samples), robustness=False)
+    best = comparison.best("z_um")
+    assert best is not None
+    assert best.model == "DynamicRidge"
+    alone = compare(samples, [Plane()], splits.leave_one_cycle_out(samples), robustness=False)
+    assert alone.overall()[0].accepted
+    assert alone.best("z_um") is None
+    assert [deployable(n) for n in expand(["ols", "gp", Plane(), Deployable(), DYNAMIC])] == [
+        True,
+        False,
+        False,
+        True,
+        True,
+    ]
+
+
+def test_the_recording_tells_which_inputs_are_speeds(samples: Samples) -> None:
+    found = rms(samples, ["dynamic", DynamicRidge(), DynamicRidge(time="column")])
+    assert found["dynamic"] == found["DynamicRidge"] == found["DynamicRidge #2"]
+
+
+def test_the_replay_is_its_prediction(samples: Samples) -> None:
+    """Predictions made at once and one by one are the same, and are those of the estimator that was given."""
+    rows = samples.cycle < 2
+    trained = train(Plane(), samples, 0, rows, support=Support(margin=1e6))
+    assert isinstance(trained.model, EstimatorModel)
+    expected = Plane().fit(samples.change()[rows], samples.deviations[rows, 0]).predict(samples.change())
+    state, got = trained.model.init(), []
+    for k, row in enumerate(samples.values):
+        if k == 100:
+            trained.model.known.clear()  # type: ignore[attr-defined]
+        state, deviation = trained.model.step(state, row, 60.0)
+        got.append(float(deviation))
+    np.testing.assert_allclose(got, expected, atol=1e-9)
+    assert trained.method == "Plane"
+    with pytest.raises(FitError, match="Plane cannot be frozen to plain numbers: it is no method of thermocomp"):
+        trained.estimator.freeze(target="z_um")
+
+
+def test_a_named_estimator_survives_the_way_to_another_process() -> None:
+    (name,) = expand([DYNAMIC])
+    back = pickle.loads(pickle.dumps(name))
+    assert isinstance(back, Named)
+    assert back == "DynamicRidge"
+    assert back.estimator.get_params() == DYNAMIC.get_params() | {"time": "routed", "speed": ("spindle_rpm",)}
+    assert expand([name, "all"]) == ["DynamicRidge", *METHODS]
+
+
+@pytest.mark.parametrize(
+    ("thing", "message"),
+    [
+        (Plane, r"Plane is a class: give an instance, Plane\(\)"),
+        (3.0, "float is no regressor: name a method, or give an instance"),
+        (StandardScaler(), "StandardScaler is no regressor"),
+        (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) takes every row for a machine at rest"),
+        (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot tell it the time here"),
+        (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),
+        ("oss", "unknown model 'oss'; did you mean ols"),
+    ],
+    ids=str,
+)
+def test_what_is_refused(thing: Any, message: str, samples: Samples) -> None:
+    with pytest.raises(InputError, match=message):
+        rms(samples, ["ols", thing])
+
+
+def test_a_pipeline_with_a_model_at_rest_is_refused(samples: Samples) -> None:
+    with pytest.raises(InputError, match="takes every row for a machine at rest"):
+        rms(samples, [make_pipeline(SensorSelector("partial-f"), DynamicRidge(time="none"))])
+
+
+def test_one_number_per_row_or_none() -> None:
+    class Wrong(Plane):
+        def predict(self, X: ArrayLike) -> FloatArray:
+            return np.zeros(3)
+
+    with pytest.raises(InputError, match=r"Wrong: predict gave an array of shape \(3,\) for 20 rows"):
+        ForeignRegressor(Wrong()).fit(np.eye(20), np.ones(20)).predict(np.eye(20))
+
+
+# -- pipelines that freeze ---------------------------------------------------------------------------------------------
+
+
+def selector() -> SensorSelector:
+    return SensorSelector("partial-f", keep=["spindle_rpm"])
+
+
+@pytest.mark.parametrize(
+    "pipeline",
+    [
+        make_pipeline(SensorSelector("partial-f"), StepwiseMRA()),
+        make_pipeline(SelectKBest(f_regression, k=2), LeastSquares()),
+        make_pipeline(StandardScaler(), SensorSelector("lasso"), LeastSquares()),
+        make_pipeline(SelectKBest(f_regression, k=3), StandardScaler(), StandardScaler(with_mean=False), PartialF()),
+        make_pipeline("passthrough", LeastSquares(fit_intercept=False)),
+    ],
+    ids=str,
+)
+def test_a_frozen_pipeline_is_the_pipeline(pipeline: Any, samples: Samples) -> None:
+    X, y = samples.frame(), samples.deviations[:, 0]
+    fitted = clone(pipeline).fit(X, y)
+    model = freeze(fitted, target="z_um")
+    assert set(model.sensors) <= set(X.columns)
+    table = X[[i.name for i in model.inputs]]
+    assert [(i.low, i.high) for i in model.inputs] == [
+        pytest.approx((low, high), rel=1e-9) for low, high in zip(table.min(), table.max(), strict=True)
+    ]
+    state, got = model.init(), []
+    for row in table.to_numpy():
+        state, deviation = model.step(state, row, 60.0)
+        got.append(float(deviation))
+    np.testing.assert_allclose(got, fitted.predict(X), rtol=1e-9, atol=1e-9)
+
+
+def test_a_pipeline_with_a_memory_freezes(samples: Samples) -> None:
+    X, y = samples.frame(), samples.deviations[:, 0]
+    timed = X.copy()
+    timed.insert(0, "time_s", samples.time)
+    select = SensorSelector("partial-f", keep=["spindle_rpm"], time="column").set_output(transform="pandas")
+    last = clone(DYNAMIC).set_params(time="column")
+    fitted = make_pipeline(select, last).fit(timed, y)
+    model = freeze(fitted, target="z_um", inputs=samples.model_inputs(range(4), samples.valid))
+    assert model.remembers
+    trained = train(make_pipeline(selector(), DYNAMIC), samples, 0, samples.valid)
+    assert isinstance(trained.estimator, PipelineRegressor)
+    state, got = model.init(), []
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]]
+    for row in values:
+        state, deviation = model.step(state, row, 60.0)
+        got.append(float(deviation))
+    np.testing.assert_allclose(got, fitted.predict(timed), rtol=1e-9, atol=1e-9)
+    lost = make_pipeline(SelectKBest(f_regression, k=2), DynamicRidge(time="column"))
+    with pytest.raises(InputError, match="time='column'"):  # it has thrown the time away
+        lost.fit(timed, y)
+
+
+def test_a_selector_of_a_pipeline_sees_only_what_is_learned_from(samples: Samples) -> None:
+    learn = samples.cycle != 1
+    trained: Any = train(make_pipeline(selector(), DYNAMIC), samples, 0, learn)
+    alone = selector().fit(samples.frame()[learn], samples.deviations[learn, 0])
+    assert trained.estimator.pipeline_[0].estimator_.coef_.tolist() == alone.estimator_.coef_.tolist()
+
+
+def test_pipelines_that_cannot_be_frozen(samples: Samples) -> None:
+    X, y = samples.frame(), samples.deviations[:, 0]
+    with pytest.raises(FitError, match="this one is PolynomialFeatures, LeastSquares"):
+        freeze(make_pipeline(PolynomialFeatures(), LeastSquares()).fit(X, y), target="z")
+    with pytest.raises(FitError, match="Ridge has no 'freeze'"):
+        freeze(Ridge().fit(X, y), target="z")
+    with pytest.raises(FitError, match="StandardScaler before a model of the family polynomial cannot be frozen"):
+        freeze(make_pipeline(StandardScaler(), StepwiseMRA(fit_intercept=True)).fit(X, y), target="z")
+    assert isinstance(adopted(make_pipeline(PolynomialFeatures(), LeastSquares())), ForeignRegressor)
