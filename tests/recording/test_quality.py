@@ -364,7 +364,7 @@ def test_a_quantised_column_that_rests_by_chance_is_not_stuck(seed: int) -> None
     """Steps of 0.25 um, noise of a quarter of a step with rare larger values: it may rest for 40 rows and more."""
     rng = np.random.default_rng(seed)
     noise, amplitude, freedom = rng.uniform(0.05, 0.13), rng.choice([0.5, 1, 3, 10]), rng.choice([2.5, 4, 50])
-    time = 15.0 * np.arange(4000)
+    time: FloatArray = np.arange(0.0, 60000.0, 15.0)
     drift = amplitude * np.sin(2 * np.pi * time / rng.uniform(5000, 40000))
     values = np.round((drift + noise * rng.standard_t(freedom, size=4000)) / 0.25) * 0.25
     longest = int(np.diff(np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))).max())
