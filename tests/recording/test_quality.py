@@ -357,3 +357,19 @@ def test_rows_in_trouble_are_told_apart_from_channels_in_trouble() -> None:
     given = check(recording)
     assert troubled_rows(recording, given).keys() == troubled_rows(recording).keys()
     assert troubled_rows(recording, ()) == {}
+
+
+@pytest.mark.parametrize("seed", [744223, 845023, 593990, 325133, 186843, 407086])
+def test_a_quantised_column_that_rests_by_chance_is_not_stuck(seed: int) -> None:
+    """Steps of 0.25 um, noise of a quarter of a step with rare larger values: it may rest for 40 rows and more."""
+    rng = np.random.default_rng(seed)
+    noise, amplitude, freedom = rng.uniform(0.05, 0.13), rng.choice([0.5, 1, 3, 10]), rng.choice([2.5, 4, 50])
+    time: FloatArray = np.arange(0.0, 60000.0, 15.0)
+    drift = amplitude * np.sin(2 * np.pi * time / rng.uniform(5000, 40000))
+    values = np.round((drift + noise * rng.standard_t(freedom, size=4000)) / 0.25) * 0.25
+    longest = int(np.diff(np.flatnonzero(np.diff(values, prepend=np.nan, append=np.nan))).max())
+
+    found = check(_recording(time, "displacement", z=values))
+
+    assert longest >= 30
+    assert [f for f in found if f.severity == "trouble" and f.kind == "stuck"] == []
