@@ -48,11 +48,6 @@ class Result(ABC):
         return f"<p>{escape(str(self))}</p>{self.to_frame().to_html(index=False, float_format='{:.2f}'.format)}"
 
 
-def verdict_of(a: Assessment) -> str:
-    """Return the verdict in one word."""
-    return "accepted" if a.accepted else "refused"
-
-
 def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
     """Return assessments as a table.
 
@@ -76,7 +71,7 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
             "none_rms": [a.none_metric("rms") for a in assessments],
             "reduction_pct": [a.metric("reduction") for a in assessments],
             "sensors": [a.n_sensors[1] for a in assessments],
-            "verdict": [verdict_of(a) for a in assessments],
+            "verdict": [a.word for a in assessments],
             "deployable": [deployable(a.model) for a in assessments],
             "reason": [a.reason for a in assessments],
         }
@@ -318,7 +313,7 @@ def _judged(a: Assessment) -> str:
     if a.failure:
         return f"{a.target}: {a.reason}."
     return (
-        f"{a.target}: {a.model} {verdict_of(a)}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
+        f"{a.target}: {a.model} {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
         f"({a.reason})."
     )
 
