@@ -84,6 +84,14 @@ def test_a_part_of_a_test_is_no_copy_of_it() -> None:
     assert covered([whole, part], "files").independent == 2
 
 
+def test_the_same_shape_at_half_the_pace_is_no_copy() -> None:
+    whole = small_machine()
+    table = pd.DataFrame(np.repeat(whole.table.to_numpy(), 2, axis=0), columns=whole.table.columns)
+    cycles = tuple(replace(c, start=2 * c.start, stop=2 * c.stop) for c in whole.cycles)
+    slow = replace(whole, name="slow", time=np.arange(0.0, 60.0 * len(table), 60.0), table=table, cycles=cycles)
+    assert covered([whole, slow], "files").independent == 2
+
+
 def test_constant_inputs_and_no_units_are_no_trouble() -> None:
     plain = small_machine()
     table = plain.table.copy()

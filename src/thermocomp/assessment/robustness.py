@@ -64,8 +64,9 @@ class Robustness:
             return ""
         errors = {f"noise of {self.noise:g} degC": max((mean for mean, _ in self.noise_rms.values()), default=np.nan)}
         errors |= {f"loss of {name}": rms for name, rms in self.lost_rms.items()}
-        worst_first = sorted(self.worse_than_none, key=lambda what: -errors[what])
-        told = [f"{what} ({errors[what]:.2f} um)" for what in worst_first]
+        # noise first, it is always there; then the sensors, the worst first
+        order = sorted(self.worse_than_none, key=lambda what: (what.startswith("loss"), -errors[what]))
+        told = [f"{what} ({errors[what]:.2f} um)" for what in order]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
         return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}"
 

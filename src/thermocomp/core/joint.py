@@ -89,11 +89,12 @@ class JointSupport:
         far = np.zeros(change.shape[:-1])
         if self.columns:
             state = change[..., columns] * weights
-            square = (state * state).sum(axis=-1)[..., None] - state @ points + squares
-            far = np.sqrt(np.maximum(square.min(axis=-1), 0.0))
+            square = np.minimum.reduce(squares - state @ points, axis=-1) + np.add.reduce(state * state, axis=-1)
+            far = np.sqrt(np.maximum(square, 0.0))
         for k, levels, tolerance in zip(self.speeds, self._levels, self.tolerances, strict=True):
-            far = np.maximum(far, np.abs(change[..., k, None] - levels).min(axis=-1) / tolerance)
-        return np.asarray(np.round(far, 6))
+            away = np.minimum.reduce(np.abs(change[..., k, None] - levels), axis=-1)
+            far = np.maximum(far, away / tolerance)
+        return np.asarray(np.rint(far * 1e6) / 1e6)
 
     @cached_property
     def _levels(self) -> tuple[FloatArray, ...]:

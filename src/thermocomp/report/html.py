@@ -90,7 +90,16 @@ def write_choices(choices: Sequence[Choice], recordings: Sequence[Recording], pa
 
 
 def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, samples: Samples | None = None) -> None:
-    """Write the report, see `render`; an existing file is replaced."""
+    """Write the report; an existing file is replaced.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    recordings : sequence of Recording
+    path : Path
+    samples : Samples, optional
+        See `render`.
+    """
     path.write_text(render(comparison, recordings, samples), encoding="utf-8")
 
 

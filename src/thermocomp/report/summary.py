@@ -17,6 +17,8 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report.running import told
 
+#: rows that are unlike the training are a caution if their RMS is so many times that of all rows
+WORSE = 1.25
 #: metrics of the big table, in its order
 TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
@@ -101,7 +103,10 @@ def cautions(comparison: Comparison) -> list[str]:
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
         found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
-    found += [f"{a.target}: {unlike(r)}." for a, r in known if r.unlike > 0.1]
+    # where the error there is as elsewhere, it is no caution: left-out cycles have judged such rows
+    found += [
+        f"{a.target}: {unlike(r)}." for a, r in known if r.unlike > 0.1 and r.unlike_rms > WORSE * a.metric("rms")
+    ]
     return found
 
 
