@@ -177,15 +177,15 @@ def _begun(
     reference: FloatArray | None,
     read: Callable[[int], FloatArray],
 ) -> tuple[State, dict[int, FloatArray]]:
-    """Return the state that a test begins in, its zero being known, and the readings that the zero was taken of."""
+    """Return the state that a test begins in, its zero being known, and the readings of that, which say its mean."""
     state = model.init(reference)
     if not np.isnan(state.reference).any():
         return state, {}
     head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
     if head:
-        state = state._replace(
-            reference=np.where(np.isnan(state.reference), centre(list(head.values())), state.reference)
-        )
+        mean = centre(list(head.values()))
+        state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
+        head = dict.fromkeys(head, mean)
     return state, head
 
 

@@ -68,10 +68,10 @@ def run(
     stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
     complete = np.asarray(np.isfinite(values).all(axis=1))
     gate = _gated(model, time, values, stands, model.init(reference).reference)
-    zero = zero_of(model, time[complete], values[complete], stands[complete], reference)
-    alone, outside = _said(model, time, values, complete, zero)
+    zero, rested = begun(model, time, values, stands, complete, reference)
+    alone, outside = _said(model, time, rested, complete, zero)
     same = np.array_equal(gate.passed, complete)
-    gated = alone if same else _said(model, time, values, gate.passed, gate.zero)[0]
+    gated = alone if same else _said(model, time, *_of_gate(values, gate))[0]
     known = gate.known
     if anew is not None:
         alone, _ = _counted(alone, model, time, complete, stands, anew)
@@ -79,36 +79,40 @@ def run(
     return Run(alone, _moved(gated, gate.passed, time, limits, known), outside, complete & ~gate.passed, gate.why)
 
 
-def zero_of(
+def begun(
     model: ErrorModel,
     time: FloatArray,
     values: FloatArray,
     resting: BoolArray,
+    usable: BoolArray,
     reference: Sequence[float] | FloatArray | None = None,
-) -> FloatArray:
-    """Return what counts as zero for a model in a test, from its usable readings.
+) -> tuple[FloatArray, FloatArray]:
+    """Find what counts as zero for a model in a test.
 
     Parameters
     ----------
     model : ErrorModel
-    time : ndarray of shape (n_readings,)
+    time : ndarray of shape (n_rows,)
         [s]
-    values : ndarray of shape (n_readings, ..., n_inputs)
-        Further axes are independent variants of a reading.
-    resting : ndarray of bool of shape (n_readings,)
+    values : ndarray of shape (n_rows, n_inputs)
+    resting, usable : ndarray of bool of shape (n_rows,)
     reference : array-like of shape (n_inputs,), optional
         What is known of it; see `ErrorModel.init`.
 
     Returns
     -------
-    ndarray of shape (..., n_inputs)
+    zero : ndarray of shape (n_inputs,)
         nan where it is not known, for there is no reading.
+    values : ndarray of shape (n_rows, n_inputs)
+        With the readings of the zero taken as their mean.
     """
-    zero = model.init(reference).reference
-    if not len(values) or not np.isnan(zero).any():
-        return zero
-    count, _ = first_rows(model.zeroing, time, resting)
-    return np.where(np.isnan(zero), centre(values[:count]), zero)
+    zero, rows = model.init(reference).reference, np.flatnonzero(usable)
+    if not rows.size or not np.isnan(zero).any():
+        return zero, values
+    window = rows[: first_rows(model.zeroing, time[rows], resting[rows])[0]]
+    rested = values.copy()
+    rested[window] = centre(values[window])
+    return np.where(np.isnan(zero), rested[window[0]], zero), rested
 
 
 class _Gate(NamedTuple):
@@ -116,12 +120,21 @@ class _Gate(NamedTuple):
     zero: FloatArray  #: (n_inputs,)
     known: int  #: the row in which it is known, and the correction begins to move
     why: str  #: the first complete reading that did not pass
+    window: list[int]  #: rows of the zero
+
+
+def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Return the readings with those of the zero taken as their mean, which of them pass, and the zero."""
+    rested = values.copy()
+    if gate.window:
+        rested[gate.window] = centre(values[gate.window])
+    return rested, gate.passed, gate.zero
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
     """Return the readings that pass the gate of the online step."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
-    passed, why, known = complete.copy(), "", 0
+    passed, why, known, window = complete.copy(), "", 0, list[int]()
     if np.isnan(zero).any():  # the first readings that pass decide what counts as zero
         gathered, known = Gathered(), len(time)
         for row in np.flatnonzero(complete).tolist():
@@ -131,12 +144,13 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
                 continue
             if gathered.belongs(model.zeroing, float(time[row]), bool(stands[row])):
                 gathered = gathered.add(float(time[row]), values[row], bool(stands[row]))
+                window.append(row)
                 if not gathered.complete(model.zeroing):
                     continue
             known = row
             break
         if gathered.times:
-            zero = gathered.zero(zero)
+            zero = np.where(np.isnan(zero), centre(gathered.values), zero)
     later = slice(min(known + 1, len(time)) if known else 0, None)
     bounds = [online.plausible(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
     low, high = np.array(bounds).reshape(-1, 2).T
@@ -145,7 +159,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
     turned = np.flatnonzero(complete & ~passed)
     if turned.size and not why:
         why = online.implausible(model, values[turned[0]].tolist(), zero.tolist())
-    return _Gate(passed, zero, known, why)
+    return _Gate(passed, zero, known, why, window)
 
 
 def _counted(

@@ -20,7 +20,7 @@ from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, FloatArray, Input, State
 from thermocomp.core.reading import Reading
-from thermocomp.core.zero import Gathered
+from thermocomp.core.zero import Gathered, centre
 
 #: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
 PLAUSIBLE: dict[str, tuple[float, float]] = {
@@ -222,7 +222,7 @@ def step(
         gathered, known = state.gathered[k], True
         if memory.memory is None and np.isnan(memory.reference).any():
             resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
-            memory, gathered, known = _zeroed(model, memory, gathered, (reading.time, values, resting))
+            memory, gathered, known, values = _zeroed(model, memory, gathered, (reading.time, values, resting))
         begins.append(gathered)
         if known:
             after, deviation = model.step(memory, values, dt)
@@ -242,22 +242,24 @@ def step(
 
 def _zeroed(
     model: ErrorModel, memory: State, gathered: Gathered, reading: tuple[float, FloatArray, bool]
-) -> tuple[State, Gathered, bool]:
-    """Take a reading into the zero if it belongs there; return whether the zero is known now.
+) -> tuple[State, Gathered, bool, FloatArray]:
+    """Take a reading into the zero if it belongs there; return whether that is known now, and what the reading says.
 
-    Once it is, the model goes through the readings before this one, as if it had been known from the first of them.
+    Once it is, the model goes through the readings before this one, as if it had been known from the first of them; all
+    readings of the zero say their mean.
     """
-    before = gathered
+    before, values = gathered, reading[1]
     if gathered.belongs(model.zeroing, reading[0], reading[2]):
         gathered = gathered.add(*reading)
         if not gathered.complete(model.zeroing):
-            return memory, gathered, False
-    memory = memory._replace(reference=gathered.zero(memory.reference))
-    last = before.times[0] if before.times else 0.0
-    for time, values in zip(before.times, before.values, strict=True):
-        memory, _ = model.step(memory, values, time - last)
+            return memory, gathered, False, values
+        values = centre(gathered.values)
+    mean, last = centre(gathered.values), gathered.times[0]
+    memory = memory._replace(reference=np.where(np.isnan(memory.reference), mean, memory.reference))
+    for time in before.times:
+        memory, _ = model.step(memory, mean, time - last)
         last = time
-    return memory, Gathered(), True
+    return memory, Gathered(), True, values
 
 
 def _later(clock: float | None, now: float) -> float:

@@ -1,6 +1,8 @@
 """What temperatures are counted from: not one reading but the mean over the first minutes, as long as nothing turns.
 
 The same few lines decide it live, in a replay and in training: a model finds at the machine what it has learned from.
+The readings of the zero are themselves taken as their mean: the machine rests in it, and what has a memory begins
+there, not in the noise of one reading.
 """
 
 from collections.abc import Sequence
@@ -82,10 +84,6 @@ class Gathered(NamedTuple):
     def add(self, time: float, values: FloatArray, resting: bool) -> "Gathered":
         """Return them with one more reading."""
         return Gathered((*self.times, time), (*self.values, values), self.resting if self.times else resting)
-
-    def zero(self, reference: FloatArray) -> FloatArray:
-        """Return what counts as zero: `reference`, and where that is nan, the mean of the readings."""
-        return np.where(np.isnan(reference), centre(self.values), reference)
 
     def _span(self, zeroing: Zeroing) -> float:
         return zeroing.at_rest if self.resting else zeroing.otherwise

@@ -1,6 +1,6 @@
 """`Samples`: several tests stacked into the arrays that models are fitted to and replayed on."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -125,8 +125,18 @@ class Samples:
         return int(np.flatnonzero((self.test == test) & (self.cycle >= 0))[0])
 
     def change(self) -> FloatArray:
-        """Return inputs minus their reference, (n_rows, n_inputs)."""
-        return self.values - self.reference()[self.test]
+        """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero say its mean."""
+        values = self.values.copy()
+        for window in self._windows() if self.rezeroed.any() else []:
+            values[window] = centre(values[window])
+        return values - self.reference()[self.test]
+
+    def _windows(self) -> Iterator[IntArray]:
+        """Yield the rows that the zero of each test is averaged of, where it is not stated."""
+        for k in range(len(self.test_names)):
+            if self.zero is None or np.isnan(self.zero[k]).any():
+                rows = np.flatnonzero((self.test == k) & self.valid)
+                yield rows[: first_rows(self.zeroing, self.time[rows], self.stands[rows])[0]]
 
     def dt(self) -> FloatArray:
         """Return the time since the previous row of the same test [s]; inf in each test's first row."""
