@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from smallmachine import small_machine
 from thermocomp.assessment.iso230_3 import assess, detect, find_ambient, find_pairs, find_stations
 from thermocomp.assessment.iso230_tables import thermal_content, thermal_tables, with_uncertainty
 from thermocomp.assessment.thermaltest import Curve, Pair, ThermalTest, figures
@@ -17,8 +18,10 @@ from thermocomp.core.model import HonestError, Input, Provenance
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record
+from thermocomp.models.training import train
 from thermocomp.recording.cycles import whole
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
 
 FloatArray = NDArray[np.float64]
 
@@ -407,6 +410,20 @@ def test_what_must_be_said_of_a_model() -> None:
     assert "the model of nothing_um has nothing to do here" in notes
     with pytest.raises(InputError, match="none of them a channel here"):
         assess(recording, models=[model("nothing_um", 1.0)])
+
+
+def test_rows_that_a_model_has_learned_from_are_counted() -> None:
+    recording, other = (replace(small_machine(seed=k), cycles=whole(800)) for k in (0, 4))
+    samples = stack([recording], ["z_um"])
+    learn = np.arange(len(samples)) < 500
+    learned = train("ols", samples, 0, learn, prints=True).model
+    assert learned.provenance is not None
+    learned = replace(learned, provenance=replace(learned.provenance, data_sha256=("another file",)))
+    told = [note for test in assess(recording, models=[learned]) for note in test.notes]
+    wanted = "the model of z_um: 500 of 800 rows were learned from: what it leaves there is no honest test"
+    assert {n for n in told if "learned" in n} == {wanted}
+    told = [note for test in assess(other, models=[learned]) for note in test.notes]
+    assert not [n for n in told if "learned" in n]
 
 
 # -- the virtual machine ------------------------------------------------------------------------------------------
