@@ -17,6 +17,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.recording.cycles import Cycle, find_cycles, whole
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def after(*recordings: Recording) -> Recording:
     return of(pd.concat([r.table for r in recordings], ignore_index=True), recordings[0])
 
 
-DAY = (2200.0, 1200.0)
+DAY = (2200.0, 1200.0, 1700.0, 2600.0)
 
 
 def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tuple[ErrorModel, ...]) -> None:
@@ -49,7 +50,7 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
         of(recording.table.iloc[250:700], recording),
     ]
     for copy in copies:
-        judged = study.assess(models, [copy])
+        judged = study.assess(models, [copy], starts=COLD)
         assert judged.seen == ()
         (overall,) = judged.overall()
         assert not overall.accepted
@@ -65,15 +66,15 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     long = after(recording, day)
     (overall,) = study.assess(models, [long]).overall()
     assert overall.learned == 800
-    assert overall.row.tolist() == list(range(800, 1200))
+    assert overall.row.tolist() == list(range(800, 1600))
     assert overall.accepted
-    assert overall.reason.endswith("; 800 of 1,200 rows were learned from: left out")
+    assert overall.reason.endswith("; 800 of 1,600 rows were learned from: left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]
     (overall,) = study.assess(models, [replace(r, name=f"{k}") for k, r in enumerate(both)]).overall()
     assert 400 <= overall.learned <= 500
-    assert set(range(300)) <= set(overall.row[overall.test == 0]) <= set(range(400))
-    assert (overall.test == 1).sum() == 400
+    assert set(range(700)) <= set(overall.row[overall.test == 0]) <= set(range(800))
+    assert (overall.test == 1).sum() == 800
 
 
 def test_the_file_itself_is_left_out_beside_another(recording: Recording, models: tuple[ErrorModel, ...]) -> None:
@@ -159,7 +160,7 @@ def test_two_files_that_share_rows_are_refused_with_both_names(recording: Record
     other = replace(after(small_machine(DAY, seed=5), of(recording.table.iloc[300:500], recording)), name="other")
     tests = [replace(r, cycles=whole(len(r))) for r in (recording, other)]
     samples = samples_of(*tests)
-    with pytest.raises(InputError, match=r"other: rows 400-599 repeat rows 300-499 of small, about"):
+    with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small, about"):
         compare(samples, ["ols"], splits.leave_one_file_out(samples))
     apart = samples_of(recording, replace(small_machine(DAY, seed=5), name="other"))
     assert compare(apart, ["ols"], splits.leave_one_file_out(apart), robustness=False).overall()

@@ -19,6 +19,7 @@ from thermocomp.files.recordings import read
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +139,7 @@ def two_that_matter(seed: int) -> Recording:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_where_two_matter_two_are_recommended(seed: int) -> None:
-    samples = stack([two_that_matter(seed)], ["x_um"])
+    samples = stack([two_that_matter(seed)], ["x_um"], starts=COLD)
     for judging in (splits.leave_one_cycle_out(samples), splits.by_rows(samples, 0.75, 0.25)):
         settings = Settings(models=["ols"], max_sensors=4)
         choice = pareto.choose(samples, 0, judging, settings, jobs=1, progress=lambda _, steps=1: None)  # noqa: ARG005

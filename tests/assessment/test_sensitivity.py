@@ -59,6 +59,7 @@ def test_all_models_have_the_same_error(samples: Samples) -> None:
     model = ols_of(samples)
     turned = replace(
         model,
+        joint=None,  # it is of the inputs in their order
         inputs=model.inputs[::-1],
         variables=tuple(replace(v, weights=((2 - k, 1.0),)) for k, v in enumerate(model.variables)),
     )
@@ -66,7 +67,8 @@ def test_all_models_have_the_same_error(samples: Samples) -> None:
     found = sensitivity({"a": model, "turned": turned, "held": held}, samples, rows, size=0.01, draws=20)
     np.testing.assert_allclose(found["turned"].draws, found["a"].draws, rtol=1e-9)
     assert np.ptp(found["a"].draws) > 0
-    one = replace(model, inputs=model.inputs[:1], variables=model.variables[:1], terms=((0,),), coefficients=(1.0,))
+    less = replace(model, joint=None)
+    one = replace(less, inputs=model.inputs[:1], variables=model.variables[:1], terms=((0,),), coefficients=(1.0,))
     padded = replace(model, coefficients=(1.0, 0.0, 0.0))
     found = {**found, **sensitivity({"one": one, "padded": padded}, samples, rows, size=0.01, draws=20)}
     np.testing.assert_allclose(found["one"].draws, found["padded"].draws, rtol=1e-9)

@@ -172,7 +172,7 @@ def test_what_fit_has_refused_assess_does_not_pass(
     capsys.readouterr()
     assert run(["assess", str(model), str(other)]) == 1
     out = " ".join(capsys.readouterr().out.split())
-    assert "accepted z_um" in out
+    assert "unproven z_um: judged on 2 units, at least 3 are needed" in out
     assert "refused when it was fitted z_um: worse than none in cycle 2" in out
     modelfile.write([fitted], model, overwrite=True)
     assert run(["assess", str(model), str(other)]) == 0

@@ -150,7 +150,9 @@ class Assessment:
         """Why, and for what is unproven which test would decide it."""
         if self.failure:
             return f"could not be judged: {self.failure}"
-        fragile = f"{self._fragile}; filter the readings, or take fewer sensors" if self._fragile else ""
+        fragile = (
+            f"{self._fragile}; take fewer sensors (thermocomp select) or filter the readings" if self._fragile else ""
+        )
         told = self.caveat or fragile or self.verdict.told
         if self.caveat or not self.learned:
             return told

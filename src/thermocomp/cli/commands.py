@@ -60,7 +60,7 @@ def demo(
     Returns
     -------
     int
-        0 done, 1 judged bad.
+        0 done, 1 a model was refused.
     """
     if output.exists() and not output.is_dir():
         raise InputError(f"{output}: is a file; name a folder")
@@ -73,11 +73,10 @@ def demo(
     study = Study(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
         _console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
-    code = compare([recording], study=study, output=report, overwrite=overwrite, json=json)
+    compare([recording], study=study, output=report, overwrite=overwrite, json=json)
     if not json:
         _console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
-    fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)
-    return code
+    return fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)
 
 
 def simulate(
