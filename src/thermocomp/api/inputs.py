@@ -17,6 +17,7 @@ from thermocomp.files import recordings as files
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.sound import sound
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -107,7 +108,7 @@ def samples_of(
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
         named = [c.name for c in recordings[0].displacements]
-    return stack(recordings, named, inputs, rezero=not absolute)
+    return sound(stack(recordings, named, inputs, rezero=not absolute), recordings)
 
 
 def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
@@ -143,6 +144,7 @@ def trouble_of(recordings: Sequence[Recording]) -> list[str]:
     """Return what is wrong with recordings, one line per trouble and per column that was left out."""
     return [
         f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
+        f"{'' if f.severity != 'trouble' or f.rows is None else '. These rows are left out'}"
         for r in recordings
         for f in check(r)
         if f.severity == "trouble" or f.kind == "left out"

@@ -249,7 +249,7 @@ def judge(
                 if mine.sum() >= harm.MIN_ROWS
             ),
             unit=model.unit,
-            caps=_caps(split, learned),
+            caps=_caps(split, learned, samples, target),
             refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
         ),
         sensors=model.sensors,
@@ -280,9 +280,10 @@ def _alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
     return (f"only {covered.independent} of {covered.units} units are not alike, at least {harm.MIN_UNITS} are needed",)
 
 
-def _caps(split: Split, learned: Learned | None) -> tuple[str, ...]:
+def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) -> tuple[str, ...]:
     """Return what keeps a model from being accepted, whatever its errors."""
-    found = []
+    others = {c.name for k, c in enumerate(samples.targets) if k != target}
+    found = [text for channel, text in samples.trouble if channel not in others]
     if split.stretch:
         found.append("judged on one stretch that goes on from what was learned")
     if learned is None:

@@ -21,6 +21,7 @@ from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.sound import sound
 from thermocomp.recording.starts import Start
 from thermocomp.recording.starts import find as find_starts
 
@@ -225,6 +226,7 @@ def assess(
             zeroing=model.zeroing,
             starts=starts,
         )
+        samples = sound(samples, recordings)
         told = tuple(zip(samples.test_names, samples.starts, strict=True))
         covered = covered or coverage.cover(samples, units(samples), recordings)
         overall = _assess(model, _called_as_in(model, samples), rules, limits)

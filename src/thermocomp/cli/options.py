@@ -78,6 +78,7 @@ class Study:
     def samples(self, tests: "list[Recording]", start: "Start | None" = None) -> "Samples":
         """Stack the tests, which begin as stated, or as found out."""
         from thermocomp.recording.samples import stack
+        from thermocomp.recording.sound import sound
 
         if self.jobs == 0:
             raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
@@ -85,7 +86,8 @@ class Study:
         zeroing = Zeroing(
             self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
         )
-        return stack(tests, self.target, self.inputs, rezero=not self.absolute, zeroing=zeroing, starts=start)
+        found = stack(tests, self.target, self.inputs, rezero=not self.absolute, zeroing=zeroing, starts=start)
+        return sound(found, tests)
 
     def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""

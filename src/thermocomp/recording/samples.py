@@ -63,6 +63,8 @@ class Samples:
         The spindle is known to stand; None: it is known nowhere.
     starts : tuple of Start
         How each test begins; empty: cold.
+    trouble : tuple of (str, str)
+        Channel (empty: all) and what is wrong with it as a whole; see `thermocomp.recording.sound`.
     """
 
     inputs: tuple[Channel, ...]
@@ -81,6 +83,7 @@ class Samples:
     zeroing: Zeroing = FIRST_READING
     resting: BoolArray | None = None
     starts: tuple[Start, ...] = ()
+    trouble: tuple[tuple[str, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.time)
