@@ -177,7 +177,7 @@ def selector() -> SensorSelector:
         make_pipeline(SelectKBest(f_regression, k=3), StandardScaler(), StandardScaler(with_mean=False), PartialF()),
         make_pipeline("passthrough", LeastSquares(fit_intercept=False)),
     ],
-    ids=str,
+    ids=range(5),
 )
 def test_a_frozen_pipeline_is_the_pipeline(pipeline: Any, samples: Samples) -> None:
     X, y = samples.frame(), samples.deviations[:, 0]

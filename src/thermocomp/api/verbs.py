@@ -10,7 +10,9 @@ from thermocomp.assessment import compare as comparing
 from thermocomp.assessment import selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
+from thermocomp.assessment.results import Rules
 from thermocomp.assessment.splits import Judging
+from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, Support
 from thermocomp.datasets import virtual
@@ -65,6 +67,9 @@ def compare(
     support: Policy = "clip",
     margin: float = Support.margin,
     robustness: bool = False,
+    primary: str | None = None,
+    harm_margin: float | None = None,
+    limits: Limits | None = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> Compared:
@@ -92,7 +97,13 @@ def compare(
     support, margin : str, float
         What the models do outside their trained range, see `thermocomp.core.model.Support`.
     robustness : bool
-        Also replay with noise and lost sensors.
+        Also replay with noise and lost sensors: a model that they make worse than none is unproven then.
+    primary : str, optional
+        Method that is named beforehand, see `thermocomp.assessment.results.Rules`.
+    harm_margin : float, optional
+        Harm in a single unit that is let pass, stated before judging [um].
+    limits : Limits or None
+        Of the compensator that is judged with the models; None: the models alone.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -114,8 +125,10 @@ def compare(
         samples,
         [models] if isinstance(models, str) else models,
         judging,
+        rules=Rules(harm_margin, primary),
         support=Support(support, margin),
         robustness=robustness,
+        limits=limits,
         jobs=jobs,
         progress=progress,
     )
