@@ -48,7 +48,9 @@ def test_cross_val_score_is_our_own_judging(name: str, tests: Samples) -> None:
     mine = estimator if name in QUICK else name
     mine_tests = tests if timed else tests.only(["t1_C", "t2_C", "t3_C"])
     ours = [
-        a for a in compare(mine_tests, [mine], judging, support=wide, robustness=False, limits=None).assessments if not a.overall
+        a
+        for a in compare(mine_tests, [mine], judging, support=wide, robustness=False, limits=None).assessments
+        if not a.overall
     ]
     assert [a.failure for a in ours] == [""] * len(judging.splits)
     X = tests.frame()
@@ -76,7 +78,9 @@ def test_routed_is_the_same(tests: Samples) -> None:
     from thermocomp.models.dynamic import DynamicRidge
 
     judging = splits.leave_one_file_out(tests)
-    overall = compare(tests, ["dynamic"], judging, support=Support(margin=1e6), robustness=False, limits=None).assessments
+    overall = compare(
+        tests, ["dynamic"], judging, support=Support(margin=1e6), robustness=False, limits=None
+    ).assessments
     ours = [a for a in overall if not a.overall]
     with config_context(enable_metadata_routing=True):
         estimator: Any = DynamicRidge(speed=["spindle_rpm"], time="routed")

@@ -161,7 +161,17 @@ def _scores(
 
 
 def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
-    """Return the number of pieces of work of `compare`."""
+    """Return the number of pieces of work of `compare`.
+
+    Parameters
+    ----------
+    samples, methods, judging, rules
+        Of `compare`.
+
+    Returns
+    -------
+    int
+    """
     names = expand(methods)
     inner = len(_inners(names, judging, rules)) * sum(deployable(n) for n in names)
     return len(samples.targets) * (len(names) * len(judging.splits) + inner)

@@ -44,7 +44,17 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the training parts that a choice inside each unit's training part needs; none with fewer than 3 units."""
+    """Return the training parts that a choice inside each unit's training part needs.
+
+    Parameters
+    ----------
+    judging : Judging
+
+    Returns
+    -------
+    list of Inner
+        None with fewer than 3 units.
+    """
     splits = judging.splits
     n = len(splits)
     if n < LEAST:
@@ -68,7 +78,24 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
 
 
 def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inner) -> list[float]:
-    """Return a method's RMS for each of an inner training part's scores; infinite if it cannot be fitted [um]."""
+    """Return a method's RMS for each of an inner training part's scores.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        Of the method.
+    target : int
+        Index into ``samples.targets``.
+    judging : Judging
+        The units.
+    inner : Inner
+
+    Returns
+    -------
+    list of float
+        Infinite if it cannot be fitted [um].
+    """
     try:
         predicted = train(name, samples, target, inner.split.learn).predicted
     except FitError:

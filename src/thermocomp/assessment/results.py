@@ -142,8 +142,9 @@ class Assessment:
     @property
     def _fragile(self) -> str:
         """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
-        good = self.robustness is not None and self.verdict.word == "accepted"
-        return self.robustness.harm if good and self.robustness is not None else ""
+        if self.robustness is None or self.verdict.word != "accepted":
+            return ""
+        return self.robustness.harm_beyond(max(u.margin for u in self.verdict.units))
 
     @property
     def reason(self) -> str:

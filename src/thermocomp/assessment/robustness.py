@@ -53,22 +53,24 @@ class Robustness:
 
         Such as ``noise of 0.4 degC`` (the mean over the draws of one of its laws) and ``loss of t3_C``.
         """
-        loud = any(mean > self.none_rms for mean, _ in self.noise_rms.values())
-        lost = [f"loss of {name}" for name, rms in self.lost_rms.items() if rms > self.none_rms]
-        return (*([f"noise of {self.noise:g} degC"] if loud else []), *lost)
+        return tuple(self._above(self.none_rms))
 
     @property
     def harm(self) -> str:
         """What makes it worse than no compensation, and how much worse, in words; empty if nothing does."""
-        if not self.worse_than_none:
-            return ""
-        errors = {f"noise of {self.noise:g} degC": max((mean for mean, _ in self.noise_rms.values()), default=np.nan)}
-        errors |= {f"loss of {name}": rms for name, rms in self.lost_rms.items()}
-        # noise first, it is always there; then the sensors, the worst first
-        order = sorted(self.worse_than_none, key=lambda what: (what.startswith("loss"), -errors[what]))
-        told = [f"{what} ({errors[what]:.2f} um)" for what in order]
+        return self.harm_beyond(0.0)
+
+    def harm_beyond(self, margin: float) -> str:
+        """Return what makes it worse than no compensation by more than a margin [um], in words; empty if nothing."""
+        told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
-        return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}"
+        return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
+
+    def _above(self, limit: float) -> dict[str, float]:
+        """Return the disturbances that leave more than a limit, and what they leave [um]."""
+        loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
+        found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {k}": rms for k, rms in self.lost_rms.items()}
+        return {what: rms for what, rms in found.items() if rms > limit}
 
     @property
     def worst_lost(self) -> tuple[str, float]:
