@@ -67,9 +67,10 @@ class Robustness:
         return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
 
     def _above(self, limit: float) -> dict[str, float]:
-        """Return the disturbances that leave more than a limit, and what they leave [um]."""
+        """Return the disturbances that leave more than a limit, and what they leave [um]: noise, then the worst loss."""
         loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
-        found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {k}": rms for k, rms in self.lost_rms.items()}
+        lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
+        found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
         return {what: rms for what, rms in found.items() if rms > limit}
 
     @property
