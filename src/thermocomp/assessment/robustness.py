@@ -67,7 +67,7 @@ class Robustness:
         return f"worse than none ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
 
     def _above(self, limit: float) -> dict[str, float]:
-        """Return the disturbances that leave more than a limit, and what they leave [um]: noise, then the worst loss."""
+        """Return the disturbances that leave more than a limit, and what [um]: noise, then losses, the worst first."""
         loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
         lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
         found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
