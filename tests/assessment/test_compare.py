@@ -273,7 +273,7 @@ def test_what_makes_a_model_worse_than_none_is_named() -> None:
     assert both.harm == "worse than none (3.00 um RMS) with noise of 0.4 degC (3.10 um), loss of b (4.50 um)"
     sensors = replace(both, lost_rms={"a": 3.5, "b": 4.5, "c": 9.0})
     assert sensors.harm.endswith("loss of c (9.00 um), loss of b (4.50 um), loss of a (3.50 um)")
-    assert sensors.worse_than_none[1:] == ("loss of a", "loss of b", "loss of c")
+    assert sensors.worse_than_none[1:] == ("loss of c", "loss of b", "loss of a")
     # several blocks: of all their rows together
     together = pooled([(found(3.1, 2.0), 100), (found(1.0, 1.0, 9.0), 100)])
     assert together is not None

@@ -77,7 +77,10 @@ def test_anything_stands_beside_the_methods(samples: Samples) -> None:
     ]  # fmt: skip
     assert found["Plane"] == found["Plane #2"] == pytest.approx(found["Deployable"], rel=1e-9)
     assert found["Plane"] < 3  # of about 16 um
-    assert n_pieces(samples, models, splits.leave_one_cycle_out(samples)) == 2 * 6 * 4
+    assert n_pieces(samples, models, splits.leave_one_cycle_out(samples)) == 2 * (
+        6 * 4 + 2 * 6
+        # two may be chosen, by pairs of cycles
+    )
 
 
 def test_what_cannot_be_deployed_is_never_the_best(samples: Samples) -> None:

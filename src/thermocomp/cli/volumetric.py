@@ -128,7 +128,7 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
         _console.print(_volume(study))
     for what, codes in (("never judged on unseen cycles", untested(study)), ("unproven", unproven(study))):
         if codes:
-            _console.print(f"[yellow]but[/] {what}: {escape('; '.join(codes))}", soft_wrap=True)
+            _console.print(f"[yellow]but[/] {what}: {escape(', '.join(codes))}", soft_wrap=True)
     if study.missing:
         _console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
     for note in study.notes:
