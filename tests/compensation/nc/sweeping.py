@@ -130,7 +130,7 @@ def outcome(seed: int, text: str, way: str, axes: str, folder: Path, proof: bool
         found.kind, found.reasons = "wrong", tuple(error.faults)
     except state_judge.InvalidError as error:
         found.kind, found.reasons = "invalid", (str(error),)
-    if proof and found.kind == "revised":
+    if proof and found.kind != "invalid":  # what is wrong and not written is a report
         try:
             trial.proved()
         except InputError as error:

@@ -8,6 +8,8 @@ from thermocomp.compensation.nc.following.block import PLANES, Point
 
 #: how far chip breaking and peck drilling stay off the ground [inch]
 BACK_OFF: Final = 0.01
+#: levels nearer than that are equal but for the arithmetic
+ROUNDING: Final = 1e-9
 #: more holes or pecks than this are a mistake in the program
 MOST: Final = 100_000
 
@@ -101,7 +103,7 @@ class Cycle:
             level = now = r
         yield Step(True, self._at(a, b, now))
         back = r if self.to_r else level
-        height = now if now > r or self.direct else back
+        height = now if now > r + ROUNDING or self.direct else back
         da, db = self.named.get("XYZ"[first]), self.named.get("XYZ"[second])
         for _ in range(self.repeats):
             if self.absolute:

@@ -4,7 +4,7 @@ from thermocomp.compensation.nc.following import fanuc
 from thermocomp.compensation.nc.following.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
 from thermocomp.compensation.nc.following.block import PLANES, Arc, Block, Known, Move
 from thermocomp.compensation.nc.following.codes import ROTARY
-from thermocomp.compensation.nc.following.cycles import KEPT, Cycle, CycleError, pause
+from thermocomp.compensation.nc.following.cycles import KEPT, ROUNDING, Cycle, CycleError, pause
 from thermocomp.compensation.nc.following.offsets import mark, put
 from thermocomp.compensation.nc.following.orders import Orders
 from thermocomp.compensation.nc.following.state import State
@@ -14,8 +14,6 @@ _NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come befo
 
 #: levels nearer than that are the same [mm]
 _SAME_LEVEL = 1e-4
-#: and nearer than that they are equal but for the arithmetic [mm]
-_ROUNDING = 1e-9
 
 
 def straight(state: State, orders: Orders, block: Block) -> None:
@@ -294,7 +292,7 @@ def _ends_certainly(state: State) -> bool:
 
 
 def _refuse_near_r(start: float, level: float, plane: float, orders: Orders) -> None:
-    if _ROUNDING < abs(start - plane) < _SAME_LEVEL < abs(level - plane):
+    if ROUNDING < abs(start - plane) < _SAME_LEVEL < abs(level - plane):
         raise orders.error(
             "G98 after a hole that ended at almost the same R: whether LinuxCNC goes up before the next hole depends "
             "on rounding; write the same R, or G80 between them"

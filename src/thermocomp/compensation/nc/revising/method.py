@@ -131,6 +131,8 @@ class Method(ABC):
     def stands(self, block: Block) -> bool:
         """Return whether a block moves no linear axis: it must not do so afterwards either.
 
+        So does a rapid with a rotary axis after a stop, if no hand has moved the axes since.
+
         Raises
         ------
         ProgramError
@@ -149,7 +151,7 @@ class Method(ABC):
                 f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
                 f"counts degrees: position {' '.join(unknown)} by a rapid before",
             )
-        return not unknown and not moves
+        return not moves and not (unknown and ROTARY.isdisjoint(block.words))
 
     def frame(self, block: Block) -> Frame:
         """Return how corrections stand in the words of a block."""
