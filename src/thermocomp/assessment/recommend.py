@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import harm
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError
-from thermocomp.models.training import train
+from thermocomp.models.training import fitted
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -97,7 +97,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
         Infinite if it cannot be fitted [um].
     """
     try:
-        predicted = train(name, samples, target, inner.split.learn).predicted
+        predicted = fitted(name, samples, target, inner.split.learn).predicted
     except FitError:
         return [np.inf] * len(inner.scores)
     found = []

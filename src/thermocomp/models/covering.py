@@ -106,8 +106,9 @@ def _nearest(states: FloatArray, points: FloatArray) -> FloatArray:
     """Return the distance of states to the nearest point, (n_states,): root of the mean square over the inputs."""
     square = np.full(len(states), np.inf)
     for p in points:
-        square = np.minimum(square, ((states - p) ** 2).mean(axis=1))
-    return np.asarray(np.sqrt(square))
+        away = states - p
+        np.minimum(square, np.einsum("ij,ij->i", away, away), out=square)
+    return np.asarray(np.sqrt(square / states.shape[1]))
 
 
 def _thinned(states: FloatArray) -> FloatArray:

@@ -55,6 +55,96 @@ class Trained:
     predicted: FloatArray
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """A method that knows its rows, before it is frozen.
+
+    Parameters
+    ----------
+    how : Method
+    estimator : ThermalRegressor
+    columns : tuple of int
+        The inputs it was given.
+    seen : ndarray of bool of shape (n_rows,)
+        Rows that it has learned from.
+    seconds : float
+        The fit took [s].
+    predicted : ndarray of shape (n_rows,)
+        What it says of every row; nan where an input is missing.
+    """
+
+    how: Method
+    estimator: ThermalRegressor
+    columns: tuple[int, ...]
+    seen: BoolArray
+    seconds: float
+    predicted: FloatArray
+
+
+def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: BoolArray) -> Fitted:
+    """Fit a method to some of the rows.
+
+    Parameters
+    ----------
+    name : str or estimator
+        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself, see
+        `thermocomp.models.foreign.adopted`.
+    samples : Samples
+    target : int
+        Index into ``samples.targets``.
+    learn : ndarray of bool of shape (n_rows,)
+        Rows whose deviation may be seen. A dynamic method also gets the inputs (never the deviations) of the other
+        rows: they are what the machine has gone through in between.
+
+    Returns
+    -------
+    Fitted
+
+    Raises
+    ------
+    FitError
+        Too few rows, or the method cannot be fitted to them.
+    """
+    own = name.estimator if isinstance(name, Named) else None if isinstance(name, str) else adopted(name)
+    how = (
+        method(str(name))
+        if own is None
+        else replace(given(own), name=str(name) if isinstance(name, str) else title(own))
+    )
+    columns = tuple(j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed")
+    if not columns:
+        raise FitError(f"{how.name}: there is no temperature to predict from")
+    channel, valid = samples.targets[target], samples.valid
+    seen = valid & learn & np.isfinite(samples.deviations[:, target])
+    if seen.sum() < 3:
+        raise FitError(
+            f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
+        )
+    _refuse_unknown_counts(samples, seen)
+    speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
+    estimator = how.build(speeds) if own is None else clone(own)
+    if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
+        estimator.set_params(speed=speeds)  # the recording knows which inputs are
+    frame = samples.frame().iloc[:, list(columns)]
+    begin = time.perf_counter()
+    # a method with a memory also gets what the machine went through between the rows it learns from
+    rows = valid & np.isin(samples.test, samples.test[seen]) if "dt" in how.takes else seen
+    learned = seen[rows]
+    y = np.where(learned, samples.deviations[rows, target], 0.0)
+    driven = samples.take(rows)
+    clock: dict[str, Any] = {"dt": pd.Series(driven.dt())} if "dt" in how.takes else {}
+    cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
+    try:
+        estimator.fit(frame.iloc[rows], y, **clock, **cycles)
+    except ValueError as e:  # what scikit-learn raises for data it cannot use
+        raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
+    seconds = time.perf_counter() - begin
+    everywhere: dict[str, Any] = {"dt": pd.Series(samples.take(valid).dt())} if "dt" in how.takes else {}
+    predicted = np.full(len(samples), np.nan)
+    predicted[valid] = estimator.predict(frame.iloc[valid], **everywhere)
+    return Fitted(how, estimator, columns, seen, seconds, predicted)
+
+
 def train(
     name: str | BaseEstimator,
     samples: Samples,
@@ -68,15 +158,8 @@ def train(
 
     Parameters
     ----------
-    name : str or estimator
-        Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself, see
-        `thermocomp.models.foreign.adopted`.
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
-    learn : ndarray of bool of shape (n_rows,)
-        Rows whose deviation may be seen. A dynamic method also gets the inputs (never the deviations) of the other
-        rows: they are what the machine has gone through in between.
+    name, samples, target, learn
+        Of `fitted`.
     support : Support
         For the frozen model.
     prints : bool
@@ -89,52 +172,19 @@ def train(
     Raises
     ------
     FitError
-        Too few rows, or the method cannot be fitted to them.
+        See `fitted`.
     """
-    own = name.estimator if isinstance(name, Named) else None if isinstance(name, str) else adopted(name)
-    how = (
-        method(str(name))
-        if own is None
-        else replace(given(own), name=str(name) if isinstance(name, str) else title(own))
-    )
-    columns = [j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed"]
-    if not columns:
-        raise FitError(f"{how.name}: there is no temperature to predict from")
-    channel = samples.targets[target]
-    seen = samples.valid & learn & np.isfinite(samples.deviations[:, target])
-    if seen.sum() < 3:
-        raise FitError(
-            f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
-        )
-    _refuse_unknown_counts(samples, seen)
-    speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
-    estimator = how.build(speeds) if own is None else clone(own)
-    if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
-        estimator.set_params(speed=speeds)  # the recording knows which inputs are
-    begin = time.perf_counter()
-    # a method with a memory also gets what the machine went through between the rows it learns from
-    rows = samples.valid & np.isin(samples.test, samples.test[seen]) if "dt" in how.takes else seen
-    X, learned = samples.frame().iloc[rows, columns], seen[rows]
-    y = np.where(learned, samples.deviations[rows, target], 0.0)
-    driven = samples.take(rows)
-    clock: dict[str, Any] = {"dt": pd.Series(driven.dt())} if "dt" in how.takes else {}
-    cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
-    try:
-        estimator.fit(X, y, **clock, **cycles)
-    except ValueError as e:  # what scikit-learn raises for data it cannot use
-        raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
-    seconds = time.perf_counter() - begin
-    everywhere: dict[str, Any] = {"dt": pd.Series(samples.take(samples.valid).dt())} if "dt" in how.takes else {}
-    predicted = np.full(len(samples), np.nan)
-    predicted[samples.valid] = estimator.predict(samples.frame().iloc[samples.valid, columns], **everywhere)
+    fit = fitted(name, samples, target, learn)
+    how, estimator, seen, predicted = fit.how, fit.estimator, fit.seen, fit.predicted
     r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))
     freeze: Any = estimator.freeze
     if isinstance(estimator, UnfrozenRegressor):
-        freeze = partial(estimator.unfrozen, rows=samples.change()[samples.valid][:, columns])
+        freeze = partial(estimator.unfrozen, rows=samples.change()[samples.valid][:, fit.columns])
+    channel = samples.targets[target]
     model: ErrorModel = freeze(
         target=channel.name,
         unit=channel.unit,
-        inputs=samples.model_inputs(columns, seen),
+        inputs=samples.model_inputs(fit.columns, seen),
         support=support,
         provenance=_provenance(how, estimator, samples, target, seen),
     )
@@ -143,7 +193,7 @@ def train(
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
     model = replace(model, joint=_joint(model, samples, seen), zeroing=samples.zeroing)
-    return Trained(how.name, estimator, model, seconds, r_squared, predicted)
+    return Trained(how.name, estimator, model, fit.seconds, r_squared, predicted)
 
 
 def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -129,6 +130,10 @@ class Samples:
 
     def change(self) -> FloatArray:
         """Return inputs minus their reference, (n_rows, n_inputs); the rows of a zero say its mean."""
+        return self._change.copy()
+
+    @cached_property
+    def _change(self) -> FloatArray:
         values = self.values.copy()
         for window in self._windows() if self.rezeroed.any() else []:
             values[window] = centre(values[window])
