@@ -1,6 +1,7 @@
 """Splits: nothing judged was learned from, and never at random."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,3 +102,18 @@ def test_one_cycle_cannot_be_left_out() -> None:
         splits.leave_one_cycle_out(one)
     with pytest.raises(InputError, match="at least two recordings"):
         splits.leave_one_file_out(one)
+    with pytest.raises(InputError, match="has no time stamps"):
+        splits.leave_one_day_out(one)
+
+
+def test_days() -> None:
+    stamped = replace(small_machine(), start="2026-03-01T16:30:00+01:00")
+    samples = stack([stamped], ["z_um"])
+    judging = splits.leave_one_day_out(samples)
+    midnight = int(np.searchsorted(samples.time, 7.5 * 3600.0))
+    assert [s.block for s in judging.splits] == ["day 2026-03-01", "day 2026-03-02"]
+    assert [int(s.judge.sum()) for s in judging.splits] == [midnight, len(samples) - midnight]
+    for s in judging.splits:
+        assert (s.learn ^ s.judge).all()
+    with pytest.raises(InputError, match="at least two days"):
+        splits.leave_one_day_out(stack([replace(stamped, start="2026-03-01T00:00:00")], ["z_um"]))

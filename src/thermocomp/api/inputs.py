@@ -24,7 +24,7 @@ IntArray = NDArray[np.intp]
 
 #: one test, or several
 Given = Recording | str | Path | pd.DataFrame | Sequence["Recording | str | Path | pd.DataFrame"]
-LeaveOne = Literal["cycle", "file"]
+LeaveOne = Literal["cycle", "day", "file"]
 
 
 def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None) -> Recording:
@@ -119,8 +119,8 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
     samples : Samples
     split : str, optional
         Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
-    leave_one : {'cycle', 'file'}, optional
-        Judge on each thermal cycle in turn, which is done if nothing is said, or on each recording.
+    leave_one : {'cycle', 'day', 'file'}, optional
+        Judge on each thermal cycle in turn, which is done if nothing is said, on each day, or on each recording.
 
     Returns
     -------
@@ -129,15 +129,20 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
     Raises
     ------
     InputError
-        Both were given, or there are too few cycles or files.
+        Both were given, or there are too few cycles, days or files.
     """
     if split is not None and leave_one is not None:
         raise InputError("split and leave_one exclude each other: choose one")
     if split is not None:
         return splits.parse(split, samples)
-    if leave_one not in (None, "cycle", "file"):
-        raise InputError(f"leave_one {leave_one!r}: want 'cycle' or 'file'")
-    return splits.leave_one_file_out(samples) if leave_one == "file" else splits.leave_one_cycle_out(samples)
+    ways = {
+        "cycle": splits.leave_one_cycle_out,
+        "day": splits.leave_one_day_out,
+        "file": splits.leave_one_file_out,
+    }
+    if leave_one is not None and leave_one not in ways:
+        raise InputError(f"leave_one {leave_one!r}: want 'cycle', 'day' or 'file'")
+    return ways[leave_one or "cycle"](samples)
 
 
 def trouble_of(recordings: Sequence[Recording]) -> list[str]:

@@ -39,7 +39,7 @@ def cover(samples: Samples, judging: Judging, recordings: Sequence[Recording] = 
     judging : Judging
         Its blocks are the units.
     recordings : sequence of Recording
-        The tests of `samples`, in their order: for the surroundings and the days.
+        The tests of `samples`, in their order: for the surroundings.
 
     Returns
     -------
@@ -50,6 +50,7 @@ def cover(samples: Samples, judging: Judging, recordings: Sequence[Recording] = 
     distances = unit_distances(samples, blocks)
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     starts = [float(samples.values[np.flatnonzero(rows)[0], temperatures].mean()) for rows in blocks if temperatures]
+    days = samples.days()[judged]
     name, ambient = _ambient(samples, judged, recordings)
     return Validity(
         units=len(blocks),
@@ -59,7 +60,7 @@ def cover(samples: Samples, judging: Judging, recordings: Sequence[Recording] = 
         ambient=ambient,
         ambient_channel=name,
         start=(min(starts), max(starts)) if starts else None,
-        days=_days(samples, judged, recordings),
+        days=int(np.unique(days[~np.isnat(days)]).size),
         hours=float(np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)[judged].sum() / 3600.0),
     )
 
@@ -136,16 +137,6 @@ def _ambient(
     known = np.concatenate(values) if values else np.empty(0)
     known = known[np.isfinite(known)]
     return (named, (float(known.min()), float(known.max()))) if known.size else ("", None)
-
-
-def _days(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]) -> int:
-    days: set[np.datetime64] = set()
-    for k, recording in enumerate(recordings):
-        if recording.start:
-            begin = np.datetime64(recording.start.replace("Z", "").split("+")[0], "s")
-            time = samples.time[judged & (samples.test == k)]
-            days |= set((begin + time.astype("timedelta64[s]")).astype("datetime64[D]").tolist())
-    return len(days)
 
 
 def table(named: dict[str, Validity]) -> Table:

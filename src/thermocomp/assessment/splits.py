@@ -1,4 +1,4 @@
-"""What is learned from and what is judged: rows, spans of time, thermal cycles or files, never at random."""
+"""What is learned from and what is judged: rows, spans of time, thermal cycles, days or files, never at random."""
 
 from dataclasses import dataclass
 
@@ -179,6 +179,35 @@ def leave_one_file_out(samples: Samples) -> Judging:
         Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
     ]
     return Judging(f"leave one file out ({n} files)", tuple(splits))
+
+
+def leave_one_day_out(samples: Samples) -> Judging:
+    """Judge on each day in turn, learn from all others; one with too few rows goes with the day before.
+
+    Raises
+    ------
+    InputError
+        A recording has no time stamps, or there is only one day.
+    """
+    days = samples.days()
+    unknown = np.isnat(days)
+    if unknown.any():
+        name = samples.test_names[samples.test[int(np.argmax(unknown))]]
+        raise InputError(
+            f"leaving one day out: {name} has no time stamps, so nobody knows its days; write date and time into its "
+            "time column, or leave out cycles or files"
+        )
+    names, day = np.unique(days, return_inverse=True)
+    own = samples.cycle >= 0  # not those of earlier files, which tests go on from
+    blocks = stretches(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
+    if len(blocks) < 2:
+        raise InputError("leaving one day out needs at least two days with recordings")
+    splits = []
+    for block in blocks:
+        mine = np.isin(day, block) & own
+        more = f" and {len(block) - 1} more" if len(block) > 1 else ""
+        splits.append(Split(f"day {names[block[0]]}{more}", ~mine, mine, whole=True))
+    return Judging(f"leave one day out ({len(blocks)} days)", tuple(splits))
 
 
 def parse(text: str, samples: Samples) -> Judging:

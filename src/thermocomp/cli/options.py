@@ -16,6 +16,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 
 if TYPE_CHECKING:
+    from thermocomp.api.inputs import LeaveOne
     from thermocomp.assessment.results import Rules
     from thermocomp.assessment.splits import Judging
     from thermocomp.recording.recording import Recording
@@ -51,13 +52,15 @@ class Study:
         Judge by time: shares of the rows such as 0.75/0.25, or hours such as 20h/8h.
     leave_one_cycle_out : bool
         Judge on each thermal cycle in turn (what is done if nothing is said).
+    leave_one_day_out : bool
+        Judge on each day in turn; the recordings need time stamps.
     leave_one_file_out : bool
         Judge on each recording in turn.
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
     harm_margin : float
-        Harm in a single cycle or file that is let pass [um]. If not given: three times the probe's noise or 5 % of the
-        largest drift, at most 2 um.
+        Harm in a single cycle, day or file that is let pass [um]. If not given: three times the probe's noise or 5 % of
+        the largest drift, at most 2 um.
     zero_over : float
         Average that start over so long, while the spindle stands [s]; 0: it is the first row.
     jobs : int
@@ -69,6 +72,7 @@ class Study:
     mapping: Path | None = None
     split: str | None = None
     leave_one_cycle_out: Flag = False
+    leave_one_day_out: Flag = False
     leave_one_file_out: Flag = False
     absolute: Flag = False
     harm_margin: float | None = None
@@ -93,9 +97,16 @@ class Study:
         """Return what is learned from and what is judged."""
         from thermocomp.api.inputs import judging_of
 
-        if (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out > 1:
-            raise InputError("--split, --leave-one-cycle-out and --leave-one-file-out exclude each other: choose one")
-        return judging_of(samples, split=self.split, leave_one="file" if self.leave_one_file_out else None)
+        units: dict[LeaveOne, bool] = {
+            "cycle": self.leave_one_cycle_out,
+            "day": self.leave_one_day_out,
+            "file": self.leave_one_file_out,
+        }
+        named: list[LeaveOne] = [unit for unit, asked in units.items() if asked]
+        if (self.split is not None) + len(named) > 1:
+            ways = ", ".join(f"--leave-one-{unit}-out" for unit in units)
+            raise InputError(f"--split, {ways} exclude each other: choose one")
+        return judging_of(samples, split=self.split, leave_one=named[0] if named else None)
 
     def rules(self, primary: str | None = None) -> "Rules":
         """Return what is stated before judging."""

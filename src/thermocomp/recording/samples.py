@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from typing import NamedTuple
 
@@ -64,6 +65,8 @@ class Samples:
         The spindle is known to stand; None: it is known nowhere.
     starts : tuple of Start
         How each test begins; empty: cold.
+    stamps : tuple of str
+        ISO timestamp of each test's first row, that of an earlier file it goes on from; empty: not known.
     trouble : tuple of (str, str)
         Channel (empty: all) and what is wrong with it as a whole; see `thermocomp.recording.sound`.
     """
@@ -84,6 +87,7 @@ class Samples:
     zeroing: Zeroing = FIRST_READING
     resting: BoolArray | None = None
     starts: tuple[Start, ...] = ()
+    stamps: tuple[str, ...] = ()
     trouble: tuple[tuple[str, str], ...] = ()
 
     def __len__(self) -> int:
@@ -145,6 +149,16 @@ class Samples:
             if self.zero is None or np.isnan(self.zero[k]).any():
                 rows = np.flatnonzero((self.test == k) & self.valid)
                 yield rows[: first_rows(self.zeroing, self.time[rows], self.stands[rows])[0]]
+
+    def days(self) -> "NDArray[np.datetime64]":
+        """Return the day of each row, (n_rows,); not a time where the recording has no time stamps."""
+        found = np.full(len(self), "NaT", "datetime64[D]")
+        for k, stamp in enumerate(self.stamps):
+            mine = self.test == k
+            if stamp:
+                begin = np.datetime64(datetime.fromisoformat(stamp).replace(tzinfo=None), "s")
+                found[mine] = (begin + self.time[mine].astype("timedelta64[s]")).astype("datetime64[D]")
+        return found
 
     def dt(self) -> FloatArray:
         """Return the time since the previous row of the same test [s]; inf in each test's first row."""
@@ -313,6 +327,7 @@ def stack(
         zeroing=zeroing,
         resting=np.concatenate([p.resting for p in parts]),
         starts=tuple(p.start for p in parts),
+        stamps=tuple((*p.start.earlier, r)[0].start for p, r in zip(parts, recordings, strict=True)),
     )
 
 
