@@ -209,13 +209,22 @@ class Coordinates(Method):
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
         # which level is the higher one must not change
+        held = True
         if certain and any(abs(z - plane) < CLEAR for z in (block.start[axis], level)):
             goal = frame.words(self.carried)[axis]
         elif not certain and self._plane and abs(plane - self._plane[1]) < CLEAR:
             goal = self._cycle
+        else:
+            held = False
         self._plane = axis, plane
         if block.modal.motion in ("G73", "G83"):
-            goal = _same_pecks(block, words[0], goal, frame.digits)
+            wanted, goal = goal, _same_pecks(block, words[0], goal, frame.digits)
+            if held and goal != wanted:
+                raise ProgramError(
+                    block.line.number,
+                    f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
+                    "the tool stands at R, which must not move: write G80 and a rapid above R before, or --expand",
+                )
         if goal != self._cycle or all(word in block.words for word in words):
             added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal

@@ -1,0 +1,58 @@
+"""Whether a verdict hangs on one thermal cycle: the demo's six, and each five of them.
+
+Run with ``python benchmarks/bench_stable.py [--seed 0]``. The machine goes through all six cycles each time; the
+displacements of the one that is left out are taken away, so it is neither learned from nor judged. Wanted: what is
+accepted with six cycles stays so with at least five of the six sets of five, and is refused with none.
+"""
+
+import argparse
+import sys
+from dataclasses import replace
+
+import numpy as np
+
+import thermocomp as tc
+from thermocomp.assessment import splits
+from thermocomp.assessment.compare import compare
+from thermocomp.assessment.results import Comparison
+from thermocomp.recording.samples import Samples, stack
+
+METHODS = ("ols", "partial-f", "mra", "dynamic")
+#: sets of five with which what was accepted has to stay so
+LEAST = 5
+
+
+def judged(samples: Samples, without: int | None, jobs: int) -> Comparison:
+    """Compare with one cycle's displacements taken away."""
+    deviations = samples.deviations.copy()
+    if without is not None:
+        deviations[samples.cycle == without] = np.nan
+    mine = replace(samples, deviations=deviations)
+    judging = splits.leave_one_cycle_out(mine)
+    kept = tuple(s for s in judging.splits if np.isfinite(deviations[s.judge]).any())
+    return compare(mine, METHODS, replace(judging, splits=kept), jobs=jobs)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=-1)
+    options = parser.parse_args()
+    (recording,) = tc.simulate("demo", seed=options.seed)
+    samples = stack([recording], [c.name for c in recording.displacements])
+    sets = [None, *range(len(samples.cycle_names))]
+    words = [{(a.target, a.model): a.word for a in judged(samples, k, options.jobs).overall()} for k in sets]
+    missed = 0
+    for key, word in words[0].items():
+        fives = [w[key] for w in words[1:]]
+        stays = fives.count(word)
+        ok = "refused" not in fives and (word != "accepted" or stays >= LEAST)
+        missed += not ok
+        print(
+            f"{key[0]:6} {key[1]:10} {word:9} stays so with {stays} of {len(fives)}  {'' if ok else f'MISSED {fives}'}"
+        )
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
