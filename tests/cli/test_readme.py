@@ -36,13 +36,23 @@ def test_the_demo_prints_what_the_readme_shows(
     assert "exists already" in capsys.readouterr().err
 
 
+def test_python_prints_what_the_readme_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (program,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
+    exec(compile(program, "README.md", "exec"), {})
+    assert_printed(blocks()[1], capsys.readouterr().out)
+    assert sorted(p.name for p in Path().iterdir()) == ["model.json", "report.html"]
+
+
 def test_the_real_machine_prints_what_the_readme_shows(
     shared_data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     recording = str(shared_data / "fl_thermal" / "recording.csv")
     assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic"]) == 0
-    assert_printed(blocks()[2], capsys.readouterr().out)
+    assert_printed(blocks()[3], capsys.readouterr().out)
 
 
 @pytest.mark.usefixtures("interpreter")
@@ -58,7 +68,7 @@ def test_the_revision_prints_what_the_readme_shows(
     Path("plate.ngc").write_bytes((README.parent / "docs" / "files" / "plate.ngc").read_bytes())
     for command in commands:
         assert run(shlex.split(command)) == 0
-    assert_printed(blocks()[5], capsys.readouterr().out)
+    assert_printed(blocks()[6], capsys.readouterr().out)
 
 
 def test_the_study_prints_what_the_readme_shows(
@@ -66,7 +76,7 @@ def test_the_study_prints_what_the_readme_shows(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert run(["papers", "hwang"]) == 0
-    assert_printed(blocks()[3], capsys.readouterr().out)
+    assert_printed(blocks()[4], capsys.readouterr().out)
 
 
 def test_commands_of_the_readme_exist() -> None:

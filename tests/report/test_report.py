@@ -20,7 +20,7 @@ from thermocomp.cli.output import show_comparison
 from thermocomp.files import modelfile
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.report import html
+from thermocomp.report import figures, html
 from thermocomp.report.summary import cautions, summarise, verdict
 
 
@@ -171,3 +171,10 @@ def test_a_real_browser_shows_it(page: str, tmp_path: Path) -> None:
     assert pixels.shape[:2] == (2400, 1100)
     ink = (pixels[..., :3].mean(axis=2) < 0.6).mean(axis=1)
     assert (ink > 0.01).mean() > 0.15
+
+
+def test_a_name_with_a_formula_in_it_is_drawn(recording: Recording) -> None:
+    names = ["a$\\frac$_C", *(c.name for c in recording.channels[1:])]
+    channels = tuple(replace(c, name=n) for c, n in zip(recording.channels, names, strict=True))
+    odd = replace(recording, table=recording.table.set_axis(names, axis=1), channels=channels, aliases={})
+    assert "a$" in figures.measured(odd)

@@ -13,7 +13,7 @@ from thermocomp import __version__
 from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
-from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, svg, thinned
+from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, plain, svg, thinned
 from thermocomp.report.html import environment
 
 #: what is drawn below each other, in this order
@@ -21,7 +21,6 @@ _PANELS = {"spindle_speed": 1.0, "temperature": 2.4, "displacement": 2.4, "angle
 _MARK = {"trouble": "#b00020", "warning": "#E69F00", "info": "#5b636e"}
 #: names beside a panel
 _NAMED = 14
-_LONGEST = 28
 
 
 def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]]) -> str:
@@ -172,13 +171,6 @@ def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
         zorder=6,
         bbox={"boxstyle": "round,pad=0.2", "fc": _MARK[first.severity], "ec": "none"},
     )
-
-
-def plain(name: str) -> str:
-    """Return a name as a figure shows it: short, on one line, with no sign that starts a formula or hides a legend."""
-    text = "".join(c if c.isprintable() else " " for c in name)
-    text = text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
-    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:

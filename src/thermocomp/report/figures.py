@@ -24,6 +24,8 @@ FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
 POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
 
+#: characters of a name in a figure
+_LONGEST = 28
 _STYLE = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
@@ -80,7 +82,7 @@ def measured(recording: Recording) -> str:
             for k, c in enumerate(channels):
                 colour = COLOURS[k % len(COLOURS)]
                 style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-                ax.plot(*thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=c.name)
+                ax.plot(*thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=plain(c.name))
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
@@ -109,7 +111,7 @@ def overview(comparison: Comparison) -> Drawn:
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
             ax.set_yticks(range(len(models)), models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
-            ax.set_ylabel(target, fontweight="bold")
+            ax.set_ylabel(plain(target), fontweight="bold")
             ax.set_xscale("log")
         panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
         for word, face in FILLED.items():
@@ -157,14 +159,15 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             )
             harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
             mark = "  HARMFUL" if harmful else ""
+            name = plain(block.block, 60)
             ax.set_title(
-                f"{block.block}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
+                f"{name}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
                 fontsize=8,
                 color="#b00020" if harmful else "#222",
             )
             ax.set_xlabel("time [h]")
         for ax in axes[:, 0]:
-            ax.set_ylabel(f"{assessment.target.removesuffix('_um')} [um]")
+            ax.set_ylabel(plain(f"{assessment.target.removesuffix('_um')} [um]"))
         handles, labels = axes.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
         return svg(figure)
@@ -187,7 +190,9 @@ def robustness(comparison: Comparison, model: str) -> str:
             ax.plot([a.none_metric("rms")] * 2, [k - 0.4, k + 0.4], color=NONE, lw=2.5)
             name, worst = r.worst_lost
             if lost:
-                ax.annotate(name, (worst, k), xytext=(3, 5), textcoords="offset points", fontsize=7, color=RESIDUAL)
+                ax.annotate(
+                    plain(name), (worst, k), xytext=(3, 5), textcoords="offset points", fontsize=7, color=RESIDUAL
+                )
         noise = found[0].robustness.noise if found and found[0].robustness else 0.0
         ax.plot([], [], "o", color=PREDICTED, label="clean")
         ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
@@ -229,6 +234,13 @@ def thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatAr
     first = np.arange(0, n, stretch)
     picked = np.unique(np.concatenate([first + parts.argmin(axis=1), first + parts.argmax(axis=1), [0, len(x) - 1]]))
     return x[picked], y[picked]
+
+
+def plain(name: str, longest: int = _LONGEST) -> str:
+    """Return a name as a figure shows it: short, on one line, with no sign that starts a formula or hides a legend."""
+    text = "".join(c if c.isprintable() else " " for c in name)
+    text = text if len(text) <= longest else text[: longest - 3] + "..."
+    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 @contextmanager
