@@ -98,8 +98,9 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     low = replace(best.robustness, none_rms=min(best.robustness.lost_rms.values()) / 2)
     spoiled = tuple(replace(a, robustness=low) if a.overall else a for a in comparison.assessments)
     bad = replace(comparison, assessments=spoiled)
-    told = [c for c in cautions(bad) if "worse than none (" in c]
+    told = [a.reason for a in bad.overall() if a.word == "unproven" and "worse than none (" in a.reason]
     assert told
+    assert not [c for c in cautions(bad) if "worse than none" in c]  # it is said once
     assert all("loss of t1_C" in c for c in told)
     assert "noise of 0.4 degC, loss of t1_C" in html.render(bad, [recording])
     assert "worse than none with" in page
@@ -108,6 +109,18 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     show_comparison(bad, None, [], Console(width=400), as_json=True)
     results = [r for r in json.loads(capsys.readouterr().out)["results"] if "robustness" in r]
     assert any("loss of t1_C" in r["robustness"]["worse_than_none"] for r in results)
+
+
+def test_harm_within_the_margin_is_a_caution(comparison: Comparison) -> None:
+    (best,) = {a for a in comparison.overall() if a.target == "z_um" and a.model == "dynamic"}
+    assert best.accepted
+    assert best.robustness is not None
+    worst = max(best.robustness.lost_rms.values())
+    spoiled = tuple(
+        replace(a, robustness=replace(best.robustness, none_rms=worst - 0.01)) if a is best else a
+        for a in comparison.assessments
+    )
+    assert [c for c in cautions(replace(comparison, assessments=spoiled)) if "dynamic for z_um is worse than none" in c]
 
 
 def test_the_page_needs_no_network(page: str) -> None:

@@ -111,14 +111,16 @@ def cautions(comparison: Comparison) -> list[str]:
 
 
 def harms(comparison: Comparison) -> list[str]:
-    """Return which models noise or a lost sensor makes worse than none: the best of each target, or the least bad."""
-    found = []
-    for target in dict.fromkeys(a.target for a in comparison.assessments):
-        judged = [a for a in comparison.overall() if a.target == target and not a.failure]
-        shown = comparison.best(target) or min(judged, key=lambda a: a.metric("rms"), default=None)
-        if shown is not None and shown.robustness is not None and shown.robustness.harm:
-            found.append(f"{shown.model} for {target} is {shown.robustness.harm}.")
-    return found
+    """Return which of the models that may run noise or a lost sensor makes worse than none, within the margin.
+
+    Others are unproven for it, which is their reason.
+    """
+    best = [comparison.best(target) for target in dict.fromkeys(a.target for a in comparison.assessments)]
+    return [
+        f"{a.model} for {a.target} is {a.robustness.harm}."
+        for a in best
+        if a is not None and a.robustness is not None and a.robustness.harm
+    ]
 
 
 def unlike(r: Robustness) -> str:
