@@ -338,7 +338,8 @@ def _assess_method(
     limits: Limits | None,
 ) -> Assessment:
     try:
-        trained = train(name, samples, target, split.learn, support=support)
+        told = robustness or support.policy != "clip"
+        trained = train(name, samples, target, split.learn, support=support, joint=told)
     except FitError as e:
         return _failed(samples, name, target, split, str(e))
     first = int(np.argmax(split.judge))

@@ -404,7 +404,7 @@ def _unseen_rms(samples: Samples, target: int, split: Split, sensors: Sequence[s
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
     reduced = samples.only([*sensors, *speeds])
     try:
-        model = train(name, reduced, target, split.learn).model
+        model = train(name, reduced, target, split.learn, joint=False).model
     except FitError:
         return float("nan")
     rows = split.judge & np.isfinite(samples.deviations[:, target])

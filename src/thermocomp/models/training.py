@@ -153,6 +153,7 @@ def train(
     *,
     support: Support = Support(),
     prints: bool = False,
+    joint: bool = True,
 ) -> Trained:
     """Fit a method to some of the rows and freeze it.
 
@@ -164,6 +165,8 @@ def train(
         For the frozen model.
     prints : bool
         The model is kept: fingerprints of the rows go into its provenance.
+    joint : bool
+        It gets its joint support; a model that only clips says the same without.
 
     Returns
     -------
@@ -192,7 +195,7 @@ def train(
         # of what the model needs: no file can be judged that has not got it
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
-    model = replace(model, joint=_joint(model, samples, seen), zeroing=samples.zeroing)
+    model = replace(model, joint=_joint(model, samples, seen) if joint else None, zeroing=samples.zeroing)
     return Trained(how.name, estimator, model, fit.seconds, r_squared, predicted)
 
 
