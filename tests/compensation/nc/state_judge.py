@@ -22,8 +22,8 @@ Vector = tuple[float, float, float]
 
 #: difference that is rounding [um]
 ROUNDING = 0.1
-#: a shift may be larger than the largest correction asked for by this [um]
-OVER = 0.2
+#: a shift may be larger than the largest drift at the lines' ends by this: within a line it may have been more [um]
+OVER = 1.0
 #: of the time of a feed move
 SHARE, SECONDS = 0.02, 0.005
 
