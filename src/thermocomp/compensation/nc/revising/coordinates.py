@@ -44,8 +44,8 @@ class Coordinates(Method):
     contact: Contact = field(init=False)
     #: what depth and retract plane of the cycle in force got
     _cycle: float = field(default=0.0, init=False)
-    #: level at which a series of cycles began [mm; nan: not known], and what it carries [um]
-    _series: tuple[float, float] | None = field(default=None, init=False)
+    #: level at which a series of cycles began [mm], if nobody has moved the axis, and what the axes carry there [um]
+    _series: tuple[float, Vector] | None = field(default=None, init=False)
     #: axis and retract plane [mm] of the last cycle, as long as the tool may still stand there
     _plane: tuple[int, float] | None = field(default=None, init=False)
 
@@ -203,16 +203,17 @@ class Coordinates(Method):
     ) -> None:
         """Shift depth and retract plane of a cycle, together or not at all."""
         words = (AXES[axis], "R")
-        certain = self.before[axis]
         if self._series is None:
-            self._series = block.start[axis] if certain else math.nan, self.carried[axis]
+            self._series = block.start[axis], self.carried
         plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
         level, carried = self._series
-        # which level is the higher one must not change
+        # which level is the higher one must not change, if nobody has moved the axis
         held = True
-        if certain and any(abs(z - plane) < CLEAR for z in (block.start[axis], level)):
+        if abs(block.start[axis] - plane) < CLEAR:
             goal = frame.words(self.carried)[axis]
-        elif not certain and self._plane and abs(plane - self._plane[1]) < CLEAR:
+        elif abs(level - plane) < CLEAR:
+            goal = frame.words(carried)[axis]
+        elif not self.before[axis] and self._plane and abs(plane - self._plane[1]) < CLEAR:
             goal = self._cycle
         else:
             held = False
@@ -234,7 +235,7 @@ class Coordinates(Method):
         self.inner = frame.shift((within[0], within[1], within[2]))
         back = list(self.carried)
         at_r = abs(block.end[axis] - plane) < CLEAR
-        back[axis], other = (self.inner[axis], carried) if at_r else (carried, self.inner[axis])
+        back[axis], other = (self.inner[axis], carried[axis]) if at_r else (carried[axis], self.inner[axis])
         self.carried = (back[0], back[1], back[2])
         if at_r or not block.known[axis]:
             self.fixed[axis] = self.doubtful[axis] = False
