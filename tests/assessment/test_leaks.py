@@ -17,7 +17,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.recording.cycles import Cycle, find_cycles, whole
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recording.starts import COLD, Start
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,8 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     (overall,) = study.assess(models, [long]).overall()
     assert overall.learned == 800
     assert overall.row.tolist() == list(range(800, 1600))
-    assert overall.accepted
+    assert overall.word == "unproven"  # its level is that of the rows that were learned
+    assert overall.reason.startswith("judged on one stretch that goes on from what was learned")
     assert overall.reason.endswith("; 800 of 1,600 rows were learned from: left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]
@@ -164,3 +165,22 @@ def test_two_files_that_share_rows_are_refused_with_both_names(recording: Record
         compare(samples, ["ols"], splits.leave_one_file_out(samples))
     apart = samples_of(recording, replace(small_machine(DAY, seed=5), name="other"))
     assert compare(apart, ["ols"], splits.leave_one_file_out(apart), robustness=False).overall()
+
+
+def test_what_goes_on_from_a_file_that_was_learned_is_a_stretch(models: tuple[ErrorModel, ...]) -> None:
+    day = replace(small_machine(DAY, seed=5), name="day")
+    (alone,) = study.assess(models, [day]).overall()
+    assert alone.accepted
+    (goes_on,) = study.assess(models, [day], starts=Start("continued", "stated", (small_machine(),), 60.0)).overall()
+    assert not goes_on.accepted
+    assert "stretch" in " ".join(goes_on.verdict.caps)
+
+
+def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> None:
+    one = small_machine((2000.0,), seed=5)
+    copies = [replace(one, name="a"), of(one.table.drop(index=50), one, "b"), of(one.table.drop(index=77), one, "c")]
+    (overall,) = study.assess(models, copies, starts=COLD).overall()
+    assert overall.word == "unproven"
+    assert overall.reason == (
+        "only 1 of 3 units are not alike, at least 3 are needed; record cycles at other speeds or on other days"
+    )

@@ -107,3 +107,19 @@ def test_a_plateau_is_never_accepted() -> None:
     result = compare(samples, ["ols", "mra", "dynamic"], splits.parse("0.75/0.25", samples), robustness=False)
     assert {a.word for a in result.overall()} == {"unproven"}
     assert all("does not move" in a.reason for a in result.overall())
+
+
+@pytest.mark.parametrize("methods", [("arx", "ols", "dynamic"), ("dynamic", "ols", "arx")])
+@pytest.mark.parametrize("left", [0, 13])
+def test_a_cycle_with_few_readings_decides_nothing(methods: tuple[str, ...], left: int) -> None:
+    machine = small_machine(SIX)
+    z = machine.table["z_um"].to_numpy().copy()
+    z[400 + left : 600] = np.nan
+    samples = of(changed(machine, z_um=z))
+    result = compare(samples, methods, splits.leave_one_cycle_out(samples), robustness=False)
+    (found,) = result.recommended
+    assert found.method == "dynamic"
+    assert len(found.chosen) == 5
+    for a in result.overall():
+        assert len(a.verdict.units) == 5
+        assert not a.failure

@@ -12,6 +12,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 
 def test_rows(samples: Samples) -> None:
@@ -110,10 +111,18 @@ def test_days() -> None:
     stamped = replace(small_machine(), start="2026-03-01T16:30:00+01:00")
     samples = stack([stamped], ["z_um"])
     judging = splits.leave_one_day_out(samples)
-    midnight = int(np.searchsorted(samples.time, 7.5 * 3600.0))
     assert [s.block for s in judging.splits] == ["day 2026-03-01", "day 2026-03-02"]
-    assert [int(s.judge.sum()) for s in judging.splits] == [midnight, len(samples) - midnight]
+    assert [int(s.judge.sum()) for s in judging.splits] == [600, 200]  # a cycle belongs to the day it begins on
     for s in judging.splits:
         assert (s.learn ^ s.judge).all()
     with pytest.raises(InputError, match="at least two days"):
         splits.leave_one_day_out(stack([replace(stamped, start="2026-03-01T00:00:00")], ["z_um"]))
+
+
+def test_midnight_makes_no_units() -> None:
+    tests = [replace(small_machine((n,), seed=k), start=f"2024-03-0{k}T22:20") for k, n in ((1, 2500.0), (5, 1500.0))]
+    assert len(splits.leave_one_day_out(stack(tests, ["z_um"], starts=COLD)).splits) == 2
+    # one cycle of several days can be cut by nothing else
+    long = small_machine((1000.0, 2500.0, 1800.0, 3000.0) * 3)
+    one = replace(long, cycles=(Cycle("whole test", 0, len(long)),), start="2024-03-01T22:20")
+    assert len(splits.leave_one_day_out(stack([one], ["z_um"])).splits) == 3

@@ -237,3 +237,22 @@ def test_noise_at_the_start_costs_little(shared_data: Path) -> None:
         mean[zeroing] = np.mean(rms)
     assert mean[None] < 4.5
     assert mean[None] < 0.5 * mean[FIRST_READING]
+
+
+def test_the_last_learned_value_of_a_continuation_is_that_of_the_file_before() -> None:
+    a, b, gap = cut(resting(), 300)
+    samples = stack([a, b], [TARGET], starts=[Start(), Start("continued", "stated", (a,), gap)])
+    learn, judged = samples.test == 0, (samples.test == 1) & (samples.cycle >= 0)
+    learned = samples.learned(0, learn, before=int(np.argmax(judged)))
+    assert learned.last == a.table[TARGET].iloc[-1]
+
+
+def test_predict_counts_from_the_zero_that_was_learned() -> None:
+    test = resting()
+    model, table = fitted("ols"), test.to_frame()
+    assert model.zeroing.at_rest > 0
+    samples = stack([test], [TARGET], [i.name for i in model.inputs], zeroing=model.zeroing, starts=Start())
+    wanted = replay(model, samples, np.ones(len(samples), np.bool_))[0]
+    assert np.allclose(model.predict(table), wanted, atol=1e-9)
+    twice = np.r_[model.predict(table), model.predict(table)]
+    assert np.array_equal(model.predict(type(table)(np.vstack([table, table]), columns=table.columns)), twice)

@@ -7,9 +7,11 @@ import numpy as np
 from smallmachine import small_machine
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import compare
+from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
 from thermocomp.recording.sound import sound
+from thermocomp.recording.starts import Start
 
 
 def spoiled(column: str, rows: slice, by: float, recording: Recording | None = None) -> Recording:
@@ -67,3 +69,28 @@ def test_assess_leaves_trouble_out_too() -> None:
     (a,) = study.assess(models, [spoiled("z_um", slice(50, 800, 150), 4300.0, day)]).overall()
     assert len(a.measured) == 800 - 5
     assert a.word == "accepted"
+
+
+def test_trouble_of_a_file_that_a_test_goes_on_from_does_not_become_its_zero() -> None:
+    whole = small_machine()
+    rows = slice(0, 400), slice(400, 800)
+    a, b = (
+        replace(
+            whole,
+            name=name,
+            time=whole.time[r] - whole.time[r][0],
+            table=whole.table.iloc[r].reset_index(drop=True),
+            cycles=(Cycle(name, 0, 400),),
+        )
+        for name, r in zip("ab", rows, strict=True)
+    )
+    values = a.table["t1_C"].to_numpy().copy()
+    values[:12] = 85.0
+    bad = replace(a, table=a.table.assign(t1_C=values))
+
+    def zero(earlier: Recording) -> float:
+        starts = Start("continued", "stated", (earlier,), 60.0)
+        samples = sound(stack([b], ["z_um"], starts=starts), [b])
+        return float(samples.reference()[0, 0])
+
+    assert abs(zero(bad) - zero(a)) < 1.0

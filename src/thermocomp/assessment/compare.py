@@ -83,36 +83,39 @@ def compare(
     refuse_leaks(samples, judging)
     names = expand(methods)
     rules.check(names)
-    alike = _alike(samples, judging)
-    targets, n = range(len(samples.targets)), len(judging.splits)
-    pieces = [(k, name, split) for k in targets for name in names for split in judging.splits]
+    capped = alike(samples, judging)
+    by_target = [readable(samples, k, judging) for k in range(len(samples.targets))]
+    pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
     work = (
         delayed(_assess_method)(samples, name, k, split, rules, support, robustness, limits)
         for k, name, split in pieces
     )
     scores: dict[int, dict[str, list[list[float]]]] = {}
-    inners = _inners(names, judging, rules)
+    inners = [_inners(names, own, rules) for own in by_target]
     try:
         for a in Parallel(n_jobs=jobs, return_as="generator")(work):
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
-        scores = _scores(samples, names, judging, inners, jobs, progress)
+        scores = _scores(samples, names, by_target, inners, jobs, progress)
     except KeyboardInterrupt:
-        if len(done) < n:
+        if len(done) < len(by_target[0].splits):
             raise
-    whole = len(done) // n  # a method that was judged on some of the blocks only is left out
-    parts = [done[k * n : (k + 1) * n] for k in range(whole)]
+    parts: dict[tuple[int, str], list[Assessment]] = {}
+    for (k, name, _), a in zip(pieces, done, strict=False):
+        parts.setdefault((k, name), []).append(a)
+    # a method that was judged on some of the blocks only is left out
+    parts = {key: p for key, p in parts.items() if len(p) == len(by_target[key[0]].splits)}
     found: list[Assessment] = []
     recommended: list[Recommendation] = []
-    for k in targets:
-        mine = {p[0].model: p for p in parts if p[0].target == samples.targets[k].name}
+    for k, target in enumerate(samples.targets):
+        mine = {p[0].model: p for (of, _), p in parts.items() if of == k}
         if not mine:
             continue
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
-        best = recommend(samples.targets[k].name, list(scores[k]), verdicts, scores[k], inners) if k in scores else None
+        best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
-        whole_of = {name: harm.together(v, caps=alike) for name, v in verdicts.items()}
+        whole_of = {name: harm.together(v, caps=capped) for name, v in verdicts.items()}
         after = corrected(whole_of, rules.primary, best)
         for name, p in mine.items():
             found += p if len(p) > 1 else []
@@ -124,7 +127,7 @@ def compare(
         judging,
         tuple(found),
         heat,
-        left=len(pieces) // n - whole,
+        left=len(names) * len(by_target) - len(parts),
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
     )
@@ -139,19 +142,17 @@ def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]
 def _scores(
     samples: Samples,
     names: Sequence[str],
-    judging: Judging,
-    inners: Sequence[Inner],
+    by_target: Sequence[Judging],
+    inners: Sequence[Sequence[Inner]],
     jobs: int,
     progress: Callable[[str], None],
 ) -> dict[int, dict[str, list[list[float]]]]:
     """Return the inner scores per target and method that may be chosen."""
-    if not inners:
-        return {}
     kept = [name for name in names if deployable(name)]
-    pieces = [(k, name, inner) for k in range(len(samples.targets)) for name in kept for inner in inners]
-    work = (delayed(score)(samples, name, k, judging, inner) for k, name, inner in pieces)
+    pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
+    work = (delayed(score)(samples, name, k, by_target[k], inner) for k, name, inner in pieces)
     found: dict[int, dict[str, list[list[float]]]] = {
-        k: {name: [] for name in kept} for k in range(len(samples.targets))
+        k: {name: [] for name in kept} for k, own in enumerate(inners) if own
     }
     results = Parallel(n_jobs=jobs, return_as="generator")(work)
     for (k, name, inner), values in zip(pieces, results, strict=True):
@@ -173,8 +174,29 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
     int
     """
     names = expand(methods)
-    inner = len(_inners(names, judging, rules)) * sum(deployable(n) for n in names)
-    return len(samples.targets) * (len(names) * len(judging.splits) + inner)
+    by_target = [readable(samples, k, judging) for k in range(len(samples.targets))]
+    choices = sum(deployable(name) for name in names)
+    return sum(len(names) * len(own.splits) + choices * len(_inners(names, own, rules)) for own in by_target)
+
+
+def readable(samples: Samples, target: int, judging: Judging) -> Judging:
+    """Return a judgement without the blocks in which a target has too few readings to say anything.
+
+    Parameters
+    ----------
+    samples : Samples
+    target : int
+        Index into ``samples.targets``.
+    judging : Judging
+
+    Returns
+    -------
+    Judging
+        With all blocks if there are too few readings in each of them.
+    """
+    known = np.isfinite(samples.deviations[:, target])
+    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= harm.MIN_ROWS)
+    return replace(judging, splits=kept) if kept else judging
 
 
 def judge(
@@ -282,7 +304,7 @@ def _worse(both: Iterable[harm.Unit]) -> harm.Unit:
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
-def _alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
+def alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
     """Return that the units are too alike to count as several, if they are."""
     covered = cover(samples, judging)
     if covered.independent >= harm.MIN_UNITS or covered.units < harm.MIN_UNITS:
@@ -370,7 +392,7 @@ def _failed(samples: Samples, name: str, target: int, split: Split, why: str) ->
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.Verdict(()),
+        verdict=harm.Verdict((), refusal=why),
         sensors=(),
         fit_s=0.0,
         n_effective=float("nan"),

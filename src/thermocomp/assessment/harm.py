@@ -223,6 +223,8 @@ class Verdict:
         """Which test would decide an unproven verdict; empty for the other words."""
         if self.word != "unproven":
             return ""
+        if any("not alike" in cap for cap in self.caps):
+            return "record cycles at other speeds or on other days"
         if self.caps:
             return "judge it by leave-one-cycle-out or leave-one-file-out, on recordings without trouble"
         n = len(self.units)

@@ -164,13 +164,14 @@ def recommend(
     best = np.nanmean(logs, axis=2).argmin(axis=0)
     chosen = tuple(methods[k] for k in best)
     judged = [parts[name][u] for u, name in enumerate(chosen)]
-    outer = [np.mean([_log(v) for v in parts[name]]) for name in methods]
+    outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
     return Recommendation(target, methods[int(np.argmin(outer))], chosen, harm.together(judged, about="the choice"))
 
 
 def _log(verdict: harm.Verdict) -> float:
+    """Return a method's logarithm of the error on a unit; infinite if it failed, nan if there was too little to see."""
     if not verdict.units:
-        return np.inf
+        return np.inf if verdict.refusal else np.nan
     return float(np.mean([np.log(max(u.rms, harm.NO_NOISE)) for u in verdict.units]))
 
 

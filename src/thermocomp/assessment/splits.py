@@ -13,6 +13,10 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 
+#: [s]
+DAY = 86400.0
+
+
 @dataclass(frozen=True, eq=False)
 class Split:
     """One training and the unseen block it is judged on.
@@ -184,6 +188,8 @@ def leave_one_file_out(samples: Samples) -> Judging:
 def leave_one_day_out(samples: Samples) -> Judging:
     """Judge on each day in turn, learn from all others; one with too few rows goes with the day before.
 
+    A thermal cycle belongs to the day on which it begins, unless it is longer than a day: then midnight cuts it.
+
     Raises
     ------
     InputError
@@ -197,8 +203,12 @@ def leave_one_day_out(samples: Samples) -> Judging:
             f"leaving one day out: {name} has no time stamps, so nobody knows its days; write date and time into its "
             "time column, or leave out cycles or files"
         )
-    names, day = np.unique(days, return_inverse=True)
     own = samples.cycle >= 0  # not those of earlier files, which tests go on from
+    for k in np.unique(samples.cycle[own]):
+        rows = np.flatnonzero(samples.cycle == k)
+        if samples.time[rows[-1]] - samples.time[rows[0]] <= DAY:
+            days[rows] = days[rows[0]]
+    names, day = np.unique(days, return_inverse=True)
     blocks = stretches(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
     if len(blocks) < 2:
         raise InputError("leaving one day out needs at least two days with recordings")

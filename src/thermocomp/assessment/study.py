@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.assessment import coverage
-from thermocomp.assessment.compare import compare, judge, per_cycle
+from thermocomp.assessment.compare import alike, compare, judge, per_cycle
 from thermocomp.assessment.leaks import learned_from
 from thermocomp.assessment.replay import absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
@@ -24,6 +25,8 @@ from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.sound import sound
 from thermocomp.recording.starts import Start
 from thermocomp.recording.starts import find as find_starts
+
+BoolArray = NDArray[np.bool_]
 
 
 def _silent(_: str) -> None:
@@ -264,15 +267,23 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -
             else f"{n:,} of {of:,} rows were learned from"
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
-    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known)
+    split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     name = model.provenance.method if model.provenance else model.family
-    return replace(
-        judge(name, model, samples, split, rules=rules, limits=limits), overall=True, caveat=caveat, learned=n
-    )
+    found = judge(name, model, samples, split, rules=rules, limits=limits)
+    caps = (*found.verdict.caps, *alike(samples, units(samples, ~known)))
+    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n)
 
 
-def units(samples: Samples) -> Judging:
-    """Return the thermal cycles of recordings as units, those too short joined to the one before."""
+def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
+    """Return whether what is judged goes on from what was learned: its level is that of the learned part."""
+    judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
+    earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
+    return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))
+
+
+def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
+    """Return the thermal cycles of recordings, or of some of their rows, as units; see `stretches`."""
     none = np.zeros(len(samples), dtype=np.bool_)
-    blocks = stretches(samples.cycle, samples.test)
-    return Judging("all cycles", tuple(Split(called(samples, b), none, np.isin(samples.cycle, b)) for b in blocks))
+    cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
+    blocks = stretches(cycle, samples.test)
+    return Judging("all cycles", tuple(Split(called(samples, b), none, np.isin(cycle, b)) for b in blocks))

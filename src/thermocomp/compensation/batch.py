@@ -15,7 +15,7 @@ from thermocomp.compensation import online
 from thermocomp.compensation.limits import limited
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import Gathered, centre, first_rows
+from thermocomp.core.zero import Gathered, begin, centre, first_rows
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -106,13 +106,7 @@ def begun(
     values : ndarray of shape (n_rows, n_inputs)
         With the readings of the zero taken as their mean.
     """
-    zero, rows = model.init(reference).reference, np.flatnonzero(usable)
-    if not rows.size or not np.isnan(zero).any():
-        return zero, values
-    window = rows[: first_rows(model.zeroing, time[rows], resting[rows])[0]]
-    rested = values.copy()
-    rested[window] = centre(values[window])
-    return np.where(np.isnan(zero), rested[window[0]], zero), rested
+    return begin(model.zeroing, model.init(reference).reference, time, values, resting, usable)
 
 
 class _Gate(NamedTuple):

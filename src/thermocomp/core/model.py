@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -18,7 +19,7 @@ from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
 from thermocomp.core.prints import Prints
 from thermocomp.core.validity import Validity
-from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.core.zero import FIRST_READING, Zeroing, begin
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -394,7 +395,9 @@ class ErrorModel(ABC):
             units. A row in which one is missing (nan) is passed over: the deviation before it is held, 0 at the start.
         time : str or array-like of shape (n_rows,), optional
             Time [s], or the name of its column; without it the column ``time_s``. A row that is not later than the one
-            before starts a new test, from rest and from a zero of its own. A model without memory does without.
+            before starts a new test, from rest and from a zero of its own: the mean over its start, see `Zeroing`;
+            whether the spindle stands there is read from its column, if there is one. A model without memory does
+            without; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
             What counts as zero, as in `init`.
 
@@ -418,10 +421,21 @@ class ErrorModel(ABC):
         steps: FloatArray = np.full(n, 1.0) if clock is None else np.diff(clock, prepend=np.inf)
         starts = (steps <= 0).tolist()
         usable: BoolArray = np.all(np.isfinite(values), axis=1)
+        resting = np.zeros(n, dtype=np.bool_)
+        if self.zeroing.speed in table:
+            speed = _column(table, self.zeroing.speed, f"model of {self.target}")
+            resting = np.array([self.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
+        zeros: dict[int, ArrayLike | None] = {0: reference}
+        for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
+            zeros[a] = reference
+            if clock is not None and usable[a:b].any():
+                zeros[a], values[a:b] = begin(
+                    self.zeroing, self.init(reference).reference, clock[a:b], values[a:b], resting[a:b], usable[a:b]
+                )
         found, state, since = np.empty(n), self.init(reference), 0.0
         for k in range(n):
-            if starts[k]:
-                state, since = self.init(reference), 0.0
+            if k in zeros:
+                state, since = self.init(zeros[k]), 0.0
             else:
                 since += float(steps[k]) if np.isfinite(steps[k]) else 0.0
             if usable[k]:

@@ -134,3 +134,35 @@ def centre(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
     off = np.abs(table - np.median(table, axis=0))
     near = off <= FAR * np.median(off, axis=0)
     return np.asarray((np.where(near, table, 0.0)).sum(axis=0) / near.sum(axis=0))
+
+
+def begin(
+    zeroing: Zeroing, zero: FloatArray, time: FloatArray, values: FloatArray, resting: BoolArray, usable: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Find what a test counts from.
+
+    Parameters
+    ----------
+    zeroing : Zeroing
+    zero : ndarray of shape (n_inputs,)
+        What is known of it; nan where the first readings decide.
+    time : ndarray of shape (n_rows,)
+        [s]
+    values : ndarray of shape (n_rows, n_inputs)
+    resting, usable : ndarray of bool of shape (n_rows,)
+        The spindle is known to stand; every input is a number.
+
+    Returns
+    -------
+    zero : ndarray of shape (n_inputs,)
+        nan where it is not known, for there is no reading.
+    values : ndarray of shape (n_rows, n_inputs)
+        With the readings of the zero taken as their mean.
+    """
+    rows = np.flatnonzero(usable)
+    if not rows.size or not np.isnan(zero).any():
+        return zero, values
+    window = rows[: first_rows(zeroing, time[rows], resting[rows])[0]]
+    rested = values.copy()
+    rested[window] = centre(values[window])
+    return np.where(np.isnan(zero), rested[window[0]], zero), rested

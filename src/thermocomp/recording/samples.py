@@ -176,8 +176,8 @@ class Samples:
         rows : ndarray of bool of shape (n_rows,)
             Learned from; those without a number are passed over.
         before : int, optional
-            The last value is that of the last row before this one in its test, 0 without any; without it, that of the
-            last row of all.
+            The last value is that of the last row before this one in its test, or in the files that it goes on from, 0
+            without any; without it, that of the last row of all.
 
         Returns
         -------
@@ -190,7 +190,13 @@ class Samples:
         noise = [probe_noise(y[known & (self.test == k)]) for k in np.unique(self.test[known])]
         candidates = np.flatnonzero(known)
         if before is not None:
-            candidates = candidates[(candidates < before) & (self.test[candidates] == self.test[before])]
+            test = int(self.test[before])
+            mine = candidates[(candidates < before) & (self.test[candidates] == test)]
+            for r in reversed(self.starts[test].earlier if self.starts else ()):  # what it goes on from
+                if not mine.size:
+                    others = [k for k, own in enumerate(self.hashes) if own == r.fingerprint]
+                    mine = candidates[np.isin(self.test[candidates], others)]
+            candidates = mine
         last = float(y[candidates[-1]]) if candidates.size else 0.0
         return Learned(float(y[known].mean()), last, float(np.median(noise)), float(np.abs(y[known]).max()))
 

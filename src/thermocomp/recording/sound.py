@@ -17,7 +17,7 @@ def sound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     ----------
     samples : Samples
     recordings : sequence of Recording
-        What they were stacked of, in their order.
+        What they were stacked of, in their order; the files that they go on from are looked at, too.
 
     Returns
     -------
@@ -27,18 +27,22 @@ def sound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []
     for k, recording in enumerate(recordings):
-        findings = check(recording)
-        mine = np.flatnonzero((samples.test == k) & (samples.cycle >= 0))
-        for name, rows in troubled_rows(recording, findings).items():
-            hit = mine[rows[samples.row[mine]]]
-            for table, channels in ((values, samples.inputs), (deviations, samples.targets)):
-                for j, c in enumerate(channels):
-                    if recording.channel(c.name).name == name:
-                        table[hit, j] = np.nan
-        own = {recording.channel(c.name).name: c.name for c in (*samples.inputs, *samples.targets)}
-        trouble += [
-            (own.get(f.channel, ""), f"{samples.test_names[k]}: {f.channel or 'the recording'} has trouble ({f.kind})")
-            for f in lasting_trouble(findings)
-            if not f.channel or f.channel in own
-        ]
-    return replace(samples, values=values, deviations=deviations, trouble=tuple(trouble))
+        rows = np.flatnonzero(samples.test == k)
+        first = 0
+        for part in (*(samples.starts[k].earlier if samples.starts else ()), recording):
+            mine, first = rows[first : first + len(part)], first + len(part)
+            own = (*samples.inputs, *samples.targets) if part is recording else samples.inputs
+            named = {part.channel(c.name).name: c.name for c in own}
+            findings = check(part)
+            for name, hit in troubled_rows(part, findings).items():
+                for table, channels in ((values, samples.inputs), (deviations, samples.targets)):
+                    for j, c in enumerate(channels):
+                        if named.get(name) == c.name:
+                            table[mine[hit], j] = np.nan
+            called = samples.test_names[k] if part is recording else part.name
+            trouble += [
+                (named.get(f.channel, ""), f"{called}: {f.channel or 'the recording'} has trouble ({f.kind})")
+                for f in lasting_trouble(findings)
+                if not f.channel or f.channel in named
+            ]
+    return replace(samples, values=values, deviations=deviations, trouble=tuple(dict.fromkeys(trouble)))
