@@ -192,6 +192,10 @@ def test_fit_and_compare_go_on(folder: Path, capsys: pytest.CaptureFixture[str])
     assert content["results"][0]["n_rows"] == round(0.4 * (400 - ROW))
     assert run(["compare", b, *study, "--models", "ols", "--start", "rezeroed"]) == 1
     assert "was re-zeroed on a machine that went on from a" in capsys.readouterr().out
+    subsets = ["--target", "z_um", "--method", "subsets", "--jobs", "1"]
+    assert run(["select", b, *subsets]) == 2
+    assert "Say how it begins: --continues EARLIER" in told(capsys)
+    assert run(["select", b, *subsets, "--continues", a]) == 0
 
 
 def test_iso230_says_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -186,6 +186,7 @@ def select(
     study: Study,
     method: SelectionMethod = "pareto",
     settings: Selector = Selector(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
     overwrite: Flag = False,
     json: Json = False,
@@ -204,6 +205,8 @@ def select(
         ace: by maximal correlation (Wessel).
     settings : Settings
         What the methods can be told.
+    beginning : Beginning
+        How the recordings begin.
     output : Path
         Page with tables and figures to write (.html).
     overwrite : bool
@@ -225,7 +228,7 @@ def select(
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".html")
     trouble = tell_trouble(tests)
-    samples = study.samples(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
     # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
     judging = study.judging(samples) if method == "pareto" else Judging("", ())
     with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
