@@ -179,6 +179,18 @@ def test_recordings_come_as_anything(recording: Recording, tmp_path: Path) -> No
         tc.compare(recording, leave_one="week")  # type: ignore[arg-type]
 
 
+def test_tables_tell_their_days() -> None:
+    def table(day: int) -> pd.DataFrame:
+        made = small_machine((1000.0, 2500.0), seed=day).to_frame()
+        stamps = pd.Timestamp(f"2026-03-{27 + day}T08:00", tz="Europe/Berlin") + pd.to_timedelta(
+            made.pop("time_s"), "s"
+        )
+        return made.set_index(pd.DatetimeIndex(stamps))
+
+    found = tc.compare([table(day) for day in range(4)], "z_um", ["ols"], leave_one="day")
+    assert len(found.to_frame(blocks=True)) == 4 + 1
+
+
 def test_trouble_is_told(recording: Recording) -> None:
     table = recording.to_frame()
     table.loc[400:, "t2_C"] = 22.0

@@ -52,6 +52,17 @@ def test_it_is_the_replay() -> None:
     assert expected[-1] > expected[1] > expected[0] == 0
 
 
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_dates_with_a_time_zone(zone: str | None) -> None:
+    """The clock of Berlin is put back between the second row and the third."""
+    t, time = np.array([20.0, 22.0, 23.0, 23.0]), np.array([0.0, 10.0, 40.0, 100.0])
+    stamps = (pd.Timestamp("2026-10-25T00:59:45", tz="UTC") + pd.to_timedelta(time, unit="s")).tz_convert(zone)
+    table = pd.DataFrame({"t": t, "stamp": stamps})
+    ways: list[Any] = [stamps, "stamp", stamps.to_series(), stamps.to_pydatetime().tolist()]
+    for way in ways:
+        assert LAG.predict(table, way).tolist() == LAG.predict(table, time).tolist()
+
+
 def test_a_new_test_starts_anew() -> None:
     t, time = np.array([20.0, 25.0, 30.0, 35.0]), np.array([0.0, 60.0, 0.0, 60.0])
     assert LAG.predict({"t": t}, time)[2:].tolist() == LAG.predict({"t": t[2:]}, time[2:]).tolist()
@@ -85,3 +96,9 @@ def test_what_is_refused() -> None:
         LAG.predict({"t": [1.0]}, [0.0, 1.0])
     with pytest.raises(InputError, match="time must be finite"):
         LAG.predict({"t": [1.0]}, [np.nan])
+    with pytest.raises(InputError, match=r"model of z: column 't' holds something that is no number: .*'warm'"):
+        LAG.predict({"t": ["warm"]}, [0.0])
+    with pytest.raises(InputError, match="column 't' holds something that is no number: found times"):
+        LAG.predict({"t": [np.datetime64("2026-01-01")]}, [0.0])
+    with pytest.raises(InputError, match=r"the time in column 'clock' must be numbers .* or datetimes: .*'noon'"):
+        LAG.predict({"t": [1.0], "clock": ["noon"]}, "clock")

@@ -1,5 +1,6 @@
 """`Recording.from_dataframe`: times, units, cycles, and what is refused."""
 
+from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import stack
 
 TABLE = pd.DataFrame(
     {"time_min": [0.0, 1.0, 2.5], "T1": [20.0, 21.0, np.inf], "drift_mm": [0.0, 0.001, 0.002], "n": [0, 0, 9]}
@@ -53,6 +55,46 @@ def test_ways_to_give_the_time(time: Any) -> None:
     assert Recording.from_dataframe(stamped).time.tolist() == [0.0, 60.0, 150.0]
 
 
+BERLIN = pd.to_datetime(["2026-03-29T01:59:00", "2026-03-29T03:00:00", "2026-03-29T03:01:30"]).tz_localize(
+    "Europe/Berlin"
+)
+AUTUMN = pd.to_datetime(["2026-10-25T00:59:00", "2026-10-25T01:00:00", "2026-10-25T01:01:30"], utc=True)
+
+
+@pytest.mark.parametrize(
+    ("time", "start"),
+    [
+        (BERLIN, "2026-03-29T01:59:00+01:00"),
+        (BERLIN.to_series(), "2026-03-29T01:59:00+01:00"),
+        (BERLIN.to_pydatetime(), "2026-03-29T01:59:00+01:00"),
+        (AUTUMN.tz_convert("Europe/Berlin"), "2026-10-25T02:59:00+02:00"),
+        (AUTUMN.tz_localize(None), "2026-10-25T00:59:00"),
+        (AUTUMN.tz_localize(None).to_pydatetime().tolist(), "2026-10-25T00:59:00"),
+        ([timedelta(), timedelta(minutes=1), timedelta(minutes=2.5)], ""),
+    ],
+    ids=["index", "series", "zoned", "clock put back", "plain", "list", "timedeltas"],
+)
+def test_dates_are_kept(time: Any, start: str) -> None:
+    """Seconds pass as in UTC, whatever the clock on the wall did."""
+    table = TABLE.drop(columns="time_min")
+    found = [
+        Recording.from_dataframe(table, time=time),
+        Recording.from_dataframe(table.assign(stamp=list(time)), time="stamp"),
+        Recording.from_dataframe(table.set_index(pd.Index(time))),
+    ]
+    for r in found:
+        assert r.time.tolist() == [0.0, 60.0, 150.0]
+        assert r.start == start
+
+
+def test_days_of_tables() -> None:
+    begin = pd.Timestamp("2026-01-01T23:30", tz="Europe/Berlin")
+    stamps = pd.date_range(begin, periods=60, freq="min")
+    table = pd.DataFrame({"t_C": np.arange(60.0), "z_um": np.arange(60.0)}, index=stamps)
+    samples = stack([Recording.from_dataframe(table)], ["z_um"])
+    assert np.unique(samples.days()).astype(str).tolist() == ["2026-01-01", "2026-01-02"]
+
+
 def test_cycles() -> None:
     labelled = TABLE.assign(cycle=["a", "a", "b"], day=[1, 2, 2])
     assert [c.name for c in Recording.from_dataframe(labelled).cycles] == ["a", "b"]
@@ -76,6 +118,9 @@ def test_there_and_back(recording: Recording) -> None:
         (TABLE, {"time": "clock"}, InputError, "no column is named 'clock'"),
         (TABLE, {"time": [1, 2]}, InputError, "want 3 values"),
         (TABLE, {"time": [0, 2, 1]}, RecordingError, "time does not rise at row 2"),
+        (TABLE, {"time": [BERLIN[0], pd.NaT, BERLIN[2]]}, RecordingError, "time is missing in row 1"),
+        (TABLE, {"time": [BERLIN[0], pd.Timestamp(0), 3]}, RecordingError, "neither a number nor a datetime"),
+        (TABLE, {"time": list("abc")}, RecordingError, "neither a number nor a datetime"),
         (TABLE, {"time": [0, np.nan, 1]}, RecordingError, "time is missing in row 1"),
         (TABLE, {"units": {"T9": "degC"}}, InputError, "units tells of 'T9'"),
         (TABLE, {"units": {"T1": "degX"}}, UnitError, "unknown unit 'degX'"),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.instants import seconds
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
 from thermocomp.core.prints import Prints
@@ -394,10 +395,10 @@ class ErrorModel(ABC):
             A DataFrame, or anything that gives a column by its name; columns of the same names as `inputs`, in their
             units. A row in which one is missing (nan) is passed over: the deviation before it is held, 0 at the start.
         time : str or array-like of shape (n_rows,), optional
-            Time [s], or the name of its column; without it the column ``time_s``. A row that is not later than the one
-            before starts a new test, from rest and from a zero of its own: the mean over its start, see `Zeroing`;
-            whether the spindle stands there is read from its column, if there is one. A model without memory does
-            without; then the first row is the zero.
+            Time: numbers [s], or datetimes with or without a time zone; or the name of its column; without it the
+            column ``time_s``. A row that is not later than the one before starts a new test, from rest and from a zero
+            of its own: the mean over its start, see `Zeroing`; whether the spindle stands there is read from its
+            column, if there is one. A model without memory does without; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
             What counts as zero, as in `init`.
 
@@ -409,9 +410,9 @@ class ErrorModel(ABC):
         Raises
         ------
         InputError
-            A column is missing, or the time of a model with a memory.
+            A column is missing or holds something that is no number; or the time is missing for a model with a memory.
         """
-        columns = [_column(table, i.name, f"model of {self.target}") for i in self.inputs]
+        columns = [_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
         clock = self._clock(table, time)
         n = len(columns[0]) if columns else len(clock) if clock is not None else _rows(table)
         for name, values in [*zip((i.name for i in self.inputs), columns, strict=True), ("the time", clock)]:
@@ -454,11 +455,13 @@ class ErrorModel(ABC):
                     "column or an array, or as a column time_s"
                 )
             return None
-        given = _column(table, time, f"model of {self.target}") if isinstance(time, str) else time
-        clock: NDArray[Any] = np.asarray(given)
-        if clock.dtype.kind in "mM":
-            clock = (clock - clock[:1]) / np.timedelta64(1, "s")
-        clock = np.asarray(clock, dtype=np.float64)
+        owner = f"model of {self.target}"
+        given = _column(table, time, owner) if isinstance(time, str) else np.asarray(time)
+        try:
+            clock = seconds(given)
+        except (TypeError, ValueError) as e:
+            named = f"the time in column {time!r}" if isinstance(time, str) else "the time"
+            raise InputError(f"{owner}: {named} must be numbers [s] or datetimes: {e}") from e
         if not np.isfinite(clock).all():
             raise InputError(f"model of {self.target}: the time must be finite numbers")
         return clock
@@ -540,10 +543,19 @@ def check_finite(owner: str, **numbers: Any) -> None:
 
 def _column(table: Columns, name: str, owner: str) -> NDArray[Any]:
     try:
-        values = np.asarray(table[name])
+        return np.asarray(table[name])
     except (KeyError, ValueError, IndexError) as e:
         raise InputError(f"{owner}: the table has no column {name!r}") from e
-    return values if values.dtype.kind in "mM" else values.astype(np.float64)
+
+
+def _numbers(table: Columns, name: str, owner: str) -> FloatArray:
+    values = _column(table, name, owner)
+    try:
+        if values.dtype.kind in "mM":
+            raise TypeError("found times")
+        return values.astype(np.float64)
+    except (TypeError, ValueError) as e:
+        raise InputError(f"{owner}: column {name!r} holds something that is no number: {e}") from e
 
 
 def _rows(table: Columns) -> int:

@@ -1,6 +1,7 @@
 """Recordings from tables that are in memory already."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import Meaning, understand
+from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import unit
 from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
@@ -53,7 +55,7 @@ def from_dataframe(
     labelled = cycles if isinstance(cycles, str) else "cycle" if cycles is None and "cycle" in columns else None
     if labelled is not None and labelled not in columns:
         raise InputError(f"{name}: cycles: no column is named {labelled!r}; there are {', '.join(columns)}")
-    clock, used = _time(plain, time, units, name)
+    clock, start, used = _time(plain, time, units, name)
     data: dict[str, FloatArray] = {}
     aliases: dict[str, str] = {}
     channels, notes = [], []
@@ -76,14 +78,21 @@ def from_dataframe(
     if len(data) < len(channels):
         raise RecordingError(f"{name}: two columns would become the same channel; rename one of them")
     recording = Recording(
-        name, clock, pd.DataFrame(data), tuple(channels), whole(len(clock)), aliases=aliases, notes=tuple(notes)
+        name,
+        clock,
+        pd.DataFrame(data),
+        tuple(channels),
+        whole(len(clock)),
+        start=start,
+        aliases=aliases,
+        notes=tuple(notes),
     )
     labels = plain[labelled].tolist() if labelled is not None else cycles
     return recording.with_cycles(_cycles(recording, labels))
 
 
-def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str | None]:
-    """Return the time since the first row [s], and the column it was taken from."""
+def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str, str | None]:
+    """Return the time since the first row [s], the first row's time stamp, and the column it was taken from."""
     used = None
     symbol = "s"
     if given is None:
@@ -106,15 +115,18 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
     values = np.asarray(given)
     if values.shape != (len(table),):
         raise InputError(f"{name}: time: want {len(table)} values, found an array of shape {values.shape}")
-    if values.dtype.kind in "mM":
-        seconds = (values - values[0]) / np.timedelta64(1, "s")
-    else:
-        scaled = _numbers(values, f"{name}: the time") * unit(symbol, "time").scale
-        seconds = scaled - scaled[0]
-    wrong = np.flatnonzero(~np.isfinite(seconds))
+    try:
+        passed = seconds(values)
+    except (TypeError, ValueError) as e:
+        raise RecordingError(f"{name}: the time holds something that is neither a number nor a datetime: {e}") from e
+    wrong = np.flatnonzero(~np.isfinite(passed))
     if wrong.size:
         raise RecordingError(f"{name}: the time is missing in row {wrong[0]}")
-    return np.asarray(seconds, dtype=np.float64), used
+    first = values[0]
+    if isinstance(first, datetime | np.datetime64):
+        return passed, pd.Timestamp(first).isoformat(), used
+    scale = 1.0 if isinstance(first, timedelta | np.timedelta64) else unit(symbol, "time").scale
+    return (passed - passed[0]) * scale, "", used
 
 
 def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:

@@ -87,8 +87,9 @@ class Recording:
             A column is a channel if its heading has a unit (``t1_C``, ``drift_um``, ``spindle_rpm``) or `units` tells
             it; what is left out is told in `notes`.
         time : str or array-like of shape (n_rows,), optional
-            Name of a column, or the time of each row: numbers (seconds without a unit), datetimes or timedeltas.
-            Without it the one column of times, such as ``time_s``, or an index of times.
+            Name of a column, or the time of each row: numbers (seconds without a unit), datetimes with or
+            without a time zone (the first is kept as `start`), or timedeltas. Without it the one column of times, such
+            as ``time_s``, or an index of times.
         units : mapping of str to str, optional
             Column to unit, such as ``{"T1": "degC", "Z": "um"}``.
         cycles : str or sequence of object of shape (n_rows,), optional
