@@ -160,8 +160,99 @@ def test_one_number_per_row_or_none() -> None:
         def predict(self, X: ArrayLike) -> FloatArray:
             return np.zeros(3)
 
-    with pytest.raises(InputError, match=r"Wrong: predict gave an array of shape \(3,\) for 20 rows"):
+    with pytest.raises(FitError, match=r"Wrong: predict gave an array of shape \(3,\) for 20 rows"):
         ForeignRegressor(Wrong()).fit(np.eye(20), np.ones(20)).predict(np.eye(20))
+
+
+class Unfit(Plane):
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Plane:
+        raise TypeError("no table")
+
+
+class Unasked(Plane):
+    def predict(self, X: ArrayLike) -> FloatArray:
+        raise KeyError("t9_C")
+
+
+class Nothing(Plane):
+    def predict(self, X: ArrayLike) -> FloatArray:
+        return np.asarray(np.where(np.arange(len(np.asarray(X))) == 3, np.nan, super().predict(X)))
+
+
+class Short(Plane):
+    def predict(self, X: ArrayLike) -> FloatArray:
+        return super().predict(X)[:-1]
+
+
+class Text(Plane):
+    def predict(self, X: ArrayLike) -> Any:
+        return ["warm"] * len(np.asarray(X))
+
+
+class Transposed(Plane):
+    def predict(self, X: ArrayLike) -> FloatArray:
+        return super().predict(X)[None]
+
+
+class Stubborn(Plane):
+    def __init__(self, slopes: Any = ()) -> None:
+        self.slopes = list(slopes)  # scikit-learn cannot copy it
+
+
+class Delicate(Plane):
+    """Fails where it is warmer than ever: on what noise makes of the inputs."""
+
+    def __init__(self, highest: float = 0.0) -> None:
+        self.highest = highest
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        if np.asarray(X)[:, :3].max() > self.highest:
+            raise ArithmeticError("too warm")
+        return super().predict(X)
+
+
+class FrozenNan(Deployable, Nothing):
+    """One with a `freeze` of its own."""
+
+
+@pytest.mark.parametrize(
+    ("thing", "message"),
+    [
+        (Unfit(), "Unfit cannot be fitted to z_um: TypeError: no table"),
+        (Unasked(), "Unasked cannot predict: KeyError: 't9_C'"),
+        (Nothing(), "Nothing predicts nan in 1 of"),
+        (Short(), "Short: predict gave an array of shape"),
+        (Text(), "Text predicts no numbers: could not convert string"),
+        (Transposed(), r"Transposed: predict gave an array of shape (1, "),
+        (Stubborn(), "Stubborn cannot be fitted to z_um: RuntimeError: Cannot clone"),
+        (FrozenNan(), "FrozenNan predicts nan in 1 of"),
+    ],
+    ids=lambda x: type(x).__name__ if isinstance(x, BaseEstimator) else "",
+)
+def test_what_fails_costs_no_one_else_the_result(thing: Any, message: str, samples: Samples) -> None:
+    found = compare(samples, ["ols", thing], splits.leave_one_cycle_out(samples), robustness=False).overall()
+    ours, theirs = (a for a in found if a.target == "z_um")
+    assert not ours.failure
+    assert message in theirs.failure
+    assert theirs.word == "refused"
+
+
+def test_what_fails_with_noise_costs_no_one_else_the_result(samples: Samples) -> None:
+    highest = samples.change()[:, :3].max()
+    judging, wide = splits.leave_one_cycle_out(samples), Support(margin=1e6)
+    found = compare(samples, ["ols", Delicate(highest)], judging, support=wide).overall()
+    ours, theirs = (a for a in found if a.target == "z_um")
+    assert not ours.failure
+    assert theirs.failure == "Delicate cannot predict: ArithmeticError: too warm"
+
+
+def test_the_keyboard_stops_it(samples: Samples) -> None:
+    class Stopped(Plane):
+        def fit(self, X: ArrayLike, y: ArrayLike) -> Plane:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(Stopped(), samples, 0, samples.valid)
 
 
 # -- pipelines that freeze ---------------------------------------------------------------------------------------------

@@ -362,21 +362,20 @@ def _assess_method(
     try:
         told = robustness or support.policy != "clip"
         trained = train(name, samples, target, split.learn, support=support, joint=told)
-    except FitError as e:
+        first = int(np.argmax(split.judge))
+        return judge(
+            name,
+            trained.model,
+            samples,
+            split,
+            learned=samples.learned(target, split.learn & samples.valid, before=first),
+            rules=rules,
+            fit_s=trained.seconds,
+            robustness=robustness,
+            limits=limits,
+        )
+    except FitError as e:  # also of one that can be fitted, and fails on what noise makes of its inputs
         return _failed(samples, name, target, split, str(e))
-    first = int(np.argmax(split.judge))
-    learned = samples.learned(target, split.learn & samples.valid, before=first)
-    return judge(
-        name,
-        trained.model,
-        samples,
-        split,
-        learned=learned,
-        rules=rules,
-        fit_s=trained.seconds,
-        robustness=robustness,
-        limits=limits,
-    )
 
 
 def _failed(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:

@@ -4,6 +4,7 @@ import codecs
 import math
 from collections.abc import Mapping as AbstractMapping
 from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -40,7 +41,8 @@ class TimeColumn:
     format : str
         How timestamps are written, in the letters of `datetime.strptime`; empty: ISO 8601.
     start : str
-        ISO timestamp of the first row, for files that hold only relative times.
+        ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
+        file goes on from another.
     """
 
     column: str = ""
@@ -155,6 +157,7 @@ class Mapping:
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
             _unit_in("[time]", self.time.unit, "time")
+        _check_start(self.time.start)
         for name, column in self.columns.items():
             table = f"[columns.{name}]"
             _unit_in(table, column.unit, column.role if column.role in HOUSE_UNITS else None)
@@ -253,6 +256,17 @@ def _unit_in(table: str, symbol: str, quantity: str | None) -> None:
             unit(symbol, quantity)
     except UnitError as e:
         raise UnitError(f"{table}: {e}") from e
+
+
+def _check_start(stamp: str) -> None:
+    try:
+        if stamp:
+            datetime.fromisoformat(stamp)
+    except ValueError as e:
+        raise InputError(
+            f"[time]: start = {stamp!r} is no ISO timestamp: write year, month, day and time of day, such as "
+            '"2024-03-01T08:00:00" or, with its offset from UTC, "2024-03-01T08:00:00+01:00"'
+        ) from e
 
 
 def _check_encoding(name: str) -> None:

@@ -296,6 +296,8 @@ def _described(text: str, source: Path) -> Mapping:
             f"{source}: thermocomp's own description of the columns is damaged ({e.errors()[0]['msg']}); delete the "
             "first line, or give a mapping and write the file anew"
         ) from e
+    except InputError as e:
+        raise type(e)(f"{source}: {e}") from e
 
 
 def _labels(cells: pd.DataFrame, columns: Plan, table: Table, source: Path) -> list[Any] | None:

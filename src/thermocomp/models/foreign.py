@@ -1,5 +1,7 @@
 """Regressors of others: any of scikit-learn's, or a small class of one's own, judged beside the methods."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,7 @@ from sklearn.base import BaseEstimator, clone, is_regressor
 from sklearn.pipeline import Pipeline
 from sklearn.utils.validation import validate_data
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import FitError, InputError, ThermocompError
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.pipelines import PipelineRegressor, freezes
 from thermocomp.models.timed import TimedRegressor
@@ -75,19 +77,73 @@ class ForeignRegressor(UnfrozenRegressor):
 
         Raises
         ------
-        InputError
-            It does not give one number per row.
+        FitError
+            It raises, or does not give a finite number per row.
         """
-        found = np.asarray(self.estimator_.predict(self._table(change)), dtype=np.float64)
-        if found.size != len(change):
-            raise InputError(f"{self.name}: predict gave an array of shape {found.shape} for {len(change)} rows")
-        return found.reshape(len(change))
+        with refused(f"{self.name} cannot predict"):
+            found = self.estimator_.predict(self._table(change))
+        return numbers(found, len(change), self.name)
 
     def _table(self, change: FloatArray) -> FloatArray | pd.DataFrame:
         return pd.DataFrame(change, columns=self._names()) if hasattr(self, "feature_names_in_") else change
 
     def _bulk(self) -> str:
         return "it is no method of thermocomp and has no 'freeze'"
+
+
+@contextmanager
+def refused(what: str) -> Iterator[None]:
+    """Make a `FitError` of whatever an estimator raises, so that it costs no other one its result.
+
+    Errors of thermocomp's own pass: they tell what to set otherwise.
+
+    Parameters
+    ----------
+    what : str
+        What it cannot do, such as ``Ridge cannot be fitted to z_um``.
+
+    Raises
+    ------
+    FitError
+        Something else was raised.
+    """
+    try:
+        yield
+    except ValueError as e:  # what scikit-learn raises for data it cannot use: the text says it all
+        raise FitError(f"{what}: {e}") from e
+    except ThermocompError:
+        raise
+    except Exception as e:
+        raise FitError(f"{what}: {type(e).__name__}: {e}") from e
+
+
+def numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
+    """Return what was predicted as one finite number per row.
+
+    Parameters
+    ----------
+    predicted : array-like of shape (n_rows,) or (n_rows, 1)
+    n_rows : int
+    name : str
+        Of the method.
+
+    Returns
+    -------
+    ndarray of shape (n_rows,)
+
+    Raises
+    ------
+    FitError
+        It is not that.
+    """
+    with refused(f"{name} predicts no numbers"):
+        found = np.asarray(predicted, dtype=np.float64)
+    if found.shape not in ((n_rows,), (n_rows, 1)):
+        raise FitError(f"{name}: predict gave an array of shape {found.shape} for {n_rows} rows")
+    wrong = np.flatnonzero(~np.isfinite(found))
+    if wrong.size:
+        raise FitError(f"{name} predicts {found.flat[wrong[0]]:g} in {wrong.size} of {n_rows} rows")
+    return found.reshape(n_rows)
 
 
 def adopted(estimator: Any) -> Any:

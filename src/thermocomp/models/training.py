@@ -18,7 +18,7 @@ from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import cover
-from thermocomp.models.foreign import adopted, title
+from thermocomp.models.foreign import adopted, numbers, refused, title
 from thermocomp.models.methods import Method, Named, given, method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
@@ -103,7 +103,7 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
     Raises
     ------
     FitError
-        Too few rows, or the method cannot be fitted to them.
+        Too few rows, or the method cannot be fitted to them, or does not give a finite number per row.
     """
     own = name.estimator if isinstance(name, Named) else None if isinstance(name, str) else adopted(name)
     how = (
@@ -122,7 +122,8 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
         )
     _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
-    estimator = how.build(speeds) if own is None else clone(own)
+    with refused(f"{how.name} cannot be fitted to {channel.name}"):
+        estimator = how.build(speeds) if own is None else clone(own)
     if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
         estimator.set_params(speed=speeds)  # the recording knows which inputs are
     frame = samples.frame().iloc[:, list(columns)]
@@ -134,14 +135,14 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
     driven = samples.take(rows)
     clock: dict[str, Any] = {"dt": pd.Series(driven.dt())} if "dt" in how.takes else {}
     cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
-    try:
+    with refused(f"{how.name} cannot be fitted to {channel.name}"):
         estimator.fit(frame.iloc[rows], y, **clock, **cycles)
-    except ValueError as e:  # what scikit-learn raises for data it cannot use
-        raise FitError(f"{how.name} cannot be fitted to {channel.name}: {e}") from e
     seconds = time.perf_counter() - begin
     everywhere: dict[str, Any] = {"dt": pd.Series(samples.take(valid).dt())} if "dt" in how.takes else {}
     predicted = np.full(len(samples), np.nan)
-    predicted[valid] = estimator.predict(frame.iloc[valid], **everywhere)
+    with refused(f"{how.name} cannot predict {channel.name}"):
+        found = estimator.predict(frame.iloc[valid], **everywhere)
+    predicted[valid] = numbers(found, int(valid.sum()), how.name)
     return Fitted(how, estimator, columns, seen, seconds, predicted)
 
 
