@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from thermocomp.models.sensors import SensorSelector
     from thermocomp.models.subsets import BestSubset
     from thermocomp.recording.recording import Recording
+    from thermocomp.recording.starts import Start
 
 __version__ = version("thermocomp")
 
@@ -54,6 +55,7 @@ _PUBLIC = {
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recording.recording",
+    "Start": "thermocomp.recording.starts",
     # what runs at the machine
     "Correction": "thermocomp.core.correction",
     "Deviation": "thermocomp.core.correction",
@@ -114,6 +116,7 @@ __all__ = [
     "SensorSelector",
     "SigmoidNet",
     "SklearnNet",
+    "Start",
     "StepwiseMRA",
     "ThermocompError",
     "__version__",

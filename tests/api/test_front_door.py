@@ -11,7 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.ensemble import HistGradientBoostingRegressor
+from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.pipeline import make_pipeline
 
 import thermocomp as tc
@@ -113,6 +113,76 @@ def test_comparison(results: dict[str, Result], tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no dynamic for z_um; there are ols for z_um"):
         found.plot("z_um", "dynamic")
     assert "<svg" in found.report(tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_verdict_is_that_of_the_command(recording: Recording) -> None:
+    samples = stack([recording], ["z_um", "x_um"])
+    ours = own_compare(samples, ["ols", "dynamic"], splits.leave_one_cycle_out(samples)).overall()
+    table = tc.compare(recording, ["z_um", "x_um"], ["ols", "dynamic"]).to_frame().set_index(["target", "model"])
+    assert [(a.word, a.reason) for a in ours] == [
+        tuple(table.loc[(a.target, str(a.model)), ["verdict", "reason"]]) for a in ours
+    ]
+    assert ours[0].word == "accepted"
+
+
+def test_nothing_is_accepted_that_was_not_tried_with_noise(recording: Recording) -> None:
+    found = tc.compare(recording, "z_um", "ols", robustness=False)
+    (row,) = found.to_frame().itertuples()
+    assert row.verdict == "unproven"
+    assert row.reason == "noise and lost sensors were not tried: compare with robustness=True"
+    assert found.best == {"z_um": None}
+    assert str(found) == f"No model may run yet for z_um: {row.reason}."
+
+
+def test_one_where_several_may_be(recording: Recording) -> None:
+    alone = tc.compare(recording, "z_um", RandomForestRegressor(2), inputs="t1_C", robustness=False).to_frame()
+    assert alone[["model", "sensors"]].to_numpy().tolist() == [["RandomForestRegressor", 1]]
+    assert tc.training_table(recording, "z_um", inputs="t1_C").X.columns.tolist() == ["t1_C"]
+    with pytest.raises(InputError, match="no model given: name at least one method"):
+        tc.compare(recording, "z_um", [])
+    with pytest.raises(InputError, match="no model given: name a model file"):
+        tc.assess([], recording)
+    with pytest.raises(InputError, match="int is no regressor"):
+        tc.compare(recording, "z_um", 3)
+
+
+def test_fit_and_assess_take_what_the_commands_take(recording: Recording) -> None:
+    tight = tc.Limits(magnitude=5.0)
+    fitted = tc.fit(recording, "z_um", "ols", harm_margin=0.5, limits=tight)
+    (whole,) = fitted.fitted.comparison.overall()
+    other = small_machine((2000.0, 1500.0), seed=3)
+    (judged,) = tc.assess(fitted, other, harm_margin=0.5, limits=tight).judged.overall()
+    for a in (whole, judged):
+        assert a.limits == tight
+        assert {u.margin for u in a.verdict.units} == {0.5}
+    weather = recording.to_frame().rename(columns={"t3_C": "t_ambient_C"})
+    validity = tc.fit(weather, "z_um", "ols", inputs=["t1_C", "t2_C"]).model.validity
+    assert validity is not None
+    assert validity.ambient_channel == "t_ambient_C"  # which no model uses: the recordings tell it
+
+
+def test_how_a_recording_begins(recording: Recording) -> None:
+    before, after = small_machine((1000.0, 2500.0, 2000.0), seed=1), small_machine((3000.0, 1500.0, 2200.0), seed=2)
+    went_on = tc.Start("continued", earlier=(before,), gap=60.0)
+    rezeroed = tc.Start("rezeroed")
+    for starts, words in ((rezeroed, ["rezeroed"]), ([went_on], ["continued"]), (None, ["cold"])):
+        assert [s.word for _, s in tc.compare(after, "z_um", "ols", starts=starts).comparison.starts] == words
+    fitted = tc.fit(after, "z_um", "ols", starts=rezeroed)
+    assert fitted.model.provenance is not None
+    assert fitted.model.provenance.starts == ("rezeroed",)
+    judged = tc.assess(fitted, [after, recording], starts=[rezeroed, tc.Start()]).judged
+    assert [s.word for _, s in judged.starts] == ["rezeroed", "cold"]
+    warm = after.to_frame().assign(z_um=lambda t: t["z_um"] + 50.0)
+    with pytest.raises(InputError, match=r"z_um begins at 49.*In Python: starts=Start"):
+        tc.select(warm, "z_um", "partial-f")
+    assert tc.select(warm, "z_um", "partial-f", starts=rezeroed).sensors["z_um"]
+    for wrong, message in (
+        ([rezeroed], r"starts: 1 for 2 recording\(s\): give one each, or one for all"),
+        (went_on, "starts: 2 recordings cannot all go on from the same files"),
+        ([tc.Start(), tc.Start("continued", earlier=(after,))], "small cannot go on from itself"),
+    ):
+        with pytest.raises(InputError, match=message):
+            tc.compare([before, after], "z_um", "ols", starts=wrong)
 
 
 def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.sound import sound
+from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -25,6 +26,8 @@ IntArray = NDArray[np.intp]
 #: one test, or several
 Given = Recording | str | Path | pd.DataFrame | Sequence["Recording | str | Path | pd.DataFrame"]
 LeaveOne = Literal["cycle", "day", "file"]
+#: how recordings begin: all of them, each of them, or to be found out
+Starts = Start | Sequence[Start] | None
 
 
 def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None) -> Recording:
@@ -84,12 +87,46 @@ def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = 
     return found
 
 
+def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, ...] | None:
+    """Return how each recording begins; None: to be found out.
+
+    Parameters
+    ----------
+    starts : Start or sequence of Start, optional
+        One for all recordings, or one each.
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    tuple of Start or None
+
+    Raises
+    ------
+    InputError
+        They are not as many as the recordings, or one goes on from itself or is told to several.
+    """
+    if starts is None:
+        return None
+    each = (starts,) * len(recordings) if isinstance(starts, Start) else tuple(starts)
+    if len(each) != len(recordings):
+        raise InputError(f"starts: {len(each)} for {len(recordings)} recording(s): give one each, or one for all")
+    if isinstance(starts, Start) and starts.earlier and len(recordings) > 1:
+        raise InputError(
+            f"starts: {len(recordings)} recordings cannot all go on from the same files: give one start each"
+        )
+    for start, r in zip(each, recordings, strict=True):
+        if r.fingerprint in (e.fingerprint for e in start.earlier):
+            raise InputError(f"starts: {r.name} cannot go on from itself: name the file before it in earlier=")
+    return each
+
+
 def samples_of(
     recordings: Sequence[Recording],
     targets: str | Sequence[str] | None,
-    inputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
     *,
     absolute: bool = False,
+    starts: Starts = None,
 ) -> Samples:
     """Stack recordings.
 
@@ -98,8 +135,10 @@ def samples_of(
     recordings : sequence of Recording
     targets : str or sequence of str, optional
         Displacement channels to predict; all of the first recording without it.
-    inputs : sequence of str, optional
+    inputs : str or sequence of str, optional
     absolute : bool
+    starts : Start or sequence of Start, optional
+        How the recordings begin, see `starts_of`.
 
     Returns
     -------
@@ -108,7 +147,9 @@ def samples_of(
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
         named = [c.name for c in recordings[0].displacements]
-    return sound(stack(recordings, named, inputs, rezero=not absolute), recordings)
+    chosen = [inputs] if isinstance(inputs, str) else inputs
+    begun = starts_of(starts, recordings)
+    return sound(stack(recordings, named, chosen, rezero=not absolute, starts=begun), recordings)
 
 
 def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
@@ -187,7 +228,7 @@ def training_table(
     recordings: Given,
     target: str,
     *,
-    inputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
     time: bool = False,
     absolute: bool = False,
     mapping: str | Path | mappings.Mapping | None = None,
@@ -199,7 +240,7 @@ def training_table(
     recordings : Recording, path, DataFrame, or sequence of them
     target : str
         Displacement channel to predict.
-    inputs : sequence of str, optional
+    inputs : str or sequence of str, optional
         Channels to predict from; all temperatures and the spindle speed without it.
     time : bool
         The first column is ``time_s``, for an estimator with ``time="column"``.

@@ -1,16 +1,17 @@
 """The main job in Python: simulate, select, compare, fit, assess. The commands' words are the keywords."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from thermocomp.api.inputs import Given, LeaveOne, judging_of, recordings_of, samples_of, trouble_of
+from thermocomp.api.inputs import Given, LeaveOne, Starts, judging_of, recordings_of, samples_of, starts_of, trouble_of
 from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
 from thermocomp.assessment import compare as comparing
-from thermocomp.assessment import selecting
+from thermocomp.assessment import harm, selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
-from thermocomp.assessment.results import Rules
+from thermocomp.assessment.results import Assessment, Rules
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -57,16 +58,17 @@ def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | N
 def compare(
     recordings: Given,
     targets: str | Sequence[str] | None = None,
-    models: Sequence[Any] = DEFAULT_MODELS,
+    models: Any = DEFAULT_MODELS,
     *,
-    inputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
     split: str | None = None,
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
+    starts: Starts = None,
     mapping: str | Path | Mapping | None = None,
     support: Policy = "clip",
     margin: float = Support.margin,
-    robustness: bool = False,
+    robustness: bool = True,
     primary: str | None = None,
     harm_margin: float | None = None,
     limits: Limits | None = Limits(),
@@ -81,23 +83,28 @@ def compare(
         Each is one test.
     targets : str or sequence of str, optional
         Displacement channels to predict; all of the first recording without it.
-    models : sequence of str or estimator
+    models : str, estimator, or sequence of them
         Names of methods, ``all``, and estimators of any kind: one of thermocomp's with settings of its own, any
         regressor of scikit-learn, a Pipeline, a small class of one's own.
-    inputs : sequence of str, optional
+    inputs : str or sequence of str, optional
         Channels to predict from; all temperatures and the spindle speed without it.
     split : str, optional
         Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
-    leave_one : {'cycle', 'file'}, optional
-        Judge on each thermal cycle in turn, which is done if nothing is said, or on each recording.
+    leave_one : {'cycle', 'day', 'file'}, optional
+        Judge on each thermal cycle in turn, which is done if nothing is said, on each day (the recordings need time
+        stamps), or on each recording.
     absolute : bool
         Take temperatures as they are; without it they are counted from the start of each test.
+    starts : Start or sequence of Start, optional
+        How all recordings begin, or each of them, such as ``Start("continued", earlier=(monday,))``; found out without
+        it. See `thermocomp.recording.starts.Start`.
     mapping : str, Path or Mapping, optional
         What the columns of files are.
     support, margin : str, float
         What the models do outside their trained range, see `thermocomp.core.model.Support`.
     robustness : bool
-        Also replay with noise and lost sensors: a model that they make worse than none is unproven then.
+        Also replay with noise and lost sensors, as ``thermocomp compare`` does: a model that they make worse than none
+        is unproven. Without it, which is quicker, none is accepted.
     primary : str, optional
         Method that is named beforehand, see `thermocomp.assessment.results.Rules`.
     harm_margin : float, optional
@@ -119,11 +126,11 @@ def compare(
         A recording, channel or model cannot be used.
     """
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
     judging = judging_of(samples, split=split, leave_one=leave_one)
     found = comparing.compare(
         samples,
-        [models] if isinstance(models, str) else models,
+        list(models) if isinstance(models, Iterable) and not _single(models) else [models],
         judging,
         rules=Rules(harm_margin, primary),
         support=Support(support, margin),
@@ -132,7 +139,19 @@ def compare(
         jobs=jobs,
         progress=progress,
     )
+    if not robustness:
+        found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
     return Compared(found, tuple(tests), tuple(trouble_of(tests)))
+
+
+def _single(models: Any) -> bool:
+    """Return whether it is one method: a forest of scikit-learn has members to go through, too."""
+    return isinstance(models, str) or hasattr(models, "fit")
+
+
+def _untried(found: Assessment) -> Assessment:
+    """Return an assessment in which nothing is accepted that was not tried with noise and lost sensors."""
+    return replace(found, verdict=replace(found.verdict, caps=(harm.UNTRIED,))) if found.accepted else found
 
 
 def fit(
@@ -140,13 +159,16 @@ def fit(
     targets: str | Sequence[str] | None = None,
     model: Any = "dynamic",
     *,
-    inputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
     split: str | None = None,
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
+    starts: Starts = None,
     mapping: str | Path | Mapping | None = None,
     support: Policy = "clip",
     margin: float = Support.margin,
+    harm_margin: float | None = None,
+    limits: Limits = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> FittedModels:
@@ -158,8 +180,10 @@ def fit(
         As for `compare`.
     model : str or estimator
         A method, or an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
-    inputs, split, leave_one, absolute, mapping, support, margin, jobs, progress
+    inputs, split, leave_one, absolute, starts, mapping, support, margin, harm_margin, jobs, progress
         As for `compare`.
+    limits : Limits
+        Of the compensator that is judged with the models.
 
     Returns
     -------
@@ -171,9 +195,19 @@ def fit(
         A recording, channel or model cannot be used, or the model cannot be frozen.
     """
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
     judging = judging_of(samples, split=split, leave_one=leave_one)
-    found = studies.fit(samples, model, judging, support=Support(support, margin), jobs=jobs, progress=progress)
+    found = studies.fit(
+        samples,
+        model,
+        judging,
+        rules=Rules(harm_margin),
+        support=Support(support, margin),
+        recordings=tests,
+        limits=limits,
+        jobs=jobs,
+        progress=progress,
+    )
     return FittedModels(found, tuple(tests), tuple(trouble_of(tests)))
 
 
@@ -181,7 +215,10 @@ def assess(
     models: ErrorModel | FittedModels | str | Path | Sequence[ErrorModel],
     recordings: Given,
     *,
+    starts: Starts = None,
     mapping: str | Path | Mapping | None = None,
+    harm_margin: float | None = None,
+    limits: Limits = Limits(),
     progress: Callable[[str], None] = _silent,
 ) -> Assessed:
     """Judge frozen models on recordings: per cycle, with noise, with each sensor lost, outside their range.
@@ -190,8 +227,14 @@ def assess(
     ----------
     models : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel
     recordings : Recording, path, DataFrame, or sequence of them
+    starts : Start or sequence of Start, optional
+        How the recordings begin, as for `compare`.
     mapping : str, Path or Mapping, optional
         What the columns of files are.
+    harm_margin : float, optional
+        Harm in a single unit that is let pass, stated before judging [um].
+    limits : Limits
+        Of the compensator that is judged with the models.
     progress : callable
         Called with a line of text per model.
 
@@ -202,7 +245,7 @@ def assess(
     Raises
     ------
     InputError
-        A file or a channel the models need cannot be used.
+        There is no model, or a file or a channel the models need cannot be used.
     """
     if isinstance(models, str | Path):
         models = modelfile.read(models)
@@ -211,7 +254,9 @@ def assess(
     elif isinstance(models, ErrorModel):
         models = (models,)
     tests = recordings_of(recordings, mapping)
-    return Assessed(studies.assess(models, tests, progress=progress), tuple(tests), tuple(trouble_of(tests)))
+    begun = starts_of(starts, tests)
+    judged = studies.assess(models, tests, rules=Rules(harm_margin), limits=limits, starts=begun, progress=progress)
+    return Assessed(judged, tuple(tests), tuple(trouble_of(tests)))
 
 
 def select(
@@ -219,10 +264,11 @@ def select(
     targets: str | Sequence[str] | None = None,
     method: SelectionMethod = "pareto",
     *,
-    inputs: Sequence[str] | None = None,
+    inputs: str | Sequence[str] | None = None,
     split: str | None = None,
     leave_one: LeaveOne | None = None,
     absolute: bool = False,
+    starts: Starts = None,
     mapping: str | Path | Mapping | None = None,
     jobs: int = 1,
     progress: Callable[..., None] = _silent,
@@ -236,7 +282,7 @@ def select(
         As for `compare`.
     method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
         How to choose; see :doc:`/methods`.
-    inputs, split, leave_one, absolute, mapping, jobs, progress
+    inputs, split, leave_one, absolute, starts, mapping, jobs, progress
         As for `compare`.
     **settings
         Of the method, see `thermocomp.assessment.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
@@ -259,7 +305,7 @@ def select(
         raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
     chosen.check(method)
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute)
+    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
     wanted = method == "pareto" or split is not None or leave_one is not None
     judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
     found = selecting.select(method, samples, judging, chosen, jobs=jobs, progress=progress)

@@ -37,6 +37,8 @@ REZERO_ROWS = 5
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
 #: a margin is so many times the probe's noise, and such a share of the largest drift learned
 TIMES_NOISE, SHARE = 3.0, 0.05
+#: caps what would be accepted where noise and lost sensors were left out
+UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
 #: a unit that moves by less than this share of the largest drift learned shows nothing
 MOVES = 0.1
 
@@ -221,7 +223,7 @@ class Verdict:
     @property
     def advice(self) -> str:
         """Which test would decide an unproven verdict; empty for the other words."""
-        if self.word != "unproven":
+        if self.word != "unproven" or self.caps == (UNTRIED,):  # which says it itself
             return ""
         if any("not alike" in cap for cap in self.caps):
             return "record cycles at other speeds or on other days"

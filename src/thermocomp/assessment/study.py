@@ -205,8 +205,11 @@ def assess(
     Raises
     ------
     InputError
-        A channel the models need is not in the recordings, or it cannot be told how one of these begins.
+        There is no model, a channel the models need is not in the recordings, or it cannot be told how one of these
+        begins.
     """
+    if not models:
+        raise InputError("no model given: name a model file, or give at least one model")
     found: list[Assessment] = []
     covered = None
     hashes = {h for m in models for h in _hashes(m)}

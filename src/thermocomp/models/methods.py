@@ -173,8 +173,10 @@ def expand(names: Sequence[Any]) -> list[str]:
     Raises
     ------
     InputError
-        There is no method of one of the names, or something else is no regressor.
+        None is given, there is no method of one of the names, or something else is no regressor.
     """
+    if not names:
+        raise InputError("no model given: name at least one method, such as dynamic, or all of them by all")
     listed: dict[str, None] = {}
     for entry in names:
         if isinstance(entry, Named):

@@ -69,7 +69,7 @@ class Start:
         if self.word not in WORDS:
             raise InputError(f"start {self.word!r}: must be one of {', '.join(WORDS)}")
         if self.word == "continued" and not self.earlier:
-            raise InputError("a test that is continued needs the earlier file: name it with --continues")
+            raise InputError("a test that is continued needs the earlier file: name it with --continues, or earlier=")
         if self.earlier and self.word not in ("continued", "rezeroed"):
             raise InputError(f"an earlier file goes with a start that is continued or rezeroed, not {self.word}")
         if self.zero and self.word != "known":
@@ -249,7 +249,7 @@ def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[
         f"{recording.source or recording.name}: {name} begins at {levels[name]:.1f} {far[name].unit}, so it was not "
         "zeroed at the start of this file. Say how it begins: --continues EARLIER (the file before it), --start "
         "rezeroed (count from its start), --start known --zero FILE or t1_C=20.1,t2_C=20.4 (the temperatures of its "
-        "zero), or --start cold if it was zeroed at rest all the same"
+        "zero), or --start cold if it was zeroed at rest all the same. In Python: starts=Start(...)"
     )
 
 
