@@ -180,10 +180,12 @@ def fit(
         As for `compare`.
     model : str or estimator
         A method, or an estimator that can be frozen: one of thermocomp's, or a Pipeline of selectors and one of them.
-    inputs, split, leave_one, absolute, starts, mapping, support, margin, harm_margin, jobs, progress
+    inputs, split, leave_one, absolute, starts, mapping, support, margin, harm_margin
         As for `compare`.
     limits : Limits
         Of the compensator that is judged with the models.
+    jobs, progress
+        As for `compare`.
 
     Returns
     -------
