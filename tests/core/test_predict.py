@@ -1,5 +1,6 @@
 """`ErrorModel.predict`: a model replayed through a table, with numpy alone."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
+from thermocomp.core.zero import Zeroing
 
 T = Input("t", "temperature", "degC", reference=20.0, rezero=True, low=-50.0, high=50.0)
 LAG = LinearDynamic(
@@ -102,3 +104,6 @@ def test_what_is_refused() -> None:
         LAG.predict({"t": [np.datetime64("2026-01-01")]}, [0.0])
     with pytest.raises(InputError, match=r"the time in column 'clock' must be numbers .* or datetimes: .*'noon'"):
         LAG.predict({"t": [1.0], "clock": ["noon"]}, "clock")
+    timed = replace(LAG, zeroing=Zeroing(speed="rpm"))
+    with pytest.raises(InputError, match="column 'rpm' holds something that is no number"):
+        timed.predict({"t": [1.0], "rpm": ["fast"]}, [0.0])

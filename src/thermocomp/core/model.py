@@ -424,7 +424,7 @@ class ErrorModel(ABC):
         usable: BoolArray = np.all(np.isfinite(values), axis=1)
         resting = np.zeros(n, dtype=np.bool_)
         if self.zeroing.speed in table:
-            speed = _column(table, self.zeroing.speed, f"model of {self.target}")
+            speed = _numbers(table, self.zeroing.speed, f"model of {self.target}")
             resting = np.array([self.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
         zeros: dict[int, ArrayLike | None] = {0: reference}
         for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
