@@ -25,6 +25,7 @@ from thermocomp.models.methods import METHODS, deployable
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD, Start
 
 FloatArray = NDArray[np.float64]
 
@@ -83,6 +84,19 @@ def independent(kind: str, tests: int, cycles: int) -> Callable[[np.random.Gener
     return make
 
 
+def continued(kind: str, files: int) -> Callable[[np.random.Generator], Samples]:
+    """Return what makes the same of one series that is cut into files."""
+
+    def make(rng: np.random.Generator) -> Samples:
+        x = noise(rng, kind, files * ROWS, SENSORS + 1)
+        parts = [x[k * ROWS : (k + 1) * ROWS] for k in range(files)]
+        found = [recording(f"test {k}", 20 + part[:, :-1], part[:, -1], 1) for k, part in enumerate(parts)]
+        starts = [Start("continued", "cut", tuple(found[:k]), 60.0) if k else COLD for k in range(files)]
+        return stack(found, ["z_um"], starts=starts)
+
+    return make
+
+
 def real(left: float, cycles: int, harm: float = 0.0) -> Callable[[np.random.Generator], Samples]:
     """Drift of which the sensors tell all but a share; the share differs between cycles. In one, harm may be done [um].
 
@@ -130,6 +144,9 @@ def cases() -> Iterator[Case]:
             yield Case(f"{name}, of one series", independent(kind, 1, n), splits.leave_one_cycle_out, FIVE, high=0.07)
         for n in (3, 5, 10):
             yield Case(f"{kind}, {n} files", independent(kind, n, 2), splits.leave_one_file_out, FIVE, high=0.07)
+        for n in (4, 8):
+            name = f"{kind}, {n} files that go on"
+            yield Case(name, continued(kind, n), splits.leave_one_file_out, FIVE, high=0.07)
         yield Case(f"{kind}, split", independent(kind, 1, 6), lambda s: splits.by_rows(s, 0.75, 0.25), FIVE, high=0.07)
     yield Case("harmful in one of six", real(0.5, 6, harm=5.0), splits.leave_one_cycle_out, FIVE, high=0.05)
     for who, methods in (("five methods", FIVE), (f"all {len(ALL)} methods", ALL)):
