@@ -103,19 +103,24 @@ def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
         "16",
     ]
     for method, code, told in (("subsets", 0, "interrupted"), ("pareto", 130, "stopped")):
-        running = subprocess.Popen(
+        with subprocess.Popen(
             [*line, "--method", method],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            # a shell starts what runs in the background with interrupts ignored, and that is inherited
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             env={**os.environ, "COLUMNS": "120"},
-        )
-        assert running.stderr is not None
-        first = running.stderr.readline()  # of its progress: it is searching
-        assert running.poll() is None, first
-        os.killpg(running.pid, signal.SIGINT)
-        said, errors = running.communicate(timeout=60)
+        ) as running:
+            try:
+                assert running.stderr is not None
+                first = running.stderr.readline()  # of its progress: it is searching
+                assert running.poll() is None, first
+                os.killpg(running.pid, signal.SIGINT)
+                said, errors = running.communicate(timeout=60)
+            finally:
+                running.kill()
         assert running.returncode == code, errors
         assert told in said + errors
         assert "Traceback" not in errors
