@@ -24,7 +24,7 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
-from thermocomp.compensation.nc.reading.tokens import read_lines, split_lines
+from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 GOAL, GOAL_MEMORY = 100_000.0, 1.2
 INSTALLED = Path("/usr/share/linuxcnc/ncfiles/3D_Chips.ngc")
@@ -96,11 +96,11 @@ def operations() -> Iterator[str]:
 def revise(program: Path, proof: str) -> dict[str, float]:
     """Revise a program by the command; us per line, of the processor for it and its children, memory in MB."""
     sys.modules["matplotlib"] = None  # type: ignore[assignment]
+    from thermocomp.adapters.linuxcnc import rs274process
     from thermocomp.cli.app import run
     from thermocomp.core.lineardynamic import LinearDynamic
     from thermocomp.core.model import Input
     from thermocomp.files import modelfile
-    from thermocomp.shopfloor import rs274process
 
     if proof == "unproved":
         rs274process.PYTHON = Path("/nowhere")
@@ -152,7 +152,7 @@ def revise(program: Path, proof: str) -> dict[str, float]:
 
 def revisions() -> bool:
     """Revise programs of growing length and say whether their memory is bounded."""
-    from thermocomp.shopfloor.rs274 import installed
+    from thermocomp.adapters.linuxcnc.rs274 import installed
 
     jobs = [(size, "unproved") for size in SIZES] + ([(PROVED, "proved")] if installed() is None else [])
     memory: dict[tuple[int, str], float] = {}

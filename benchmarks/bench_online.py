@@ -14,12 +14,12 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from thermocomp.compensation import online
 from thermocomp.core import lagbank
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import Input
 from thermocomp.core.reading import Reading
 from thermocomp.models.dynamic import DynamicRidge
+from thermocomp.runtime import compensator
 
 FloatArray = NDArray[np.float64]
 
@@ -76,11 +76,11 @@ def main() -> int:
     print(f"frozen model against its estimator, {N_ROWS} rows: largest relative difference {worst:.1e} (goal 1e-12)")
 
     readings = [Reading(30.0 * k, dict(zip(names, row.tolist(), strict=True))) for k, row in enumerate(X)]
-    limits, live, last = Limits(), online.start([model]), model.init()
+    limits, live, last = Limits(), compensator.start([model]), model.init()
 
     def online_step(k: int) -> None:
         nonlocal live
-        live, _ = online.step([model], limits, live, readings[k], readings[k].time)
+        live, _ = compensator.step([model], limits, live, readings[k], readings[k].time)
 
     def model_step(k: int) -> None:
         nonlocal last

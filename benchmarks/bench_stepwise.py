@@ -13,9 +13,9 @@ import pandas as pd
 import statsmodels.api as sm
 from numpy.typing import NDArray
 
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.numerics.stepwise import AlphaThresholds, FThresholds, Rule, alpha_of_f
 from thermocomp.models.partial_f import PartialF
+from thermocomp.models.second_order import SecondOrderRegression
 
 FloatArray = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def main() -> int:
     if "--quick" not in sys.argv:
         y = network(N_ROWS, N_TEMPERATURES, seed=20, bending=0.05)[1]
         alphas = alpha_of_f(100.0, N_ROWS - 20), alpha_of_f(50.0, N_ROWS - 20)
-        mra = StepwiseMRA(alpha_enter=alphas[0], alpha_remove=alphas[1]).fit(frame, y)
+        mra = SecondOrderRegression(alpha_enter=alphas[0], alpha_remove=alphas[1]).fit(frame, y)
         products = {name: frame[[*name.split("*")]].prod(axis=1) for name in mra.candidates_}
         terms = pd.DataFrame(products)
         reached &= compare(

@@ -1,7 +1,7 @@
 """Random programs are revised, and judged by LinuxCNC's interpreter in eight states of the controller.
 
 Run with ``python benchmarks/nc_sweep.py --programs 2000 --seed 1``. Each seed gives one program, which is revised by
-both methods, for Z alone or for X, Y and Z. The judge (`tests/compensation/nc/state_judge.py`) knows nothing of what
+both methods, for Z alone or for X, Y and Z. The judge (`tests/helpers/state_judge.py`) knows nothing of what
 the revision wanted. Printed are the counts, and why programs were refused. The folder of ``--found`` gets what was
 found, and what is wrong with both programs; a sweep that was interrupted goes on with what is there.
 """
@@ -12,10 +12,9 @@ import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
-TESTS = Path(__file__).resolve().parents[1] / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS / "compensation" / "nc")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 
-from sweeping import Counts, Outcome, sweep  # noqa: E402
+from sweeping import Counts, Outcome, sweep
 
 #: refused programs of the valid ones, at most
 GOAL = 0.10

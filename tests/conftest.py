@@ -4,14 +4,14 @@ import os
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags
 from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
+
+from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.cli import reviserun
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.shopfloor import rs274
 
 ROOT = Path(__file__).resolve().parent.parent
 

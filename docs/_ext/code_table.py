@@ -10,7 +10,7 @@ from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.util.docutils import SphinxDirective
 
-from thermocomp.compensation.nc.following import codes
+from thermocomp.nc.interpreter import codes
 
 
 class CodeTable(SphinxDirective):

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from thermocomp.models.lasso import ElasticNet, Lasso
     from thermocomp.models.mlp import SigmoidNet
     from thermocomp.models.mlp_sklearn import SklearnNet
-    from thermocomp.models.mra import StepwiseMRA
     from thermocomp.models.ols import LeastSquares
     from thermocomp.models.partial_f import PartialF
     from thermocomp.models.pcr import PrincipalComponents
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from thermocomp.models.pls import PartialLeastSquares
     from thermocomp.models.ppr import ProjectionPursuit
     from thermocomp.models.ridge import Ridge
+    from thermocomp.models.second_order import SecondOrderRegression
     from thermocomp.models.sensors import SensorSelector
     from thermocomp.models.subsets import BestSubset
     from thermocomp.recording.recording import Recording
@@ -85,7 +85,7 @@ _PUBLIC = {
     "SensorSelector": "thermocomp.models.sensors",
     "SigmoidNet": "thermocomp.models.mlp",
     "SklearnNet": "thermocomp.models.mlp_sklearn",
-    "StepwiseMRA": "thermocomp.models.mra",
+    "SecondOrderRegression": "thermocomp.models.second_order",
 }
 
 __all__ = [
@@ -113,11 +113,11 @@ __all__ = [
     "Reading",
     "Recording",
     "Ridge",
+    "SecondOrderRegression",
     "SensorSelector",
     "SigmoidNet",
     "SklearnNet",
     "Start",
-    "StepwiseMRA",
     "ThermocompError",
     "__version__",
     "assess",

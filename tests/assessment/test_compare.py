@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import ALL, compare, judge, n_pieces
 from thermocomp.assessment.replay import replay, run
 from thermocomp.assessment.robustness import Robustness, pooled, stress
-from thermocomp.compensation import online
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
@@ -25,6 +24,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
+from thermocomp.runtime import compensator
 
 METHOD_NAMES = sorted(METHODS)
 
@@ -146,11 +146,11 @@ def test_replay_is_what_the_online_step_commands(samples: Samples) -> None:
     rows = np.arange(len(samples)) < 120
     predicted, _ = replay(model, samples, rows)
     limits = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
-    state = online.start([model])
+    state = compensator.start([model])
     names = [c.name for c in samples.inputs]
     for k in range(120):
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k], strict=True)))
-        state, result = online.step([model], limits, state, reading, reading.time)
+        state, result = compensator.step([model], limits, state, reading, reading.time)
         if k:
             assert result.corrections["z_um"].offset == -predicted[k]
 
@@ -160,10 +160,10 @@ def test_judged_is_what_would_run(recording: Recording, samples: Samples) -> Non
     everything = np.ones(len(samples), np.bool_)
     model = train("dynamic", samples, 0, everything).model
     limits = Limits(magnitude=8.0, rate=0.002, dead_band=0.5)
-    state, names, commanded = online.start([model]), [c.name for c in samples.inputs], []
+    state, names, commanded = compensator.start([model]), [c.name for c in samples.inputs], []
     for k in range(len(samples)):
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k].tolist(), strict=True)))
-        state, result = online.step([model], limits, state, reading, reading.time)
+        state, result = compensator.step([model], limits, state, reading, reading.time)
         commanded.append(-result.corrections["z_um"].offset)
     everywhere = splits.Split("all", ~everything, everything)
     a = judge("dynamic", model, samples, everywhere, robustness=False, limits=limits)

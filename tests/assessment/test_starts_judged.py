@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from smallmachine import small_machine
-from thermocomp.assessment import iso230_3, study
+
+from thermocomp.assessment import study
 from thermocomp.assessment.compare import judge
 from thermocomp.assessment.replay import replay, run
 from thermocomp.assessment.robustness import stress
@@ -20,6 +20,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import FIRST_READING, Zeroing
 from thermocomp.files import recordings
+from thermocomp.iso230 import part3
 from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle, find_cycles
 from thermocomp.recording.recording import Recording
@@ -166,9 +167,9 @@ def test_a_thermal_test_that_goes_on() -> None:
     first, second, gap = cut(resting(), 260)
     models = [fitted("dynamic")]
     with pytest.raises(InputError, match="so it was not zeroed"):
-        iso230_3.assess(second, models=models)
-    assert iso230_3.assess(second)  # without a model its figures count from its start
-    (test,) = iso230_3.assess(second, "etve", models=models, start=Start("continued", "stated", (first,), gap))
+        part3.assess(second, models=models)
+    assert part3.assess(second)  # without a model its figures count from its start
+    (test,) = part3.assess(second, "etve", models=models, start=Start("continued", "stated", (first,), gap))
     (z,) = (c for c in test.curves if c.name == TARGET)
     assert z.after is not None
     whole = stack([resting()], [TARGET])

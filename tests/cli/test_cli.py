@@ -342,7 +342,7 @@ def test_the_base_install_says_what_to_install(drift: Path) -> None:
 def test_the_running_wing_loads_nothing_of_the_training_wing() -> None:
     code = (
         "import sys, thermocomp\n"
-        "import thermocomp.compensation.online, thermocomp.files.modelfile\n"
+        "import thermocomp.runtime.compensator, thermocomp.files.modelfile\n"
         "thermocomp.Polynomial, thermocomp.Limits\n"
         "print([m for m in ('pandas', 'sklearn', 'scipy', 'matplotlib', 'numba', 'joblib') if m in sys.modules])"
     )

@@ -8,11 +8,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags
 from reviseruns import HONEST, PLATE, judged, revise, said, table, without_header, write_models
-from thermocomp.compensation.nc.revising.header import MARK
+
 from thermocomp.files import jobstate
+from thermocomp.nc.rewrite.header import MARK
 
 # -- what is written -------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import pytest
 
 from driftmodels import lags
 from reviseruns import PLATE, judged, revise, table, without_header, write_models
-from thermocomp.compensation.nc.revising.header import MARK, WIDTH, blank, filled, wrapped
+from thermocomp.nc.rewrite.header import MARK, WIDTH, blank, filled, wrapped
 
 ENDINGS = ["\n", "\r", "\r\n", "\x0b", "\x0c", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029"]
 NASTY = [

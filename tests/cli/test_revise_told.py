@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from driftmodels import lags
 from reviseruns import PLATE, judged, revise, said, write_models
 from thermocomp.cli import reviserun
-from thermocomp.compensation.nc.revising.header import MARK
-from thermocomp.compensation.nc.revising.revise import Revision
+from thermocomp.nc.rewrite.header import MARK
+from thermocomp.nc.rewrite.revise import Revision
 from thermocomp.report import revision as pictures
 
 MILL = 'structure = "{}"\n' + "".join(f"[axes.{name}]\ntravel = ['-500 mm', '500 mm']\n" for name in "XYZ")

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from driftmodels import lags, static
 from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
-from thermocomp.assessment.precompensation import Proof, prove
-from thermocomp.compensation.nc.revising.header import MARK
+
+from thermocomp.adapters.linuxcnc.verification.verify import Proof, prove
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.nc.rewrite.header import MARK
 
 # -- how far to trust it ---------------------------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import crowded_machine
+
 from thermocomp.assessment.choice import LOOKED_AT_BY, Settings
 from thermocomp.cli.app import run
 from thermocomp.core.machine import Channel
@@ -89,10 +89,12 @@ def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
     channels = (*plain.channels, *(Channel(n, "temperature", "degC") for n in more))
     path = tmp_path / "wide.csv"
     recordings.write(replace(plain, table=table, channels=channels), path)
+    # a shell starts what runs in the background with interrupts ignored, and that is inherited
+    begin = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
     line = [
         sys.executable,
-        "-m",
-        "thermocomp.cli.app",
+        "-c",
+        begin + "from thermocomp.cli.app import main; main()",
         "select",
         str(path),
         "--target",
@@ -109,8 +111,6 @@ def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
-            # a shell starts what runs in the background with interrupts ignored, and that is inherited
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             env={**os.environ, "COLUMNS": "120"},
         ) as running:
             try:

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-
 from smallmachine import small_machine
-from thermocomp.compensation.online import TOGETHER, start
-from thermocomp.compensation.online import step as online_step
+
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.joint import JointSupport
@@ -26,6 +24,8 @@ from thermocomp.files import modelfile
 from thermocomp.models.covering import cover
 from thermocomp.models.training import train
 from thermocomp.recording.samples import stack
+from thermocomp.runtime.compensator import TOGETHER, start
+from thermocomp.runtime.compensator import step as online_step
 
 FloatArray = NDArray[np.float64]
 

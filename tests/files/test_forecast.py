@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from thermocomp.compensation.nc.drifting.inputs import Signal
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import forecast
+from thermocomp.nc.thermal.inputs import Signal
 
 
 def written(folder: Path, text: str) -> Path:

@@ -5,14 +5,14 @@ from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags, net, ticking
-from thermocomp.compensation.nc.drifting import start
-from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.drifting.stations import Station
+
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.jobstate import JobState
 from thermocomp.files import jobstate, jsonfile, modelfile
+from thermocomp.nc.thermal import start
+from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.stations import Station
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, 250000, tzinfo=UTC)
 

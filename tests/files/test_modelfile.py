@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.fingerprints import Prints, Runs, packed
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import RULES, HonestError, Input, Provenance, Support
-from thermocomp.core.prints import Prints, Runs, packed
 from thermocomp.files import jsonfile, modelfile
 
 PRINTS = Prints(

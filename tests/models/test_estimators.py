@@ -15,14 +15,14 @@ from thermocomp.core.model import Input, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.numerics.leastsquares import lstsq
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
+from thermocomp.models.second_order import SecondOrderRegression
 
 FloatArray = NDArray[np.float64]
 
-ALL = [LeastSquares(), PartialF(), StepwiseMRA(), StepwiseMRA(fit_intercept=True, hierarchy=True)]
+ALL = [LeastSquares(), PartialF(), SecondOrderRegression(), SecondOrderRegression(fit_intercept=True, hierarchy=True)]
 
 
 @parametrize_with_checks([*ALL, DynamicRidge(time="none"), DynamicRidge(time="none", fit_intercept=True)])  # type: ignore[untyped-decorator]
@@ -41,12 +41,12 @@ def drift(seed: int = 0, n: int = 300) -> tuple[pd.DataFrame, FloatArray]:
     return T, y.to_numpy() + 0.5 * rng.normal(size=n)
 
 
-CHEN = StepwiseMRA(differences=(("T6", "T7"), ("T8", "T9")), subset=("T1", "T2", "T3", "T6-T7", "T8-T9"))
+CHEN = SecondOrderRegression(differences=(("T6", "T7"), ("T8", "T9")), subset=("T1", "T2", "T3", "T6-T7", "T8-T9"))
 
 
 @pytest.mark.parametrize(
     "estimator",
-    [LeastSquares(), LeastSquares(fit_intercept=False), PartialF(), CHEN, StepwiseMRA(fit_intercept=True)],
+    [LeastSquares(), LeastSquares(fit_intercept=False), PartialF(), CHEN, SecondOrderRegression(fit_intercept=True)],
     ids=str,
 )
 def test_frozen_replay_is_the_prediction(estimator: TermRegressor) -> None:
@@ -69,7 +69,7 @@ def test_frozen_replay_is_the_prediction(estimator: TermRegressor) -> None:
 
 def test_freeze_with_own_inputs() -> None:
     T, y = drift()
-    fitted = StepwiseMRA(differences=(("x5", "x6"),), subset=("x1", "x2", "x5-x6")).fit(T.to_numpy(), y)
+    fitted = SecondOrderRegression(differences=(("x5", "x6"),), subset=("x1", "x2", "x5-x6")).fit(T.to_numpy(), y)
     inputs = [Input(f"t{i}", "temperature", "degC", 20.0, rezero=True, low=-5, high=15) for i in range(9)]
     model = fitted.freeze(target="dx", unit="um", inputs=inputs, support=Support("hold"))
     assert model.support.policy == "hold"
@@ -111,7 +111,7 @@ def test_number_of_terms(subset: tuple[str, ...], terms: int) -> None:
     # C-10, C-13
     T, y = drift()
     pairs = (("T6", "T7"), ("T8", "T9"), ("T6", "T8"), ("T7", "T9"))
-    m = StepwiseMRA(differences=pairs, subset=subset).fit(T, y)
+    m = SecondOrderRegression(differences=pairs, subset=subset).fit(T, y)
     assert m.variables_ == subset
     assert len(m.candidates_) == terms
     assert m.intercept_ == 0.0
@@ -119,7 +119,9 @@ def test_number_of_terms(subset: tuple[str, ...], terms: int) -> None:
 
 def test_chens_form_is_found_again() -> None:
     T, y = drift(2, 810)
-    m = StepwiseMRA(alpha_enter=1e-6, alpha_remove=1e-5, differences=CHEN.differences, subset=CHEN.subset).fit(T, y)
+    m = SecondOrderRegression(
+        alpha_enter=1e-6, alpha_remove=1e-5, differences=CHEN.differences, subset=CHEN.subset
+    ).fit(T, y)
     assert {"T2", "T3", "(T6-T7)", "(T8-T9)", "T2*(T6-T7)"} <= set(m.terms_)
     truth = np.asarray(T.eval("-0.6*T2 + 7.5*T3 - 37*(T6-T7) + 10.8*(T8-T9) + 2.5*T2*(T6-T7)"))
     assert np.sqrt(np.mean((m.predict(T) - truth) ** 2)) < 0.1
@@ -131,9 +133,9 @@ def test_chens_form_is_found_again() -> None:
 def test_linear_terms_only_and_hierarchy() -> None:
     # C-23 and C-21
     T, y = drift()
-    linear = StepwiseMRA(subset=("T1", "T3", "T4"), second_order=False).fit(T, y)
+    linear = SecondOrderRegression(subset=("T1", "T3", "T4"), second_order=False).fit(T, y)
     assert linear.candidates_ == ("T1", "T3", "T4")
-    strict = StepwiseMRA(hierarchy=True).fit(T, y)
+    strict = SecondOrderRegression(hierarchy=True).fit(T, y)
     factors = {f for t in strict.terms_ for f in t.split("*")}
     assert any("*" in t for t in strict.terms_)
     assert factors <= set(strict.terms_)
@@ -164,7 +166,7 @@ def test_nothing_enters() -> None:
     assert frozen.inputs == ()
     assert frozen.step(frozen.init(), X[:, :0], 0.0)[1] == pytest.approx(m.predict(X))
     assert "NONE" in m.log_text()
-    assert (StepwiseMRA(alpha_enter=1e-30).fit(X, y - y.mean()).predict(X) == 0).all()
+    assert (SecondOrderRegression(alpha_enter=1e-30).fit(X, y - y.mean()).predict(X) == 0).all()
 
 
 def test_log_text_in_the_style_of_systat() -> None:
@@ -242,8 +244,8 @@ def test_bad_settings_are_refused() -> None:
     with pytest.raises(InputError, match=r"F-to-enter 10.* F-to-delete 20"):
         PartialF(f_enter=10, f_delete=20).fit(T, y)
     with pytest.raises(InputError, match="alpha-to-enter"):
-        StepwiseMRA(alpha_enter=0.1, alpha_remove=0.05).fit(T, y)
+        SecondOrderRegression(alpha_enter=0.1, alpha_remove=0.05).fit(T, y)
     with pytest.raises(InputError, match="no input is named 'T99'; there are T1, T2"):
-        StepwiseMRA(differences=(("T1", "T99"),)).fit(T, y)
+        SecondOrderRegression(differences=(("T1", "T99"),)).fit(T, y)
     with pytest.raises(InputError, match="no variable is named 'T6-T7'; there are T1, T2"):
-        StepwiseMRA(subset=("T1", "T6-T7")).fit(T, y)
+        SecondOrderRegression(subset=("T1", "T6-T7")).fit(T, y)

@@ -22,10 +22,10 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.foreign import ForeignRegressor, adopted
 from thermocomp.models.methods import METHODS, Named, deployable, expand
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.pipelines import PipelineRegressor, freeze
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.sensors import SensorSelector
 from thermocomp.models.training import train
 from thermocomp.models.unfrozen import EstimatorModel
@@ -265,7 +265,7 @@ def selector() -> SensorSelector:
 @pytest.mark.parametrize(
     "pipeline",
     [
-        make_pipeline(SensorSelector("partial-f"), StepwiseMRA()),
+        make_pipeline(SensorSelector("partial-f"), SecondOrderRegression()),
         make_pipeline(SelectKBest(f_regression, k=2), LeastSquares()),
         make_pipeline(StandardScaler(), SensorSelector("lasso"), LeastSquares()),
         make_pipeline(SelectKBest(f_regression, k=3), StandardScaler(), StandardScaler(with_mean=False), PartialF()),
@@ -325,5 +325,5 @@ def test_pipelines_that_cannot_be_frozen(samples: Samples) -> None:
     with pytest.raises(FitError, match="Ridge has no 'freeze'"):
         freeze(Ridge().fit(X, y), target="z")
     with pytest.raises(FitError, match="StandardScaler before a model of the family polynomial cannot be frozen"):
-        freeze(make_pipeline(StandardScaler(), StepwiseMRA(fit_intercept=True)).fit(X, y), target="z")
+        freeze(make_pipeline(StandardScaler(), SecondOrderRegression(fit_intercept=True)).fit(X, y), target="z")
     assert isinstance(adopted(make_pipeline(PolynomialFeatures(), LeastSquares())), ForeignRegressor)

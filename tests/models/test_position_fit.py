@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
 from profilemachine import EQ6, LAW, along_y, planted, profiles, states
+
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.models.geometric import fit_profile
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.position import PositionOptions, fit_position
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996.law import OURS, plant, temperatures
 from thermocomp.papers.chen1996.setup import DIFFERENCES, SLOPE_VARIABLES
 from thermocomp.recording.profiles import Profiles
@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 GRID = along_y(np.linspace(0.0, 550.0, 111))
 INPUTS = ("T1", "T3", "T4", "T6", "T7", "T8", "T9")
-CHEN = PositionOptions(method=StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES), inputs=INPUTS)
+CHEN = PositionOptions(method=SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES), inputs=INPUTS)
 
 
 def off(profile: FloatArray, truth: FloatArray) -> float:

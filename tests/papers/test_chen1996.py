@@ -9,7 +9,7 @@ import pytest
 
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import drift as chen1996_drift
 from thermocomp.papers.chen1996 import law as chen1996_law
@@ -244,7 +244,7 @@ def test_a_net_that_knows_the_truth_fulfils_them(unseen: Unseen) -> None:
     knowing = cheat(unseen.learned.samples)
     spies = [f"spy {t}" for t in column]
     models = {
-        t: common.fitted(StepwiseMRA(subset=[f"spy {t}"], second_order=False), knowing.only(spies), [t])[t]
+        t: common.fitted(SecondOrderRegression(subset=[f"spy {t}"], second_order=False), knowing.only(spies), [t])[t]
         for t in column
     }
     learned = replace(

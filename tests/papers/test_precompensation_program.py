@@ -8,18 +8,18 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.drifting.start import cold
+from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input
 from thermocomp.datasets.virtual import find, record
+from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.start import cold
 from thermocomp.papers.precompensation import cutting, program
 from thermocomp.papers.precompensation.cutting import COLD, COLDER, HOUR, WARM, WARMER, Changing
 from thermocomp.papers.precompensation.setup import POSITIONS, SPEED
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
-from thermocomp.shopfloor import rs274
 from thermocomp.simulation.climate import STABLE
 
 FloatArray = NDArray[np.float64]

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-
 from smallmachine import small_machine
+
+from thermocomp.core.fingerprints import Prints, unpacked
 from thermocomp.core.machine import Channel
-from thermocomp.core.prints import Prints, unpacked
 from thermocomp.datasets import virtual
 from thermocomp.files.recordings import read
 from thermocomp.recording.cycles import whole
-from thermocomp.recording.prints import LENGTH, fingerprint, overlap, repeats
+from thermocomp.recording.fingerprints import LENGTH, fingerprint, overlap, repeats
 from thermocomp.recording.samples import Samples, stack
 
 FloatArray = NDArray[np.float64]

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
-from thermocomp.assessment import iso230_2, iso230_3
-from thermocomp.assessment.thermaltest import ThermalTest
-from thermocomp.assessment.timeconstants import time_constants
+
 from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record
+from thermocomp.iso230 import part2, part3
+from thermocomp.iso230.settling import time_constants
+from thermocomp.iso230.thermaltest import ThermalTest
 from thermocomp.recording.positioning import Positioning
 from thermocomp.report import iso230 as pages
 from thermocomp.report import iso230figures as figures
@@ -37,16 +37,16 @@ def model(target: str, coefficient: float, sensor: str) -> Polynomial:
 @pytest.fixture(scope="module")
 def spindle() -> ThermalTest:
     recording = record("iso230-spindle")[0]
-    pairs = iso230_3.find_pairs(recording, 100.0)
-    (test,) = iso230_3.assess(recording, pairs=pairs, models=[model("z_um", -4.0, "t_front_seat_C")])
+    pairs = part3.find_pairs(recording, 100.0)
+    (test,) = part3.assess(recording, pairs=pairs, models=[model("z_um", -4.0, "t_front_seat_C")])
     return test
 
 
 def test_the_page_is_offline_and_complete(spindle: ThermalTest, tmp_path: Path) -> None:
-    axis = iso230_3.assess(record("iso230-axis")[1])[0]
-    etve = iso230_3.assess(record("etve")[0])[0]
+    axis = part3.assess(record("iso230-axis")[1])[0]
+    etve = part3.assess(record("etve")[0])[0]
     settlings = [(t.recording, time_constants(t.recording)) for t in (spindle, axis, etve)]
-    results = [iso230_2.assess(positioning_test())]
+    results = [part2.assess(positioning_test())]
     path = tmp_path / "page.html"
     pages.write([spindle, axis, etve], settlings, results, path)
     text = path.read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ def test_the_page_is_offline_and_complete(spindle: ThermalTest, tmp_path: Path) 
 
 
 def test_a_page_of_positioning_only() -> None:
-    text = pages.render([], [], [iso230_2.assess(positioning_test()), iso230_2.assess(positioning_test(both=False))])
+    text = pages.render([], [], [part2.assess(positioning_test()), part2.assess(positioning_test(both=False))])
     assert "ISO 230-3" not in text
     assert "y.csv" in text
     assert text.count("<svg") == 2
@@ -85,7 +85,7 @@ def test_a_page_of_positioning_only() -> None:
 def test_a_single_run_on_the_page() -> None:
     positions = np.linspace(0, 3000, 13)
     up = 0.01 * positions[None]
-    text = pages.render([], [], [iso230_2.assess(Positioning("X", "", "um", positions, up, up - 2, "x.csv"))])
+    text = pages.render([], [], [part2.assess(Positioning("X", "", "um", positions, up, up - 2, "x.csv"))])
     assert "mean ↑ of a single run" in text
     assert "a single run in direction +: s, R and A take more" in text
     assert "measurement uncertainty is not told" in text
@@ -96,34 +96,34 @@ def test_figures_say_what_they_show(spindle: ThermalTest) -> None:
     drawn = figures.thermal(spindle)
     for said in ("60 min", "tilts A (about X) and B (about Y)", "urad = um/m", "with model", "t_air_C: surroundings"):
         assert said in drawn, said
-    r = iso230_2.assess(positioning_test())
+    r = part2.assess(positioning_test())
     drawn = figures.positioning(r)
     for symbol in ("A", "E", "M"):
         assert f"{symbol} {r.axis_values[symbol]:.3g}" in drawn
-    assert "↑" in figures.positioning(iso230_2.assess(positioning_test(both=False)))
+    assert "↑" in figures.positioning(part2.assess(positioning_test(both=False)))
 
 
 def test_an_axis_before_and_after_over_its_travel() -> None:
     recording = record("iso230-axis")[0]
     models = [model(c.name, 1.0, "t_x_bearing_C") for c in recording.displacements]
-    (test,) = iso230_3.assess(recording, models=models)
+    (test,) = part3.assess(recording, models=models)
     assert "what the model leaves" in figures.profiles(test, 0)
-    (without,) = iso230_3.assess(recording)
+    (without,) = part3.assess(recording)
     assert "what the model leaves" not in figures.profiles(without, 0)
 
 
 def test_odd_recordings_are_drawn_too() -> None:
     recording = small_machine()
-    assert "small, 4" in pages.render(iso230_3.assess(recording), [(recording, time_constants(recording))], [])
+    assert "small, 4" in pages.render(part3.assess(recording), [(recording, time_constants(recording))], [])
     bare = replace(
         recording,
         table=recording.table[["z_um"]],
         channels=tuple(c for c in recording.channels if c.name == "z_um"),
     )
-    (test,) = iso230_3.assess(bare)
+    (test,) = part3.assess(bare)
     assert test.kind == "etve"
     assert "<svg" in pages.render([test], [(bare, time_constants(bare))], [])
     holes = recording.table.copy()
     holes.loc[holes.index % 10 != 0, "z_um"] = np.nan
-    (first, *_) = iso230_3.assess(replace(recording, table=holes))
+    (first, *_) = part3.assess(replace(recording, table=holes))
     assert "<svg" in figures.thermal(first)

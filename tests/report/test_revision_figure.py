@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermocomp.compensation.nc.revising.course import Bound, Run
+from thermocomp.nc.rewrite.course import Bound, Run
 from thermocomp.report import revision
 
 

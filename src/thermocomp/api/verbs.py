@@ -8,7 +8,7 @@ from typing import Any, Literal
 from thermocomp.api.inputs import Given, LeaveOne, Starts, judging_of, recordings_of, samples_of, starts_of, trouble_of
 from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
 from thermocomp.assessment import compare as comparing
-from thermocomp.assessment import harm, selecting
+from thermocomp.assessment import do_no_harm, selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.results import Assessment, Rules
@@ -151,7 +151,7 @@ def _single(models: Any) -> bool:
 
 def _untried(found: Assessment) -> Assessment:
     """Return an assessment in which nothing is accepted that was not tried with noise and lost sensors."""
-    return replace(found, verdict=replace(found.verdict, caps=(harm.UNTRIED,))) if found.accepted else found
+    return replace(found, verdict=replace(found.verdict, caps=(do_no_harm.UNTRIED,))) if found.accepted else found
 
 
 def fit(

@@ -8,7 +8,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from thermocomp.assessment import harm, metrics
+from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.coverage import cover
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.leaks import refuse_leaks
@@ -115,7 +115,7 @@ def compare(
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
         best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
-        whole_of = {name: harm.together(v, caps=capped) for name, v in verdicts.items()}
+        whole_of = {name: do_no_harm.together(v, caps=capped) for name, v in verdicts.items()}
         after = corrected(whole_of, rules.primary, best)
         for name, p in mine.items():
             found += p if len(p) > 1 else []
@@ -195,7 +195,7 @@ def readable(samples: Samples, target: int, judging: Judging) -> Judging:
         With all blocks if there are too few readings in each of them.
     """
     known = np.isfinite(samples.deviations[:, target])
-    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= harm.MIN_ROWS)
+    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= do_no_harm.MIN_ROWS)
     return replace(judging, splits=kept) if kept else judging
 
 
@@ -263,10 +263,10 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.Verdict(
+        verdict=do_no_harm.Verdict(
             units=tuple(
                 _worse(
-                    harm.measure(
+                    do_no_harm.measure(
                         unit,
                         measured[mine],
                         run_or_alone[mine],
@@ -278,7 +278,7 @@ def judge(
                     for run_or_alone in (predicted, ran.deviation)
                 )
                 for unit, mine in segments
-                if mine.sum() >= harm.MIN_ROWS
+                if mine.sum() >= do_no_harm.MIN_ROWS
             ),
             unit=model.unit,
             caps=_caps(split, learned, samples, target),
@@ -297,7 +297,7 @@ def judge(
     )
 
 
-def _worse(both: Iterable[harm.Unit]) -> harm.Unit:
+def _worse(both: Iterable[do_no_harm.Unit]) -> do_no_harm.Unit:
     """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
@@ -307,9 +307,10 @@ def _worse(both: Iterable[harm.Unit]) -> harm.Unit:
 def alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
     """Return that the units are too alike to count as several, if they are."""
     covered = cover(samples, judging)
-    if covered.independent >= harm.MIN_UNITS or covered.units < harm.MIN_UNITS:
+    needed = do_no_harm.MIN_UNITS
+    if covered.independent >= needed or covered.units < needed:
         return ()
-    return (f"only {covered.independent} of {covered.units} units are not alike, at least {harm.MIN_UNITS} are needed",)
+    return (f"only {covered.independent} of {covered.units} units are not alike, at least {needed} are needed",)
 
 
 def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) -> tuple[str, ...]:
@@ -326,7 +327,7 @@ def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) 
 def per_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
-    blocks = [b for b in stretches(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= harm.MIN_ROWS]
+    blocks = [b for b in stretches(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= do_no_harm.MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]
@@ -391,7 +392,7 @@ def _failed(samples: Samples, name: str, target: int, split: Split, why: str) ->
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=harm.Verdict((), refusal=why),
+        verdict=do_no_harm.Verdict((), refusal=why),
         sensors=(),
         fit_s=0.0,
         n_effective=float("nan"),
@@ -420,7 +421,7 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         row=np.concatenate([a.row for a in parts]),
         test=np.concatenate([a.test for a in parts]),
         cycle=np.concatenate([a.cycle for a in parts]),
-        verdict=harm.together([a.verdict for a in parts]),
+        verdict=do_no_harm.together([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
         n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),
         fit_s=sum(a.fit_s for a in parts),

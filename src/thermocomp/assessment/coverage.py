@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.choice import Cell, Table
-from thermocomp.assessment.iso230_3 import find_ambient
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.validity import Validity
 from thermocomp.recording.recording import Recording
@@ -129,7 +128,7 @@ def _ambient(
 ) -> tuple[str, tuple[float, float] | None]:
     named, values = "", []
     for k, recording in enumerate(recordings):
-        air = find_ambient(recording)
+        air = recording.ambient
         if air is not None:
             rows = samples.row[judged & (samples.test == k)]
             values.append(recording.table[air.name].to_numpy(dtype=np.float64)[rows])

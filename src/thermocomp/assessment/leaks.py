@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.recording.prints import overlap, repeats
+from thermocomp.recording.fingerprints import overlap, repeats
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]

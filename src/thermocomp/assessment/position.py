@@ -8,7 +8,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from thermocomp.assessment import harm, metrics
+from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.core.exceptions import FitError, InputError
@@ -77,7 +77,7 @@ class PositionAssessment:
     protocol: str
     cycles: tuple[CycleErrors, ...]
     overall: CycleErrors
-    verdict: harm.Verdict
+    verdict: do_no_harm.Verdict
     factors: tuple[HonestError, ...]
     unit: str
 
@@ -333,7 +333,7 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
         else:
             cycle = samples.cycle[rows]
             segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
-    verdict = harm.Verdict(
+    verdict = do_no_harm.Verdict(
         units=tuple(
             _unit(name, rms[mine], unit, thermal=bool(options.powers))
             for name, mine in segments
@@ -375,11 +375,11 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
     )
 
 
-def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> harm.Unit:
+def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.Unit:
     """Measure a cycle by the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
     none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
     largest = float(rms[:, 0].max())
-    return harm.Unit(
+    return do_no_harm.Unit(
         name=name,
         rows=len(rms),
         rms=left,
@@ -387,7 +387,7 @@ def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> harm.Unit:
         baselines=(none, geometric) if thermal else (none,),
         none_largest=largest,
         noise=0.0,
-        margin=harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
+        margin=do_no_harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
         moves=True,
     )
 

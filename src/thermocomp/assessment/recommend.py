@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment import harm
+from thermocomp.assessment import do_no_harm
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.training import fitted
@@ -124,13 +124,13 @@ class Recommendation:
     target: str
     method: str
     chosen: tuple[str, ...]
-    verdict: harm.Verdict
+    verdict: do_no_harm.Verdict
 
 
 def recommend(
     target: str,
     methods: Sequence[str],
-    parts: Mapping[str, Sequence[harm.Verdict]],
+    parts: Mapping[str, Sequence[do_no_harm.Verdict]],
     inner: Mapping[str, Sequence[Sequence[float]]],
     inners: Sequence[Inner],
 ) -> Recommendation | None:
@@ -160,24 +160,26 @@ def recommend(
     for k, name in enumerate(methods):
         for found, values in zip(inners, inner[name], strict=True):
             for (u, v), rms in zip(found.scores, values, strict=True):
-                logs[k, u, v] = np.log(max(rms, harm.NO_NOISE))
+                logs[k, u, v] = np.log(max(rms, do_no_harm.NO_NOISE))
     best = np.nanmean(logs, axis=2).argmin(axis=0)
     chosen = tuple(methods[k] for k in best)
     judged = [parts[name][u] for u, name in enumerate(chosen)]
     outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
-    return Recommendation(target, methods[int(np.argmin(outer))], chosen, harm.together(judged, about="the choice"))
+    return Recommendation(
+        target, methods[int(np.argmin(outer))], chosen, do_no_harm.together(judged, about="the choice")
+    )
 
 
-def _log(verdict: harm.Verdict) -> float:
+def _log(verdict: do_no_harm.Verdict) -> float:
     """Return a method's logarithm of the error on a unit; infinite if it failed, nan if there was too little to see."""
     if not verdict.units:
         return np.inf if verdict.refusal else np.nan
-    return float(np.mean([np.log(max(u.rms, harm.NO_NOISE)) for u in verdict.units]))
+    return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))
 
 
 def corrected(
-    verdicts: Mapping[str, harm.Verdict], primary: str | None, found: Recommendation | None
-) -> dict[str, harm.Verdict]:
+    verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
+) -> dict[str, do_no_harm.Verdict]:
     """Correct the verdicts on the methods that were tried for one target for their number.
 
     Parameters
@@ -193,7 +195,7 @@ def corrected(
     -------
     dict of str to Verdict
     """
-    after = dict(zip(verdicts, harm.holm(list(verdicts.values())), strict=True))
+    after = dict(zip(verdicts, do_no_harm.holm(list(verdicts.values())), strict=True))
     if primary is not None:
         after[primary] = replace(after[primary], p=None, about="named beforehand")
     elif found is not None and found.verdict.accepted:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.compensation import batch
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.zero import centre, first_rows
 from thermocomp.recording.samples import Samples
+from thermocomp.runtime import batch
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

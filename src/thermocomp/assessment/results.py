@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment import harm, metrics
+from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity
 from thermocomp.assessment.recommend import Recommendation
 from thermocomp.assessment.robustness import Robustness
@@ -28,7 +28,7 @@ class Rules:
     Parameters
     ----------
     margin : float or None
-        Harm in a single unit that is let pass [unit of the target]; None takes that of `harm.margin_of`.
+        Harm in a single unit that is let pass [unit of the target]; None takes that of `do_no_harm.margin_of`.
     primary : str or None
         Method that the judging is about: it is not corrected for the number of methods, all others are.
     """
@@ -96,7 +96,7 @@ class Assessment:
     row: IntArray
     test: IntArray
     cycle: IntArray
-    verdict: harm.Verdict
+    verdict: do_no_harm.Verdict
     sensors: tuple[str, ...]
     fit_s: float
     n_effective: float
@@ -133,7 +133,7 @@ class Assessment:
         return self.word == "accepted"
 
     @property
-    def word(self) -> harm.Word:
+    def word(self) -> do_no_harm.Word:
         """``accepted``, ``unproven`` or ``refused``."""
         if self.failure or self.caveat:
             return "refused"

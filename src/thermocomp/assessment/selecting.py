@@ -15,10 +15,10 @@ from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.numerics.leastsquares import table, triangle
 from thermocomp.models.numerics.stepwise import Step
 from thermocomp.models.partial_f import PartialF
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
@@ -178,7 +178,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
 
 def _by_steps(candidates: Candidates, method: str) -> Choice:
     """Choose by stepwise regression: ``partial-f`` (T-02 to T-06) or ``stepwise``, Chen's second-order one (C-15)."""
-    estimator: PartialF | StepwiseMRA = PartialF() if method == "partial-f" else StepwiseMRA()
+    estimator: PartialF | SecondOrderRegression = PartialF() if method == "partial-f" else SecondOrderRegression()
     found = estimator.fit(candidates.X, candidates.y)
     log: tuple[Step, ...] = found.log_
     steps = Table(

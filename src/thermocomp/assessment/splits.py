@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.harm import MIN_ROWS
+from thermocomp.assessment.do_no_harm import MIN_ROWS
 from thermocomp.core.exceptions import InputError
 from thermocomp.recording.samples import Samples
 

@@ -182,7 +182,7 @@ def assess(
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
 
     Rows that a model has learned from are left out and counted, whatever file they stand in; if no others are there,
-    the model is refused: see `thermocomp.recording.prints`.
+    the model is refused: see `thermocomp.recording.fingerprints`.
 
     Parameters
     ----------

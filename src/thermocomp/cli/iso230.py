@@ -24,9 +24,9 @@ from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.units import measured
 
 if TYPE_CHECKING:
-    from thermocomp.assessment.iso230_2 import PositioningResult
-    from thermocomp.assessment.thermaltest import Pair, ThermalTest
-    from thermocomp.assessment.timeconstants import Settling
+    from thermocomp.iso230.part2 import PositioningResult
+    from thermocomp.iso230.settling import Settling
+    from thermocomp.iso230.thermaltest import Pair, ThermalTest
     from thermocomp.recording.recording import Recording
 
 Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False, show_default=False)]
@@ -103,10 +103,10 @@ def iso230(
     if distance is not None and pairs:
         raise InputError("--distance is for probes named x1, x2, y1, y2; those of --pairs carry their own")
     with needs("study"):
-        from thermocomp.assessment import iso230_2, iso230_3
-        from thermocomp.assessment.timeconstants import Phase, find_phases, time_constants
         from thermocomp.files import modelfile
         from thermocomp.files import positioning as positioning_files
+        from thermocomp.iso230 import part2, part3
+        from thermocomp.iso230.settling import Phase, find_phases, time_constants
     given = [Path(p) for p in (model, mapping) if p is not None]
     if output is not None:
         refuse_existing([output], overwrite, [*recordings, *positioning, *given], ".html")
@@ -123,14 +123,12 @@ def iso230(
     settlings: list[tuple[Recording, tuple[Settling, ...]]] = []
     for recording in tests:
         paired = _pairs(recording, distance, pairs)
-        mine = iso230_3.assess(
-            recording, test, pairs=paired, ambient=ambient, models=models, start=start, limits=limits
-        )
+        mine = part3.assess(recording, test, pairs=paired, ambient=ambient, models=models, start=start, limits=limits)
         # where nothing was recorded of the drives, a test is told to be a warm-up
         phases = find_phases(recording) or tuple(Phase("warm-up", 1, t.start, t.stop) for t in mine if t.kind != "etve")
         thermal += mine
-        settlings.append((recording, time_constants(recording, phases, iso230_3.find_stations(recording))))
-    positioned = [iso230_2.assess(p) for path in positioning for p in positioning_files.read(path)]
+        settlings.append((recording, time_constants(recording, phases, part3.find_stations(recording))))
+    positioned = [part2.assess(p) for path in positioning for p in positioning_files.read(path)]
     if output is not None:
         with needs("study"):
             from thermocomp.report import iso230 as pages
@@ -160,8 +158,8 @@ def length(text: str, what: str) -> float:
 
 
 def _pairs(recording: "Recording", distance: str | None, pairs: list[str] | None) -> "tuple[Pair, ...]":
-    from thermocomp.assessment import iso230_3
-    from thermocomp.assessment.thermaltest import Pair
+    from thermocomp.iso230 import part3
+    from thermocomp.iso230.thermaltest import Pair
 
     if pairs:
         found = []
@@ -172,12 +170,12 @@ def _pairs(recording: "Recording", distance: str | None, pairs: list[str] | None
                     f"--pairs {text!r}: write the probe at the tip, the one nearer to the spindle and their distance, "
                     "such as x1:x2:100mm"
                 )
-            tip, spindle = (iso230_3.find_probe(recording, name.strip()) for name in parts[:2])
+            tip, spindle = (part3.find_probe(recording, name.strip()) for name in parts[:2])
             found.append(Pair(tip, spindle, length(parts[2], f"--pairs {text!r}: distance")))
         return tuple(found)
     if distance is None:
         return ()
-    paired = iso230_3.find_pairs(recording, length(distance, "--distance"))
+    paired = part3.find_pairs(recording, length(distance, "--distance"))
     if not paired:
         raise InputError(
             f"--distance: {recording.name} has no probes named x1 and x2, or y1 and y2; name them by --pairs "
@@ -192,9 +190,9 @@ def _show(
     positioned: "list[PositioningResult]",
     page: Path | None,
 ) -> None:
-    from thermocomp.assessment import iso230_tables as tables
-    from thermocomp.assessment.thermaltest import TITLES
     from thermocomp.cli.output import print_table
+    from thermocomp.iso230 import tables
+    from thermocomp.iso230.thermaltest import TITLES
 
     # numbers must not be cut: a narrow terminal wraps whole lines instead
     wide = Console(highlight=False, width=max(_console.width, TABLE_WIDTH))
@@ -227,7 +225,7 @@ def _print_json(
     positioned: "list[PositioningResult]",
     trouble: list[str],
 ) -> None:
-    from thermocomp.assessment import iso230_tables as tables
+    from thermocomp.iso230 import tables
 
     content = {
         "trouble": trouble,

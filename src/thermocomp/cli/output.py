@@ -13,7 +13,7 @@ from rich.table import Table
 from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice, written
 from thermocomp.assessment.choice import Table as ChoiceTable
-from thermocomp.assessment.harm import Unit
+from thermocomp.assessment.do_no_harm import Unit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.checked import recording_content

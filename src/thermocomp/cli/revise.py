@@ -7,19 +7,19 @@ from pathlib import Path
 
 from rich.console import Console
 
+from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.cli import reviseheader, reviserun, revisetables
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Flag, Json, Output, refuse_existing
 from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
 from thermocomp.cli.revisetravel import Travel
-from thermocomp.compensation.nc.drifting.stations import Station
-from thermocomp.compensation.nc.following.block import Setup
-from thermocomp.compensation.nc.reading.recognise import program_number
-from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising.revise import FIRST, Revision
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
-from thermocomp.shopfloor import rs274
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.parser.recognise import program_number
+from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.nc.rewrite.revise import FIRST, Revision
+from thermocomp.nc.thermal.stations import Station
 
 _console = Console(highlight=False)
 

@@ -4,11 +4,11 @@ from array import array
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from thermocomp.compensation.nc.following.block import Setup
-from thermocomp.compensation.nc.reading.tokens import program_lines
-from thermocomp.compensation.nc.unrolling.unroll import unroll
+from thermocomp.adapters.linuxcnc.expansion.expand import expand
 from thermocomp.files import ncprogram
-from thermocomp.shopfloor.expand import expand
+from thermocomp.nc.expansion.unroll import unroll
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.parser.tokens import program_lines
 
 
 def written_out(

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from thermocomp.assessment.precompensation import Proof
-from thermocomp.compensation.nc.following.block import Setup, system_name
-from thermocomp.compensation.nc.revising.course import Bound
-from thermocomp.compensation.nc.revising.elsewhere import AWAY, Elsewhere
-from thermocomp.compensation.nc.revising.header import wrapped
+from thermocomp.adapters.linuxcnc.verification.verify import Proof
+from thermocomp.nc.interpreter.block import Setup, system_name
+from thermocomp.nc.rewrite.course import Bound
+from thermocomp.nc.rewrite.elsewhere import AWAY, Elsewhere
+from thermocomp.nc.rewrite.header import wrapped
 
 UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
 #: most lines for the models, for the place, and for the proof

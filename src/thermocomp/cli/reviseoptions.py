@@ -19,23 +19,23 @@ from thermocomp.cli.revisevalues import (
     tool_of,
     value,
 )
-from thermocomp.compensation.nc.drifting import start
-from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.drifting.inputs import SPEED, Signal, constants
-from thermocomp.compensation.nc.drifting.start import Start
-from thermocomp.compensation.nc.drifting.stations import Station, stations
-from thermocomp.compensation.nc.following.block import Setup
-from thermocomp.compensation.nc.revising.coordinates import Coordinates
-from thermocomp.compensation.nc.revising.demand import Demand
-from thermocomp.compensation.nc.revising.method import Method
-from thermocomp.compensation.nc.revising.offset import Offset
-from thermocomp.compensation.nc.revising.text import DIGITS
-from thermocomp.compensation.nc.timing.timeline import Kinematics
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
 from thermocomp.files import forecast as forecasts
 from thermocomp.files import jobstate, modelfile
 from thermocomp.files.machines import read_machine
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.rewrite.coordinates import Coordinates
+from thermocomp.nc.rewrite.demand import Demand
+from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.offset import Offset
+from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.thermal import start
+from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.inputs import SPEED, Signal, constants
+from thermocomp.nc.thermal.start import Start
+from thermocomp.nc.thermal.stations import Station, stations
 
 Zero = Literal["start", "cold", "last"]
 Models = Annotated[list[Path], Parameter(consume_multiple=True, negative=())]

@@ -9,21 +9,21 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from thermocomp import __version__
-from thermocomp.assessment.precompensation import Ledger, Proof, prove
+from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.cli import reviseheader
 from thermocomp.cli.progress import Share, by_share
 from thermocomp.cli.reviseexpand import written_out
 from thermocomp.cli.revisetravel import Travel
 from thermocomp.cli.shown import shown
-from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.reading.tokens import program_lines
-from thermocomp.compensation.nc.revising import diff, header
-from thermocomp.compensation.nc.revising.course import Bound, Course, Run
-from thermocomp.compensation.nc.revising.offset import ending
-from thermocomp.compensation.nc.revising.revise import Revised, Revision
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import publish, scratch
+from thermocomp.nc.parser.tokens import program_lines
+from thermocomp.nc.rewrite import diff, header
+from thermocomp.nc.rewrite.course import Bound, Course, Run
+from thermocomp.nc.rewrite.offset import ending
+from thermocomp.nc.rewrite.revise import Revised, Revision
+from thermocomp.nc.thermal.drift import Drift
 
 #: what a program that cannot be proved is refused with
 ALL_THE_SAME = "--unproved writes it all the same, and its header says so"

@@ -8,15 +8,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from thermocomp.assessment.precompensation import Proof
+from thermocomp.adapters.linuxcnc.verification.verify import Proof
 from thermocomp.cli import reviseheader
 from thermocomp.cli.reviserun import Done, Job
 from thermocomp.cli.shown import shown
-from thermocomp.compensation.nc.drifting.inputs import SPEED
-from thermocomp.compensation.nc.following.block import Setup
-from thermocomp.compensation.nc.revising.course import Bound
-from thermocomp.compensation.nc.revising.offset import Offset
-from thermocomp.compensation.nc.revising.revise import TELLING
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.rewrite.course import Bound
+from thermocomp.nc.rewrite.offset import Offset
+from thermocomp.nc.rewrite.revise import TELLING
+from thermocomp.nc.thermal.inputs import SPEED
 
 #: lines from which on the time that one takes can be told
 MANY = 1000

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from thermocomp.compensation.nc.revising.revise import Revised
+from thermocomp.nc.rewrite.revise import Revised
 
 #: so far beyond the travel an axis has to go before anybody is told [mm]
 BEYOND = 1.0

@@ -3,12 +3,12 @@
 import re
 from collections.abc import Sequence
 
-from thermocomp.compensation.nc.following import startup
-from thermocomp.compensation.nc.following.block import Point
-from thermocomp.compensation.nc.following.codes import find
-from thermocomp.compensation.nc.reading.tokens import Controller
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import measured as with_unit
+from thermocomp.nc.interpreter import startup
+from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.interpreter.codes import find
+from thermocomp.nc.parser.tokens import Controller
 
 _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)

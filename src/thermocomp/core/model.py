@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.fingerprints import Prints
 from thermocomp.core.instants import seconds
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
-from thermocomp.core.prints import Prints
 from thermocomp.core.validity import Validity
 from thermocomp.core.zero import FIRST_READING, Zeroing, begin
 

@@ -82,7 +82,7 @@ METHODS: dict[str, Method] = {
     for m in (
         Method("ols", "least squares on all temperatures", "ols.LeastSquares"),
         Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", "partial_f.PartialF"),
-        Method("mra", "Chen's stepwise second-order regression", "mra.StepwiseMRA"),
+        Method("mra", "Chen's stepwise second-order regression", "second_order.SecondOrderRegression"),
         Method(
             "dynamic",
             "ridge on temperatures, their lagged copies and the lagged spindle speed",

@@ -14,15 +14,15 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.lasso import Lasso
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.partial_f import PartialF
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.subsets import BestSubset
 
 #: the methods that choose, as on the command line
 SELECTORS: dict[str, type[ThermalRegressor]] = {
     "grouping": CorrelationGrouping,
     "partial-f": PartialF,
-    "stepwise": StepwiseMRA,
+    "stepwise": SecondOrderRegression,
     "subsets": BestSubset,
     "lasso": Lasso,
 }

@@ -22,7 +22,7 @@ from thermocomp.models.foreign import adopted, numbers, refused, title
 from thermocomp.models.methods import Method, Named, given, method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
-from thermocomp.recording.prints import fingerprint
+from thermocomp.recording.fingerprints import fingerprint
 from thermocomp.recording.samples import Samples
 
 BoolArray = NDArray[np.bool_]

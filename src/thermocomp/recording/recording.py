@@ -1,6 +1,7 @@
 """`Recording`: the synchronised table of one test, with units, roles and thermal cycles."""
 
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -16,6 +17,8 @@ from thermocomp.core.machine import Channel
 from thermocomp.recording.cycles import Cycle
 
 FloatArray = NDArray[np.float64]
+
+_AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +148,11 @@ class Recording:
     def displacements(self) -> tuple[Channel, ...]:
         """Displacement channels [um]."""
         return self.of_quantity("displacement")
+
+    @property
+    def ambient(self) -> Channel | None:
+        """The first temperature whose name says air, ambient, room, workshop or environment; None if none does."""
+        return next((c for c in self.temperatures if _AMBIENT.search(c.name)), None)
 
     @property
     def speed(self) -> Channel | None:

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from thermocomp import __version__
-from thermocomp.assessment import iso230_tables as tables
-from thermocomp.assessment.iso230_2 import PositioningResult
-from thermocomp.assessment.thermaltest import TITLES, ThermalTest
-from thermocomp.assessment.timeconstants import Settling
+from thermocomp.iso230 import tables
+from thermocomp.iso230.part2 import PositioningResult
+from thermocomp.iso230.settling import Settling
+from thermocomp.iso230.thermaltest import TITLES, ThermalTest
 from thermocomp.recording.recording import Recording
 from thermocomp.report import iso230figures as figures
 from thermocomp.report.html import environment

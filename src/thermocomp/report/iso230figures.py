@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from thermocomp.assessment.iso230_2 import PositioningResult
-from thermocomp.assessment.thermaltest import HOUR, Curve, ThermalTest
-from thermocomp.assessment.timeconstants import Settling
+from thermocomp.iso230.part2 import PositioningResult
+from thermocomp.iso230.settling import Settling
+from thermocomp.iso230.thermaltest import HOUR, Curve, ThermalTest
 from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, drawing, svg, thinned
 
 FloatArray = NDArray[np.float64]

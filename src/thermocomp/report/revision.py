@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.revising.course import Bound, Run
+from thermocomp.nc.rewrite.course import Bound, Run
 from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL, drawing
 
 FloatArray = NDArray[np.float64]

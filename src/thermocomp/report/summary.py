@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from thermocomp import __version__
-from thermocomp.assessment import coverage, harm
+from thermocomp.assessment import coverage, do_no_harm
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.robustness import Robustness
@@ -73,8 +73,8 @@ def verdict(comparison: Comparison) -> str:
     usable = {t: a for t, a in best.items() if a is not None}
     left = [t for t in targets if t not in usable]
     if not usable:
-        untried = any(harm.UNTRIED in a.verdict.caps for a in comparison.overall())
-        why = harm.UNTRIED if untried else "none was shown to be better than constants on unseen cycles"
+        untried = any(do_no_harm.UNTRIED in a.verdict.caps for a in comparison.overall())
+        why = do_no_harm.UNTRIED if untried else "none was shown to be better than constants on unseen cycles"
         return f"No model may run yet for {_list(targets)}: {why}."
     by_model: dict[str, list[str]] = {}
     for t, a in usable.items():

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996.setup import (
     CLOSELY,
@@ -70,7 +70,7 @@ class Learned:
     Parameters
     ----------
     samples : Samples
-    regressions : mapping of str to StepwiseMRA
+    regressions : mapping of str to SecondOrderRegression
         Per drift.
     models : mapping of str to ErrorModel
         The same, frozen.
@@ -83,7 +83,7 @@ class Learned:
     """
 
     samples: Samples
-    regressions: Mapping[str, StepwiseMRA]
+    regressions: Mapping[str, SecondOrderRegression]
     models: Mapping[str, ErrorModel]
     wide: Mapping[str, ErrorModel]
     nets: Sequence[Trained]
@@ -120,9 +120,9 @@ def learn(seed: int, told: Callable[[float], None]) -> Learned:
     """
     samples = drift_samples(recordings("chen1996", seed))
     heat = samples.only(TEMPERATURES)
-    regressions = {t: StepwiseMRA(differences=DIFFERENCES, subset=group) for t, group in SUBGROUPS.items()}
+    regressions = {t: SecondOrderRegression(differences=DIFFERENCES, subset=group) for t, group in SUBGROUPS.items()}
     models = {t: common.fitted(r, heat, [t])[t] for t, r in regressions.items()}
-    wide = {t: common.fitted(StepwiseMRA(), heat, [t])[t] for t in DRIFTS}
+    wide = {t: common.fitted(SecondOrderRegression(), heat, [t])[t] for t in DRIFTS}
     kinds: dict[str, tuple[SigmoidNet, int]] = {"": (SigmoidNet(hidden=HIDDEN), STARTS)}
     kinds |= {f"9-{h}-3": (SigmoidNet(hidden=h), SWEEP_STARTS) for h in SWEEP}
     kinds["common scaling"] = SigmoidNet(hidden=HIDDEN, scaling="common"), SWEEP_STARTS

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996.setup import (
     DIFFERENCES,
     EQ6,
@@ -75,9 +75,9 @@ class Design:
     hierarchy: bool = False
 
     @property
-    def method(self) -> StepwiseMRA:
+    def method(self) -> SecondOrderRegression:
         """Chen's regression."""
-        return StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
+        return SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
 
     def reference(self, n_states: int) -> list[int]:
         """Return the states of a test that are counted from the mean of."""
@@ -235,7 +235,7 @@ def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, 
     for draw in range(n_draws):
         measured = plant(days[draw % len(days)], design, rng)
         change, k1 = (np.concatenate(v) for v in zip(*(m.counted(design) for m in measured), strict=True))
-        regression: StepwiseMRA = design.method.fit(pd.DataFrame(change, columns=list(TEMPERATURES)), k1)
+        regression: SecondOrderRegression = design.method.fit(pd.DataFrame(change, columns=list(TEMPERATURES)), k1)
         found.append(dict(zip(regression.terms_, regression.coef_.tolist(), strict=True)))
     return Recovery(design, found)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermocomp.models.mra import StepwiseMRA
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
 from thermocomp.papers.chen1996.setup import DRIFTS, SENSORS, SUBGROUPS
@@ -77,7 +77,7 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.3f}"
 
 
-def _log(regression: StepwiseMRA, target: str) -> Table:
+def _log(regression: SecondOrderRegression, target: str) -> Table:
     rows = [
         [f"{s.number}", s.action.upper(), s.term, f"{s.r:.3f}", f"{s.r_squared:.3f}", f"{s.f:.1f}"]
         for s in regression.log_

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from thermocomp.files.profiles import from_recording
 from thermocomp.models.mlp import SigmoidNet
-from thermocomp.models.mra import StepwiseMRA
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position, slope_samples
+from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
 from thermocomp.papers.chen1996 import law
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
@@ -75,7 +75,7 @@ class Positioning:
 
     @property
     def regression(self) -> Any:
-        """The StepwiseMRA behind its fit."""
+        """The SecondOrderRegression behind its fit."""
         return self.fits[MRA].trained[0].estimator
 
     @cached_property
@@ -123,7 +123,10 @@ def learn(seed: int, other_seed: int) -> Positioning:
     regression, linear = (
         fit_position(
             learned,
-            replace(paper, method=StepwiseMRA(differences=DIFFERENCES, subset=SLOPE_VARIABLES, second_order=second)),
+            replace(
+                paper,
+                method=SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES, second_order=second),
+            ),
         )
         for second in (True, False)
     )

@@ -10,20 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.compensation.nc.drifting.drift import Drift
-from thermocomp.compensation.nc.drifting.start import Start, carried, cold
-from thermocomp.compensation.nc.drifting.stations import Station
-from thermocomp.compensation.nc.following.block import Block, Setup
-from thermocomp.compensation.nc.following.follower import follow
-from thermocomp.compensation.nc.reading.tokens import read_lines
-from thermocomp.compensation.nc.revising.coordinates import Coordinates
-from thermocomp.compensation.nc.revising.demand import Demand
-from thermocomp.compensation.nc.revising.method import Method
-from thermocomp.compensation.nc.revising.offset import Offset
-from thermocomp.compensation.nc.revising.revise import Revision
-from thermocomp.compensation.nc.revising.text import DIGITS
-from thermocomp.compensation.nc.timing.timeline import Kinematics, Timed, timed
 from thermocomp.core.model import ErrorModel
+from thermocomp.nc.interpreter.block import Block, Setup
+from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.nc.planner.timeline import Kinematics, Timed, timed
+from thermocomp.nc.rewrite.coordinates import Coordinates
+from thermocomp.nc.rewrite.demand import Demand
+from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.offset import Offset
+from thermocomp.nc.rewrite.revise import Revision
+from thermocomp.nc.rewrite.text import DIGITS
+from thermocomp.nc.thermal.drift import Drift
+from thermocomp.nc.thermal.start import Start, carried, cold
+from thermocomp.nc.thermal.stations import Station
 from thermocomp.papers.precompensation.setup import INTERVAL, MILLING, POSITIONS, SPEED
 from thermocomp.recording.recording import Recording
 

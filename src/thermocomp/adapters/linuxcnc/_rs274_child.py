@@ -1,0 +1,446 @@
+"""Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
+
+A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
+thermocomp but `_rs274_hooks.py` and `_rs274_kinds.py` beside it. `rs274process.py` starts it with the
+folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with
+the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of
+what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a block
+without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record
+tells of its centre.
+
+The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
+the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
+in inches from the module whatever the program's unit is; but those of moves leave here in mm.
+"""
+
+import ctypes
+import json
+import math
+import os
+import re
+import resource
+import struct
+import sys
+import traceback
+from collections.abc import Callable
+from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
+from typing import Any, BinaryIO
+
+MM = 25.4
+#: records of a block
+BLOCK = 2048
+
+
+def beside(name: str) -> Any:
+    """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
+    spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+kinds = beside("_rs274_kinds")
+INT, D, B, P, TEXT, Pose = kinds.INT, kinds.D, kinds.B, kinds.P, kinds.TEXT, kinds.Pose
+RECORD, KINDS, CODES, TOLD, PYTHON = kinds.RECORD, kinds.KINDS, kinds.CODES, kinds.TOLD, kinds.PYTHON
+RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
+
+
+class RefusedError(Exception):
+    """The program wants something that is not done for it."""
+
+
+class Canon:
+    """Receives the canonical calls of the interpreter."""
+
+    def __init__(self, out: BinaryIO) -> None:
+        self.out = out
+        self.records: list[bytes] = []
+        self.more: list[Any] = []
+        self.line = 0
+        self.begun = 0  # 1 after the mark in the job's start block, 2 after its last call, the tool length
+        self.metric = False
+        self.interpreter = 0
+        self.place: tuple[float, ...] = (0.0,) * 9  # program coordinates where it stands [inch, deg]
+        self.offset: dict[str, tuple[float, ...]] = dict.fromkeys(("g5x", "g92", "length"), (0.0,) * 9)  # [inch, deg]
+        self.angle = 0.0
+        self.plane = 1
+        self.feed = 0.0  # [mm/min]
+        self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
+        self.file = b""
+        self.files: dict[bytes, None] = {}  # that were opened
+        self.hooks = beside("_rs274_hooks").Hooks()
+        self.linked = ctypes.PyDLL("librs274.so.0")
+        self.sequence = self.linked._ZN6Interp15sequence_numberEv
+        self.sequence.argtypes = (P,)
+        self.name = self.linked._ZN6Interp9file_nameEPcm
+        self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
+        self.buffer = ctypes.create_string_buffer(512)
+        self.alone = True  # no other file has been opened
+
+    def begin(self, job: dict[str, Any]) -> None:
+        """Take what the program is run in."""
+        self.parameter_file = job["parameters"]
+        self.delete = bool(job["block_delete"])
+        self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
+        self.spindle: int = job["spindle"]
+        self.program = os.path.realpath(job["program"].encode())
+
+    def connect(self, module: str) -> None:
+        """Turn the functions the module leaves empty to this object."""
+
+        def told(kind: str) -> Callable[..., None]:
+            return lambda *numbers: self.tell(kind, *numbers)
+
+        functions: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
+            name: (told(kind), (None, *types)) for name, (kind, types) in TOLD.items()
+        }
+        functions["_Z22START_SPEED_FEED_SYNCHidb"] = (self.synchronised, (None, INT, D, B))
+        functions["_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi"] = (self.tool_stored, (None, INT, INT, Pose, D, D, D, INT))
+        functions["fopen64"] = (self.opened, (P, TEXT, TEXT))
+        functions[PYTHON] = (self.python, (INT, P, TEXT, P, B))
+        functions["_Z7COMMENTPKc"] = (self.commented, (None, TEXT))  # the module knows ASCII only
+        functions["_Z7MESSAGEPc"] = (self.messaged, (None, TEXT))
+        functions["_Z18CHANGE_TOOL_NUMBERi"] = (self.change_tool_number, (None, INT))
+        functions["_Z9RIGID_TAPidddd"] = (self.tapped, (None, INT, D, D, D, D))
+        functions["_Z4WAITiiid"] = (self.waited, (INT, INT, INT, INT, D))
+        functions["_Z16USE_LENGTH_UNITS11CANON_UNITS"] = (self.united, (None, INT))
+        functions["_Z23SET_MOTION_CONTROL_MODE17CANON_MOTION_MODEd"] = (self.pathed, (None, INT, D))
+        functions["_Z22SET_NAIVECAM_TOLERANCEd"] = (self.naive, (None, D))
+        # what the module answers is wrong once the unit, an offset or the mode has changed
+        functions["_Z22GET_EXTERNAL_FEED_RATEv"] = (lambda: self.feed / self.unit(), (D,))
+        functions["_Z32GET_EXTERNAL_MOTION_CONTROL_MODEv"] = (lambda: self.path[0], (INT,))
+        functions["_Z37GET_EXTERNAL_MOTION_CONTROL_TOLERANCEv"] = (lambda: self.path[1] / self.unit(), (D,))
+        functions["_Z46GET_EXTERNAL_MOTION_CONTROL_NAIVECAM_TOLERANCEv"] = (lambda: self.path[2] / self.unit(), (D,))
+        for i, axis in enumerate("XYZABCUVW"):
+            functions[f"_Z23GET_EXTERNAL_POSITION_{axis}v"] = (partial(self.position, i), (D,))
+            functions[f"_Z32GET_EXTERNAL_TOOL_LENGTH_{axis}OFFSETv"] = (partial(self.tool_length, i), (D,))
+        functions["_Z10NURBS_FEEDiSt6vectorI13CONTROL_POINTSaIS0_EEj"] = (
+            self.curved,
+            (None, INT, P, ctypes.c_uint),
+        )
+        before = self.hooks.turn("librs274", functions)
+        self.python_before = before[PYTHON]
+        self.unit_before, self.open_before = before["_Z16USE_LENGTH_UNITS11CANON_UNITS"], before["fopen64"]
+        made = {"_ZN6InterpC1Ev": (self.constructed, (None, P))}
+        self.construct_before = self.hooks.turn(module, made)["_ZN6InterpC1Ev"]
+
+    def constructed(self, this: int) -> None:
+        self.construct_before(this)
+        self.interpreter = this
+
+    # --- writing ---
+    def where(self) -> None:
+        """Line and file of the block in execution."""
+        if self.interpreter:
+            self.move_to(self.sequence(self.interpreter))
+
+    def move_to(self, line: int) -> None:
+        self.line = line if self.begun == 2 else 0
+        if self.alone:
+            return
+        self.name(self.interpreter, self.buffer, 512)
+        name = self.buffer.value
+        if name != self.file:
+            self.file = name
+            own = not name or os.path.samefile(name, self.program)  # noqa: PTH121
+            self.extra("file", "" if own else name.decode("utf-8", "replace"))
+
+    def tell(self, kind: str, *numbers: float) -> None:
+        self.where()
+        self.record(kind, *numbers)
+
+    def record(self, kind: str, *numbers: float) -> None:
+        self.records.append(RECORD.pack(CODES[kind], len(numbers), self.line, *numbers, *(0.0,) * (10 - len(numbers))))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    def text(self, kind: str, text: str) -> None:
+        self.where()
+        self.extra(kind, re.sub("[^ -~]", "?", text))
+
+    def extra(self, kind: str, what: Any) -> None:
+        """Tell what is no row of numbers."""
+        self.more.append(what)
+        self.record(kind, len(self.more) - 1)
+
+    def flush(self) -> None:
+        more = json.dumps(self.more).encode()
+        self.out.write(struct.pack("<II", len(self.records), len(more)))
+        self.out.writelines(self.records)
+        self.out.write(more)
+        self.out.flush()
+        self.records.clear()
+        self.more.clear()
+
+    def length(self, value: float) -> float:
+        return value if self.metric else value * MM
+
+    def unit(self) -> float:
+        return 1.0 if self.metric else MM
+
+    # --- where it stands: program = unrotated(machine - origin - tool) - G92 ---
+    def turned(self, values: tuple[float, ...], angle: float) -> list[float]:
+        c, s = math.cos(angle), math.sin(angle)
+        return [values[0] * c - values[1] * s, values[0] * s + values[1] * c, *values[2:]]
+
+    def shifted(self, name: str, values: tuple[float, ...]) -> None:
+        """Take an offset; the machine stays."""
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        machine = self.turned(tuple(p + g for p, g in zip(self.place, self.offset["g92"], strict=True)), self.angle)
+        machine = [m + f for m, f in zip(machine, sums, strict=True)]
+        if name == "rotation":
+            self.angle = math.radians(values[0])
+        else:
+            self.offset[name] = values
+        sums = [o + t for o, t in zip(self.offset["g5x"], self.offset["length"], strict=True)]
+        back = self.turned(tuple(m - f for m, f in zip(machine, sums, strict=True)), -self.angle)
+        self.place = tuple(p - g for p, g in zip(back, self.offset["g92"], strict=True))
+
+    def position(self, axis: int) -> float:
+        return self.place[axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)
+
+    def tool_length(self, axis: int) -> float:
+        return self.offset["length"][axis] * (MM if self.metric and not 3 <= axis < 6 else 1.0)
+
+    # --- what the module leaves out ---
+    def united(self, unit: int) -> None:
+        self.unit_before(unit)
+        self.metric = unit == 2
+        self.tell("unit", 1.0 if self.metric else MM)
+
+    def synchronised(self, spindle: int, pitch: float, velocity: bool) -> None:
+        self.tell("sync", spindle, self.length(pitch), velocity)
+
+    def change_tool_number(self, number: int) -> None:
+        self.spindle = number
+        self.tell("toolnumber", number)
+
+    def tool_stored(self, place: int, number: int, pose: Any, front: float, back: float, size: float, to: int) -> None:
+        """G10 L1, L10, L11: M6 and G43 take the tool from here [mm]."""
+        if 0 < number <= len(self.tools):
+            self.tools[number - 1] = (number, pose.values[2], size)
+        self.tell("tooltable")
+
+    def opened(self, name: bytes, mode: bytes) -> int:
+        """Note a file that is there, the program's own included."""
+        result: int = self.open_before(name, mode)
+        if result and mode.startswith(b"r"):
+            path = os.path.realpath(name)
+            self.files[path] = None
+            self.alone &= path == self.program or self.begun < 2
+        return result
+
+    def python(self, this: int, code: bytes, result: int, as_file: bool) -> int:
+        """Run Python code of the interpreter's own, and none of a program."""
+        if code == b"from interpreter import this":
+            done: int = self.python_before(this, code, result, as_file)
+            return done
+        self.where()
+        raise RefusedError(self.line, "it holds Python code (py, ...), which is not run here")
+
+    def commented(self, text: bytes) -> None:
+        self.comment(text.decode("latin-1"))
+
+    def messaged(self, text: bytes) -> None:
+        self.text("message", text.decode("latin-1"))
+
+    def tapped(self, line: int, x: float, y: float, z: float, scale: float) -> None:
+        self.tell("tap", self.length(x), self.length(y), self.length(z), scale)
+
+    def waited(self, index: int, *more: float) -> int:
+        self.tell("wait", index)
+        return 0
+
+    def pathed(self, mode: int, tolerance: float) -> None:
+        self.path = (mode, self.length(tolerance), self.path[2])
+        self.tell("path", mode, self.length(tolerance))
+
+    def naive(self, tolerance: float) -> None:
+        self.path = (*self.path[:2], self.length(tolerance))
+        self.tell("naive", self.length(tolerance))
+
+    def curved(self, line: int, vector: int, order: int) -> None:
+        """Tell a spline; the argument is a std::vector of (x, y, weight)."""
+        first, last = (ctypes.c_size_t.from_address(vector + 8 * i).value for i in (0, 1))
+        numbers = (D * ((last - first) // 8)).from_address(first)
+        points = [n if i % 3 == 2 else self.length(n) for i, n in enumerate(numbers)]
+        self.place = (points[-3] / MM, points[-2] / MM, *self.place[2:])
+        self.where()
+        self.extra("curve", [order, *points])
+
+    # --- what the module tells ---
+    def next_line(self, state: Any) -> None:
+        if self.alone:
+            self.line = state.sequence_number if self.begun == 2 else 0
+        elif self.interpreter:
+            self.move_to(state.sequence_number)
+
+    def straight_traverse(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    def straight_feed(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    def straight_probe(self, *place: float) -> None:
+        self.place = place
+        self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    def arc_feed(
+        self, end1: float, end2: float, centre1: float, centre2: float, turns: int, end3: float, *more: float
+    ) -> None:
+        at = {1: (end1, end2, end3), 2: (end3, end1, end2), 3: (end2, end3, end1)}[self.plane]
+        plane = {1: 17, 2: 19, 3: 18}[self.plane]
+        self.place = (*at, *more)
+        centre = (centre1 * MM, centre2 * MM, turns, plane, *(0.0,) * 6)
+        self.records.append(RECORD.pack(CENTRE, 4, self.line, *centre))
+        self.records.append(RECORD.pack(ARC, 9, self.line, *self.place, 0.0))
+        if len(self.records) >= BLOCK:
+            self.flush()
+
+    def offsets(self, kind: str, first: tuple[int, ...], values: tuple[float, ...]) -> None:
+        self.where()
+        self.shifted(kind, values)
+        self.record(kind, *first, *(v if 3 <= i < 6 else v * MM for i, v in enumerate(values)))
+        if kind == "length" and self.begun == 1:
+            self.begun = 2
+
+    def set_g5x_offset(self, index: int, *values: float) -> None:
+        self.offsets("g5x", (index,), values)
+
+    def set_g92_offset(self, *values: float) -> None:
+        self.offsets("g92", (), values)
+
+    def tool_offset(self, *values: float) -> None:
+        self.offsets("length", (), values)
+
+    def set_xy_rotation(self, angle: float) -> None:
+        self.shifted("rotation", (angle,))
+        self.tell("rotation", angle)
+
+    def set_plane(self, plane: int) -> None:
+        self.plane = plane
+        self.tell("plane", {1: 17, 2: 19, 3: 18}[plane])
+
+    def set_feed_rate(self, feed: float) -> None:
+        # the module divides by 25.4 in G21 and does not in G20; a feed of rotary axes alone is no length
+        self.feed = feed * MM
+        self.tell("feedrate", feed * MM, feed * (MM if self.metric else 1.0))
+
+    def dwell(self, seconds: float) -> None:
+        self.tell("dwell", seconds)
+
+    def change_tool(self, number: int) -> None:
+        self.spindle = number
+        self.tell("change", number)
+
+    def user_defined_function(self, number: int, p: float, q: float) -> None:
+        self.tell("user", 100 + number, p, q)
+
+    def comment(self, text: str) -> None:
+        if text == "begin" and not self.begun:
+            self.begun = 1
+        else:
+            self.text("comment", text)
+
+    def message(self, text: str) -> None:
+        """Not used: it is turned to `messaged`."""
+
+    def set_traverse_rate(self, rate: float) -> None:
+        """Not used by the programs' words."""
+
+    # --- what the module asks ---
+    def check_abort(self) -> bool:
+        return self.hooks.failure is not None
+
+    def get_tool(self, index: int) -> tuple[float, ...]:
+        """Of the tool at this place of the table: number, offsets (X to W), diameter, angles, orientation [mm]."""
+        index = index or self.spindle  # place 0 is the spindle
+        number, length, diameter = self.tools[index - 1] if 0 < index <= len(self.tools) else (0, 0.0, 0.0)
+        return (number, 0.0, 0.0, length, *(0.0,) * 6, diameter, 0.0, 0.0, 0)
+
+    def get_external_angular_units(self) -> float:
+        return 1.0
+
+    def get_external_length_units(self) -> float:
+        return 1.0  # of the machine per mm
+
+    def get_axis_mask(self) -> int:
+        return 0x1FF
+
+    def get_block_delete(self) -> bool:
+        return self.delete
+
+
+def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
+    """Run a job."""
+    ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: it does not outlive the process that reads its end
+    resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
+    os.environ["HOME"] = job["home"]
+    os.environ["INI_FILE_NAME"] = job["ini"]
+    # T, M6 and G43 crash the interpreter unless the store of the tools is there: it is $HOME/.tool.mmap
+    tools = ctypes.CDLL("libtooldata.so.0")
+    tools._Z17tool_mmap_creatorPK13EMC_TOOL_STATi(None, 0)
+    tools._Z13tooldata_initb(B(False))
+    tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
+    ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
+    canon.begin(job)
+    result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
+    failure = canon.hooks.failure
+    if isinstance(failure, RefusedError):
+        canon.line, reason = failure.args
+        canon.extra("error", reason)
+    elif failure is not None:
+        raise failure
+    elif result > gcode.MIN_ERROR:
+        canon.text("error", gcode.strerror(result))
+    else:
+        canon.linked._ZN6Interp4exitEv(P(canon.interpreter))  # writes the parameters
+        with open(job["opened"], "wb") as file:  # noqa: PTH123
+            file.write(b"\0".join(canon.files))
+        canon.record("done")
+    canon.flush()
+
+
+def main() -> None:
+    """Run the jobs of the folders that are named, each from the same fresh state of the interpreter's module."""
+    with os.fdopen(os.dup(1), "wb", buffering=1 << 18) as out:
+        os.dup2(2, 1)  # (PRINT, ...) of a program goes to standard output
+        os.environ["HOME"] = os.getcwd()  # noqa: PTH109
+        import gcode  # type: ignore[import-not-found,unused-ignore]
+
+        canon = Canon(out)
+        canon.connect("gcode.cpython")
+        out.write(json.dumps(KINDS).encode() + b"\n")
+        out.flush()
+        for folder in sys.argv[1:]:
+            child = os.fork()
+            if not child:
+                code = 1
+                try:
+                    with open(f"{folder}/job", encoding="utf-8") as file:  # noqa: PTH123
+                        job = json.load(file)
+                    run(job, canon, gcode)
+                    code = 0
+                except BaseException:  # noqa: BLE001
+                    traceback.print_exc()
+                finally:
+                    sys.stderr.flush()
+                    os._exit(code)
+            end = json.dumps([os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])]).encode()
+            out.write(struct.pack("<II", 0, len(end)) + end)
+            out.flush()
+
+
+if __name__ == "__main__":
+    main()

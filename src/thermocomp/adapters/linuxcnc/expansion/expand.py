@@ -1,0 +1,232 @@
+"""Expands an NC program: loops, parameters, subprograms, cycles and G91 become plain lines; the result is proven."""
+
+import re
+from array import array
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+
+from thermocomp.adapters.linuxcnc.expansion.origins import DEPENDS, G10
+from thermocomp.adapters.linuxcnc.expansion.plain import Writer
+from thermocomp.adapters.linuxcnc.expansion.proof import compare, kept
+from thermocomp.adapters.linuxcnc.expansion.words import Side
+from thermocomp.adapters.linuxcnc.rs274 import Canonical, read
+from thermocomp.adapters.linuxcnc.stored import Stored, drawn
+from thermocomp.core.exceptions import InputError, ProgramError
+
+_NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
+_ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """What `expand` wrote.
+
+    Parameters
+    ----------
+    path : Path
+    sources : array of int
+        For each line of the file, from the first: the line of the program it comes from; 0: of none.
+    acts : int
+        Moves, dwells, stops, tool changes ... that were compared with the program's.
+    """
+
+    path: Path
+    sources: "array[int]"
+    acts: int
+
+
+@dataclass(frozen=True)
+class _Around:
+    """What a program is run in; see `expand`."""
+
+    inch: bool | None
+    startup: str | None
+    diameters: Mapping[int, float]
+    block_delete: bool
+    subroutines: Sequence[Path]
+    user_codes: bool
+    seconds: int
+
+    def run(
+        self,
+        path: Path,
+        stored: Stored,
+        *,
+        task: bool = False,
+        left: dict[int, float] | None = None,
+        opened: set[Path] | None = None,
+    ) -> Generator[Canonical]:
+        """Run a program in it."""
+        return read(
+            path,
+            stored,
+            inch=bool(self.inch),
+            block_delete=self.block_delete,
+            subroutines=self.subroutines,
+            task=task,
+            seconds=self.seconds,
+            left=left,
+            opened=opened,
+        )
+
+    def controller(self, seed: int) -> Stored:
+        """Return a controller that has nothing else in common with that of another seed."""
+        stored = drawn(seed, self.startup or "")
+        return replace(stored, diameters={**stored.diameters, **self.diameters})
+
+
+def expand(
+    path: Path,
+    out: Path,
+    *,
+    inch: bool | None = None,
+    startup: str | None = None,
+    diameters: Mapping[int, float] | None = None,
+    block_delete: bool = False,
+    subroutines: Sequence[Path] = (),
+    user_codes: bool = False,
+    seconds: int = 600,
+) -> Expansion:
+    """Write a program out in plain lines that do the same on every machine, whatever its origins and tool lengths.
+
+    LinuxCNC's interpreter runs the program in two controllers with other origins, tool lengths, homes, parameters,
+    another tool in the spindle and another start, and what both runs have in common is written. Then program and result
+    are run in two more such controllers and have to make the same moves within 1e-6 mm, with the same feeds, spindle,
+    coolant, stops and tools, and to leave the same origins behind. Texts of ``(PRINT,...)`` and ``(LOG,...)`` are left
+    out.
+
+    Parameters
+    ----------
+    path, out : Path
+        `out` must not exist.
+    inch : bool, optional
+        The unit in force at the start; if not given the program has to say it.
+    startup : str, optional
+        Codes in force at the start that the end of a program does not put back, such as ``G64 P0.01 G98`` [mm]. Canned
+        cycles need them; what is not given the program has to say (G61, G61.1 or G64; G98 or G99).
+    diameters : dict of int to float, optional
+        Of the tools [mm]: G41 and G42 are worked out for them. A program that uses another one, which is stored in the
+        controller, is refused.
+    block_delete : bool
+        Leave out the lines that begin with ``/``.
+    subroutines : sequence of Path
+        Folders of subprograms, at most 8; the program's own comes first anyway.
+    user_codes : bool
+        Keep M100 to M199; without it they are refused, for nobody knows what they do.
+    seconds : int
+        Processor time each run may take [s].
+
+    Returns
+    -------
+    Expansion
+
+    Raises
+    ------
+    ProgramError
+        The program does something that depends on what is stored in the machine, or that has no plain words; a file
+        that was run has M19.
+    InputError
+        `out` exists already, or the program is not there.
+    """
+    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds)
+    if out.exists():
+        raise InputError(f"{out} exists already; nothing is overwritten")
+    part = out.with_name(out.name + ".part")
+    acts = 0
+    try:
+        sources: array[int] = array("I")
+        with part.open("w", encoding="ascii", newline="\n") as file:
+            for text, line in _lines(path, around):
+                file.write(text + "\n")
+                sources.append(line)
+        for seed in (3, 4):
+            left: tuple[dict[int, float], dict[int, float]] = ({}, {})
+            stored = around.controller(seed)
+            try:
+                with (
+                    closing(around.run(path, stored, left=left[0])) as asked,
+                    closing(around.run(part, stored, left=left[1])) as done,
+                ):
+                    acts = compare(asked, done)
+                kept(*left)
+            except ProgramError as error:
+                raise ProgramError(error.line, f"it cannot be expanded: {error.reason}") from error
+        part.rename(out)
+    finally:
+        part.unlink(missing_ok=True)
+    return Expansion(out, sources, acts)
+
+
+def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
+    """Yield the lines of the plain program, each with the line of the program it comes from."""
+    if not path.is_file():
+        raise InputError(f"{path} is not a file")
+    percent = _first(path) == "%"
+    if percent:
+        yield "%", 0
+    name = "".join(c if " " <= c <= "~" and c not in "()" else "?" for c in path.name)
+    yield f"(expanded from {name} by thermocomp)", 0
+    if around.diameters:
+        yield "(cutter radius compensation is worked out for given tool diameters)", 0
+    yield "G17 G40 G80 G90 G94", 0
+    if around.startup is not None:
+        yield f"G21 {around.startup}", 0
+    if around.inch is not None:
+        yield "G20" if around.inch else "G21", 0
+    one, two = around.controller(1), around.controller(2)
+    writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
+    opened: set[Path] = set()
+    with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
+        for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
+            if first is None or second is None:
+                raise writer.refuse(f"where it ends {DEPENDS}")
+            yield from writer.write(first, second)
+    for file in sorted(opened):
+        _refuse_orienting(file, path, around.block_delete)
+    if not writer.ended:
+        yield from writer.flush()
+        if percent:
+            yield "%", 0
+
+
+def _refuse_orienting(file: Path, program: Path, block_delete: bool) -> None:
+    """Refuse M19 in a file that was run: without R the interpreter passes it over without a trace."""
+    with file.open(encoding="latin-1") as lines:
+        for number, text in enumerate(lines, 1):
+            code = _NO_CODE.sub("", text).upper()
+            if _ORIENTS.search(code) and not (block_delete and code.startswith("/")):
+                own = file == program.resolve()
+                where = "" if own else f" (line {number} of {file.name})"
+                raise ProgramError(
+                    number if own else 1,
+                    f"it cannot be expanded: it orients the spindle (M19), which plain lines would lose{where}",
+                )
+
+
+def _first(path: Path) -> str:
+    """Return the first line that is not empty."""
+    with path.open(encoding="latin-1") as file:
+        return next((line.strip() for line in file if line.strip()), "")
+
+
+def _told(calls: Iterator[Canonical], side: Side) -> Iterator[Canonical]:
+    """Yield the calls without the interpreter's own remarks; what stands before the first line is where it starts."""
+    for call in calls:
+        if call.line == 0:
+            side.begin(call)
+        elif call.kind != "comment" or call.text == G10 or not call.text.startswith("interpreter: "):
+            yield call
+
+
+class _Source:
+    """Text of a line; the file is read again from its start at each question, which is rare."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __call__(self, number: int) -> str:
+        with self.path.open(encoding="latin-1") as file:
+            return next((text for i, text in enumerate(file, 1) if i == number), "")

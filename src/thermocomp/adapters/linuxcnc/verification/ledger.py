@@ -1,0 +1,134 @@
+"""What every line of a revised program should be shifted by, and where its lines come from."""
+
+from array import array
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.revise import Revised
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+Booleans = np.ndarray[Any, np.dtype[np.bool_]]
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+_INVERSE_TIME = 93
+
+
+class Shift(NamedTuple):
+    """By how much the moves of a line may be shifted [um, machine axes]."""
+
+    before: Vector  #: what the axes carry before it
+    after: Vector  #: what they carry behind it: its last move has to have this
+    inner: Vector  #: on the way, in a cycle
+    inverse: bool  #: G93: a way of another length gives another feed
+    knots: tuple[Vector, ...] = ()  #: at the inner ends of the pieces of a move that was divided
+    other: Vector | None = None  #: what they may carry instead, where the program leaves open which
+
+
+class Shifts(NamedTuple):
+    """The same of many lines."""
+
+    before: Floats  #: lines x 3
+    after: Floats
+    inner: Floats
+    inverse: Booleans
+    placed: Booleans  #: it is known where the axes stood that it names
+    others: tuple[Floats, ...]  #: what may be carried instead before it, and behind it
+
+
+class _Track:
+    """Numbers by line; as long as they stay the same they take no room."""
+
+    def __init__(self, width: int) -> None:
+        self.lines, self.numbers, self.width = array("i"), array("d"), width
+        self._last = (0.0,) * width
+
+    def take(self, line: int, numbers: tuple[float, ...]) -> None:
+        if numbers != self._last:
+            self.lines.append(line)
+            self.numbers.extend(numbers)
+            self._last = numbers
+
+    def at(self, lines: Integers) -> Floats:
+        """Return the numbers of lines, a row each."""
+        if not self.lines:
+            return np.zeros((len(lines), self.width))
+        k = np.searchsorted(np.frombuffer(self.lines, np.intc), lines, side="right") - 1
+        rows = np.frombuffer(self.numbers).reshape(-1, self.width)[k]
+        rows[k < 0] = 0.0
+        return rows
+
+
+class Ledger:
+    """What every line of a program should be shifted by; as long as that stays the same it takes no room."""
+
+    def __init__(self) -> None:
+        self._carried, self._inner, self._other = _Track(3), _Track(3), _Track(3)
+        self._inverse, self._loose = _Track(1), _Track(1)
+        #: by line whose move was divided: what is carried at the inner ends of its pieces
+        self.knots: dict[int, tuple[Vector, ...]] = {}
+        # lines that have become none or several, or the header: first line of the revised program, how many, original
+        self._first, self._count, self._original = array("i"), array("i"), array("i")
+        self._written = 0
+        self._last = 0
+
+    def take(self, revised: Revised) -> None:
+        """Take a line in, in its order, the header too."""
+        if len(revised.texts) != 1 or not revised.number:
+            self._first.append(self._written + 1)
+            self._count.append(len(revised.texts))
+            self._original.append(revised.number or self._last)
+        self._written += len(revised.texts)
+        self._last = line = revised.number or self._last
+        block = revised.block
+        if block is None:
+            return
+        self._carried.take(line, revised.carried)
+        x, y, z = (i - c for i, c in zip(revised.inner, revised.carried, strict=True))
+        self._inner.take(line, (x, y, z))
+        self._inverse.take(line, (float(block.modal.feed_mode == _INVERSE_TIME),))
+        if revised.knots:
+            self.knots[line] = revised.knots
+        self._loose.take(line, (float(not revised.placed),))
+        x, y, z = (o - c for o, c in zip(revised.other or revised.carried, revised.carried, strict=True))
+        self._other.take(line, (x, y, z))
+
+    def of(self, lines: Integers) -> Shifts:
+        """Return what lines of the original should be shifted by."""
+        after = self._carried.at(lines)
+        inverse = self._inverse.at(lines)[:, 0] > 0
+        before, placed = self._carried.at(lines - 1), self._loose.at(lines)[:, 0] == 0
+        others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
+        return Shifts(before, after, after + self._inner.at(lines), inverse, placed, others)
+
+    def at(self, line: int) -> Shift:
+        """Return what a line of the original should be shifted by."""
+        found = self.of(np.array([line]))
+        before, after, inner, inverse = (row[0].tolist() for row in found[:4])
+        other = tuple(found.others[1][0].tolist()) if found.others else tuple(after)
+        return Shift(
+            tuple(before),
+            tuple(after),
+            tuple(inner),
+            inverse,
+            self.knots.get(line, ()),
+            None if other == tuple(after) else other,
+        )
+
+    def originals(self, lines: Integers) -> Integers:
+        """Return the lines of the original that lines of the revised program come from."""
+        if not self._first:
+            return lines
+        first, count, original = (np.frombuffer(a, np.intc).astype(int) for a in self._tables())
+        k = np.searchsorted(first, lines, side="right") - 1
+        beyond = lines - first[k] - count[k]
+        return np.where(k < 0, lines, np.where(beyond < 0, original[k], original[k] + 1 + beyond))
+
+    def _tables(self) -> "tuple[array[int], array[int], array[int]]":
+        return self._first, self._count, self._original
+
+    @property
+    def lines(self) -> int:
+        """Number of lines taken in."""
+        return self._last

@@ -1,0 +1,340 @@
+"""A Fanuc's program in LinuxCNC's words, so that LinuxCNC's interpreter can judge what a revision did to it.
+
+Only where the two controls do the same: G68 becomes an offset and a rotation, K becomes L, a dwell gets seconds, and
+what moves nothing is left out. What a LinuxCNC does otherwise, or cannot do, is not translated, and says so.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Final
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name
+from thermocomp.nc.interpreter.codes import CYCLES
+from thermocomp.nc.interpreter.cycles import KEPT
+from thermocomp.nc.interpreter.interpret import Follower
+from thermocomp.nc.parser.tokens import read_lines
+
+#: diameter of all cutters under G41 and G42: so little that every contour has room for it [mm]
+DIAMETER: Final = 0.02
+#: LinuxCNC's systems that G54.1 P1 and its like become
+_SPARE: Final = (7, 8, 9)
+_MOST_M: Final = 4
+
+#: codes that are the same; in the order that LinuxCNC does them in
+_SAME: Final = (
+    *("G93", "G94", "G95", "G97", "G17", "G18", "G19", "G40", "G61", "G64"),
+    *(f"G{n}" for n in range(54, 60)),
+    *("G90", "G91"),
+)
+_OTHER: Final = {"G61": "G61.1"}
+_SAME_M: Final = frozenset({"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M30", "M48", "M49"})
+#: they move nothing, and say how a Fanuc smooths, or take back what is not in force; G98 and G99 go with each cycle
+_LEFT_OUT: Final = frozenset(
+    {
+        "G98",
+        "G99",
+        "G5",
+        "G5.1",
+        "G8",
+        "G9",
+        "G13.1",
+        "G15",
+        "G22",
+        "G23",
+        "G50",
+        "G50.1",
+        "G61.1",
+        "G67",
+        "G103",
+        "G187",
+    }
+) | {"M19", "M29"}
+_MOTION: Final = CYCLES | {"G0", "G1", "G2", "G3", "G80", "G31"}
+_ONCE: Final = ("G4", "G10", "G28", "G30", "G52", "G53", "G92", "G92.1")
+_AXES: Final = "XYZABC"
+
+
+class UntranslatableError(InputError):
+    """A line cannot be said in LinuxCNC's words.
+
+    Parameters
+    ----------
+    line : int
+        From 1.
+    reason : str
+    """
+
+    def __init__(self, line: int, reason: str) -> None:
+        super().__init__(f"line {line}: {reason}")
+        self.line = line
+        self.reason = reason
+
+
+def translate(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
+    """Say a Fanuc's program in LinuxCNC's words.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        Plain lines, see `thermocomp.nc.expansion.unroll`.
+    setup : Setup
+        That of the program.
+
+    Yields
+    ------
+    str
+        A line of the translation, with its ending.
+    int
+        Line of the program it comes from, from 1.
+
+    Raises
+    ------
+    UntranslatableError
+        LinuxCNC does it otherwise, or not at all.
+    ProgramError
+        The program cannot be followed.
+    """
+    return Translator(setup).translate(lines)
+
+
+class Translator:
+    """Translates one program.
+
+    Parameters
+    ----------
+    setup : Setup
+        That of the program.
+
+    Attributes
+    ----------
+    systems : dict of int to int
+        LinuxCNC's systems, by those of G54.1 (100 + P) that stand in the program.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.systems: dict[int, int] = {}
+        self._setup = setup
+        self._follower = Follower(setup)
+        self._stores: set[str] = set()  # G52, G68 and G92 share one in LinuxCNC
+        self._local: Point = (0.0, 0.0, 0.0)  # of G52 [mm]
+        self._turned = False
+        self._turning = 0
+        self._length: int | None = None
+
+    def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
+        """Yield the lines of the translation, see `translate`."""
+        for line in read_lines(lines, "fanuc"):
+            block = self._follower.step(line)
+            if line.optional and self._setup.skip_optional:
+                continue
+            texts = self._told(block)
+            for text in texts:
+                yield f"{'/' if line.optional else ''}{text}\n", line.number
+            if block.ends:
+                return
+
+    def setup(self) -> Setup:
+        """Return what stands at a LinuxCNC that does what the Fanuc does, when the whole program has been translated.
+
+        A Fanuc stores no rotation, and begins with G98 and without a tolerance of its path, where nothing else is
+        stated. Where the program uses G52 or G68, no G92 may be in force at its start: LinuxCNC has one store for all.
+        """
+        own = self._setup
+        offsets = {self.systems.get(system, system): place for system, place in own.offsets.items()}
+        return replace(
+            own,
+            controller="linuxcnc",
+            offsets={system: place for system, place in offsets.items() if 1 <= system <= 9},
+            rotations=dict.fromkeys(range(1, 10), 0.0),
+            no_shift=own.no_shift or bool(self._stores & {"G52", "G68"}),
+            integers="whole",
+            harmless=frozenset(),
+        )
+
+    # -- one line ----------------------------------------------------------------------------------------------------
+
+    def _told(self, block: Block) -> list[str]:
+        if block.line.demarcation:
+            return ["M2"] if block.ends else []
+        if not block.codes and not block.values:
+            return []
+        codes = set(block.codes)
+        self._check(block, codes)
+        # LinuxCNC reads an F beside G20 in the old unit
+        first: list[str] = [code for code in ("G20", "G21") if code in codes]
+        head = [_OTHER.get(code, code) for code in _SAME if code in codes]
+        head += self._cutter(block, codes) + self._lengths(block, codes) + self._system(block, codes)
+        head += self._speeds(block, codes)
+        machine = [code for code in block.codes if code in _SAME_M]
+        if len(machine) > _MOST_M:
+            first.append(" ".join(machine[:_MOST_M]))
+            machine = machine[_MOST_M:]
+        rotation = self._rotation(block, codes)
+        once = next((code for code in _ONCE if code in codes), "")
+        before, action, after = ([], self._once(block, once), []) if once else self._move(block, codes)
+        main = [" ".join(filter(None, (*head, *machine, action)))]
+        turned = [*main, *rotation] if block.modal.turned else [*rotation, *main]
+        return [text for text in (*first, *before, *turned, *after) if text]
+
+    def _check(self, block: Block, codes: set[str]) -> None:
+        known = {*_SAME, *_SAME_M, *_LEFT_OUT, *_MOTION, *(f"M{n}" for n in self._setup.harmless)}
+        known |= {*_ONCE, "G20", "G21", "G41", "G42", "G43", "G49", "G54.1", "G68", "G69", "G154"}
+        if strange := sorted(codes - known):
+            raise _cannot(block, f"{strange[0]} has no counterpart in LinuxCNC")
+        if block.kind == "probe":
+            raise _cannot(block, "G31 probes: where it ends is not known")
+        self._stores |= codes & {"G52", "G68", "G92", "G92.1"}
+        if self._stores & {"G92", "G92.1"} and self._stores & {"G52", "G68"}:
+            raise _cannot(block, "G92 beside G52 or G68: LinuxCNC has one store for them")
+
+    def _cutter(self, block: Block, codes: set[str]) -> list[str]:
+        side = next((code for code in ("G41", "G42") if code in codes), None)
+        if side is None:
+            return []
+        return [f"{side}.1 D{number(DIAMETER / (25.4 if block.modal.inch else 1.0))}"]
+
+    def _lengths(self, block: Block, codes: set[str]) -> list[str]:
+        if "G49" in codes:
+            return ["G49"]
+        if "G43" not in codes:
+            return []
+        self._length = int(block.values["H"]) if "H" in block.values else self._length
+        if self._length is None:
+            raise _cannot(block, "G43 without H: the control takes the H of before, which is not in the program")
+        return [f"G43 H{self._length}"] if self._length else ["G49"]
+
+    def _system(self, block: Block, codes: set[str]) -> list[str]:
+        if not {"G54.1", "G154"} & codes:
+            return []
+        system = block.modal.system
+        if system not in self.systems:
+            if len(self.systems) == len(_SPARE):
+                raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
+            self.systems[system] = _SPARE[len(self.systems)]
+        return [system_name(self.systems[system])]
+
+    def _speeds(self, block: Block, codes: set[str]) -> list[str]:
+        """F, S, T; F once more behind G94, which a Fanuc keeps and LinuxCNC forgets."""
+        told = []
+        state = self._follower.state
+        if "F" in block.values or ({"G94", "G95"} & codes and state.feed_word):
+            told.append(f"F{number(state.feed_word)}")
+        told += [f"{letter}{number(block.values[letter])}" for letter in "ST" if letter in block.values]
+        self._turning = state.turning
+        return told
+
+    def _once(self, block: Block, once: str) -> str:
+        """Return the code that holds for this line only, and its words."""
+        values = block.values
+        words = _words(values, _AXES)
+        if once == "G10":
+            return self._stored(block)
+        if once == "G30" and values.get("P", 2.0) != 2.0:
+            raise _cannot(block, f"G30 P{values['P']:g}: LinuxCNC has two reference points")
+        if once == "G52":
+            scale = self._follower.state.scale
+            x, y, z = (values[c] * scale if c in values else v for c, v in zip("XYZ", self._local, strict=True))
+            self._local = (x, y, z)
+        if once == "G53":  # always a rapid
+            return f"G0 G53 {words}" if block.moves else ""
+        return {"G4": f"G4 P{number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
+
+    def _move(self, block: Block, codes: set[str]) -> tuple[list[str], str, list[str]]:
+        """Return lines before, words on the line, and lines after it. Each move says its own motion code."""
+        if block.kind == "cycle":
+            return self._cycle(block)
+        if block.kind in ("line", "arc"):
+            letters = _AXES if block.kind == "line" else f"{_AXES}IJKR"
+            return [], f"{block.modal.motion} {_words(block.values, letters)}", []
+        return [], "G80" if "G80" in codes else "", []
+
+    def _stored(self, block: Block) -> str:
+        values = block.values
+        kind, target = int(values["L"]), int(values["P"])
+        if not block.modal.absolute:
+            raise _cannot(block, "G10 in G91: the origin is moved by its words, which LinuxCNC does not do")
+        if kind == 20:
+            if 100 + target not in self.systems:
+                if len(self.systems) == len(_SPARE):
+                    raise _cannot(block, f"LinuxCNC has no room for more than {len(_SPARE)} systems of G54.1")
+                self.systems[100 + target] = _SPARE[len(self.systems)]
+            target = self.systems[100 + target]
+        elif not target:
+            raise _cannot(block, "G10 L2 P0 sets the external offset, which LinuxCNC does not have")
+        return f"G10 L2 P{target} {_words(values, _AXES)}"
+
+    def _rotation(self, block: Block, codes: set[str]) -> list[str]:
+        """G68 and G69: the system turns about its origin in LinuxCNC, so that it has to be shifted, too."""
+        turned = block.modal.turned
+        if "G68" not in codes and (turned or not self._turned):
+            return []
+        self._turned = turned
+        scale = self._follower.state.scale
+        angle, x, y = 0.0, self._local[0], self._local[1]
+        if turned:
+            angle = math.radians(block.values["R"])
+            a, b = block.values["X"] * scale + x, block.values["Y"] * scale + y
+            x += a * math.cos(angle) + b * math.sin(angle) - a
+            y += b * math.cos(angle) - a * math.sin(angle) - b
+        # under a G52 LinuxCNC loses its place where a rotation changes
+        turn = f"G10 L2 P0 R{number(math.degrees(angle))}"
+        return ["G52 X0 Y0", turn, f"G52 X{number(x / scale)} Y{number(y / scale)}"]
+
+    # -- cycles ------------------------------------------------------------------------------------------------------
+
+    def _cycle(self, block: Block) -> tuple[list[str], str, list[str]]:
+        """Return a cycle with all its words: LinuxCNC keeps them for the same cycle only, a Fanuc until G80."""
+        if not block.moves:  # K0
+            return [], "", []
+        state, modal, code = self._follower.state, block.modal, block.modal.motion
+        across = PLANES[modal.plane][2]
+        letter = "XYZ"[across]
+        words = {c: v for c, v in block.values.items() if c in _AXES}
+        words |= {
+            c: block.sticky[c] for c in (letter, "R", "Q") if c in block.sticky and (c != "Q" or "Q" in KEPT[code])
+        }
+        if "P" in KEPT[code] or code in ("G74", "G84"):
+            words["P"] = block.sticky.get("P", 0.0) / 1000.0
+        repeats = block.values.get("K", block.values.get("L"))
+        if repeats is not None:
+            words["L"] = repeats
+        if code == "G74":
+            words.pop("L", None)
+        before, after = self._spindle(block)
+        scale, back = state.scale, f"G{modal.retract} " if modal.retract_stated else ""
+        level, plane = state.level or 0.0, block.sticky["R"] * scale
+        if modal.absolute and modal.retract == 98 and abs(block.start[across] - plane) < 1e-3 < level - plane:
+            # from R a Fanuc goes to the next hole at R; LinuxCNC goes up before, or does not, as numbers are rounded
+            up = f"G0 {letter}{number(level / scale)}"
+            return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
+        return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
+
+    def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
+        """Return what makes the spindle turn for a tap, and what comes after: a Fanuc does it by itself."""
+        code, turning = block.modal.motion, self._turning
+        if code not in ("G74", "G84", "G86"):
+            return [], []
+        wanted = -1 if code == "G74" else turning or 1
+        wanted = 1 if code == "G84" else wanted
+        if wanted == turning:
+            return [], []
+        if code == "G86" or not self._follower.state.spindle:
+            raise _cannot(block, f"{code} while the spindle stands, which LinuxCNC refuses")
+        names = {1: "M3", -1: "M4", 0: "M5"}
+        return [names[wanted]], [names[turning]]
+
+
+def number(value: float) -> str:
+    """Return a number as LinuxCNC reads it."""
+    text = f"{value:.9f}".rstrip("0").rstrip(".")
+    return "0" if text.strip("-0.") == "" else text
+
+
+def _words(values: dict[str, float], letters: str) -> str:
+    return " ".join(f"{letter}{number(values[letter])}" for letter in letters if letter in values)
+
+
+def _cannot(block: Block, why: str) -> UntranslatableError:
+    return UntranslatableError(block.line.number, why)

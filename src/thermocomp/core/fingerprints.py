@@ -1,0 +1,104 @@
+"""`Prints`: what a model file keeps of the rows it learned from, so that they are known again in another file."""
+
+import base64
+import binascii
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+
+Marks = NDArray[np.uint32]
+
+
+def packed(marks: Marks) -> str:
+    """Return numbers of 32 bits as base64 text, lowest byte first."""
+    return base64.b64encode(marks.astype("<u4").tobytes()).decode("ascii")
+
+
+def unpacked(text: str) -> Marks:
+    """Return the numbers in the text that `packed` gives.
+
+    Raises
+    ------
+    InputError
+        It is no such text.
+    """
+    try:
+        content = base64.b64decode(text.encode("ascii"), validate=True)
+    except (binascii.Error, UnicodeEncodeError) as e:
+        raise InputError(f"fingerprints {text[:12]!r}...: not base64 text: {e}") from e
+    if len(content) % 4:
+        raise InputError(f"fingerprints {text[:12]!r}...: {len(content)} bytes are no whole number of 32-bit numbers")
+    return np.frombuffer(content, dtype="<u4").astype(np.uint32)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Fingerprints of runs of rows that are `stride` rows apart.
+
+    Parameters
+    ----------
+    stride : int
+    rows : str
+        First row of each run, rising, as `packed` has it; counted through all tests.
+    moving : str
+        1 where target and an input move beyond their noise around the run, else 0.
+    marks : dict of str to str
+        Per channel the hash of each run, the target first; 0 where the channel says nothing there.
+    """
+
+    stride: int
+    rows: str
+    moving: str
+    marks: dict[str, str]
+
+    def __post_init__(self) -> None:
+        if self.stride < 1:
+            raise InputError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
+        if len(self.marks) < 2:
+            raise InputError("fingerprints: want those of a target and of one input at least")
+        rows = unpacked(self.rows)
+        if not (np.diff(rows.astype(np.int64)) > 0).all():
+            raise InputError("fingerprints: their rows do not rise")
+        for name, text in (("moving", self.moving), *self.marks.items()):
+            if (n := len(unpacked(text))) != len(rows):
+                raise InputError(f"fingerprints: {n} of {name} for {len(rows)} rows")
+
+
+@dataclass(frozen=True)
+class Prints:
+    """Fingerprints of the rows a model learned from; made and looked up by `thermocomp.recording.fingerprints`.
+
+    Parameters
+    ----------
+    interval : float
+        Median time between two rows [s].
+    learned : tuple of (int, int)
+        First row, and the row after the last, of each stretch that was learned from; counted through all tests.
+    steps : dict of str to float
+        What differences are rounded to, per channel, the target first [its unit].
+    runs : tuple of Runs
+        Per stride.
+    """
+
+    interval: float
+    learned: tuple[tuple[int, int], ...]
+    steps: dict[str, float]
+    runs: tuple[Runs, ...]
+
+    def __post_init__(self) -> None:
+        if not 0 < self.interval < np.inf:
+            raise InputError(f"fingerprints: an interval of {self.interval} s between rows must be a positive number")
+        ends = [row for stretch in self.learned for row in stretch]
+        if not ends or ends != sorted(ends) or ends[0] < 0 or any(a == b for a, b in self.learned):
+            raise InputError(f"fingerprints: {self.learned} are no stretches of rows one after the other")
+        for name, step in self.steps.items():
+            if not 0 < step < np.inf:
+                raise InputError(f"fingerprints of {name}: a resolution of {step} must be a positive number")
+        for run in self.runs:
+            if list(run.marks) != list(self.steps):
+                raise InputError(f"fingerprints of {', '.join(run.marks)}: want those of {', '.join(self.steps)}")
+            if (rows := unpacked(run.rows)).size and rows[-1] >= ends[-1]:
+                raise InputError(f"fingerprints: of row {rows[-1]}, where {ends[-1]} rows were recorded")

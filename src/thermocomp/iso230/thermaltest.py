@@ -1,0 +1,335 @@
+"""What a thermal test after ISO 230-3 comes out as: curves, and what is told of each.
+
+Which names are the standard's and which are ours stands in `thermocomp.iso230.part3`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.iso230.averaging import Course, K
+from thermocomp.iso230.settling import Settling
+from thermocomp.recording.recording import Recording
+
+FloatArray = NDArray[np.float64]
+
+Kind = Literal["etve", "spindle", "axis"]
+#: what each test is called
+TITLES: dict[Kind, str] = {
+    "etve": "Environmental temperature variation error (ETVE)",
+    "spindle": "Thermal distortion caused by the rotating spindle",
+    "axis": "Thermal distortion caused by the moving linear axis",
+}
+HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two parallel probes along the test bar, whose difference is a tilt of the spindle.
+
+    Signs as everywhere here (ISO 841): ``A = (y1 - y2) / L`` and ``B = (x2 - x1) / L`` with 1 at the tip of the test
+    bar and 2 towards the spindle, which points to -Z.
+
+    Parameters
+    ----------
+    tip, spindle : str
+        Channels of the probe at the tip (X1 or Y1) and of the one nearer to the spindle (X2 or Y2).
+    distance : float
+        L, between the two [mm].
+
+    Raises
+    ------
+    InputError
+        The distance is not positive, or the two do not begin with the same x or y.
+    """
+
+    tip: str
+    spindle: str
+    distance: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.distance < float("inf"):
+            raise InputError(f"probes {self.tip} and {self.spindle}: distance {self.distance:g} mm must be positive")
+        if self.axis not in ("x", "y") or self.spindle[:1].lower() != self.axis or self.tip == self.spindle:
+            raise InputError(
+                f"probes {self.tip} and {self.spindle}: a tilt comes of two different probes along X, or along Y, "
+                "whose names begin with that letter, such as x1 and x2"
+            )
+
+    @property
+    def axis(self) -> str:
+        """Letter of the direction both measure in."""
+        return self.tip[:1].lower()
+
+    @property
+    def tilt(self) -> Literal["A", "B"]:
+        """A, about X, from probes along Y; B, about Y, from probes along X."""
+        return "A" if self.axis == "y" else "B"
+
+    def angle(self, tip: FloatArray, spindle: FloatArray) -> FloatArray:
+        """Return the tilt [urad] of the two displacements [um]; the same number in um/m."""
+        difference = tip - spindle if self.tilt == "A" else spindle - tip
+        return np.asarray(1e3 * difference / self.distance)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What is told of one curve; counted from the start of the test, in the curve's unit. The symbols are ours.
+
+    Parameters
+    ----------
+    range_60 : float
+        Largest minus smallest average over the first 60 min; nan if the period is shorter.
+    range_run : float
+        The same over the time the drives run; of an ETVE test, over all of it.
+    range_all : float
+        The same over the whole recording of this test, cool-down included. Of an ETVE test: its ETVE.
+    at_60, at_end : float
+        Value at 60 min (linear between rows), and when the drives stop: the drift of the warm-up.
+    largest : float
+        Value farthest from the start, with its sign, while the drives run.
+    cool_down : float
+        Last value minus that when the drives stop; nan without a cool-down.
+    range_last : float
+        Largest minus smallest over the last 60 min that the drives run; nan if they run for less than 2 h.
+    range_rows : float
+        `range_all` of the single rows: their noise is in it.
+    U_60, U_end, U_cool_down : float
+        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` by the noise, that of the zero included; nan
+        if it is not known.
+    """
+
+    range_60: float
+    range_run: float
+    range_all: float
+    at_60: float
+    at_end: float
+    largest: float
+    cool_down: float
+    range_last: float
+    range_rows: float = float("nan")
+    U_60: float = float("nan")
+    U_end: float = float("nan")
+    U_cool_down: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A displacement, a tilt or a change of length over the time of a test.
+
+    Parameters
+    ----------
+    name : str
+        Channel; of a tilt its letter, of a length what it is between.
+    unit : {'um', 'urad'}
+    place : str
+        In words.
+    values : ndarray of shape (n_rows,)
+        Since the start of the test, row by row; nan where missing.
+    course : Course
+        The same averaged: what `figures` tells.
+    figures : Figures
+    settling : Settling or None
+        How fast it follows the start of the drives; None if they never start.
+    after : ndarray of shape (n_rows,) or None
+        What a model leaves of it; None without a model.
+    after_course : Course or None
+    after_figures : Figures or None
+    """
+
+    name: str
+    unit: str
+    place: str
+    values: FloatArray
+    course: Course
+    figures: Figures
+    settling: Settling | None
+    after: FloatArray | None = None
+    after_course: Course | None = None
+    after_figures: Figures | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Positioning of a linear axis at several targets, over the time of a test.
+
+    Parameters
+    ----------
+    name : str
+        What the channels' names begin with, such as ``x_laser``.
+    axis : {'X', 'Y', 'Z'}
+    positions : ndarray of shape (n_targets,)
+        Rising [mm].
+    curves : tuple of Curve
+        Error at each target, in their order.
+    length : Curve
+        Change of the length between the first and the last target: error at the last minus error at the first [um].
+    """
+
+    name: str
+    axis: str
+    positions: FloatArray
+    curves: tuple[Curve, ...]
+    length: Curve
+
+    @property
+    def distance(self) -> float:
+        """Between the first and the last target [mm]."""
+        return float(self.positions[-1] - self.positions[0])
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalTest:
+    """One thermal test, evaluated.
+
+    Parameters
+    ----------
+    kind : {'etve', 'spindle', 'axis'}
+    name : str
+    recording : Recording
+        It is part of.
+    start, stop, end : int
+        Its first row, from which everything is counted, the one in which the drives stop (`end` if they do not), and
+        its last one.
+    load : str
+        What the spindle or the axis did, in words.
+    curves : tuple of Curve
+        Of every displacement and angle that is not a target.
+    tilts : tuple of Curve
+        From paired probes [urad].
+    pairs : tuple of Pair
+    targets : tuple of Targets
+        Linear axis only.
+    ambient : Channel or None
+        Temperature of the surroundings.
+    ambient_range : tuple of float
+        Its lowest and highest value during the test [degC]; nan if there is none.
+    notes : tuple of str
+        What one should know before relying on the figures.
+    """
+
+    kind: Kind
+    name: str
+    recording: Recording
+    start: int
+    stop: int
+    end: int
+    load: str
+    curves: tuple[Curve, ...]
+    tilts: tuple[Curve, ...]
+    pairs: tuple[Pair, ...]
+    targets: tuple[Targets, ...]
+    ambient: Channel | None
+    ambient_range: tuple[float, float]
+    notes: tuple[str, ...]
+
+    @property
+    def time(self) -> FloatArray:
+        """Seconds since the start of the test, (n_rows,)."""
+        time = self.recording.time
+        return np.asarray(time[self.start : self.end + 1] - time[self.start])
+
+    @property
+    def running(self) -> float:
+        """How long the drives ran [s]; of an ETVE test, how long it was."""
+        return float(self.time[self.stop - self.start])
+
+    @property
+    def described(self) -> str:
+        """What was done, in what surroundings, with what distance between the probes, in one line."""
+        parts = [self.load]
+        hours = [self.running / HOUR, (self.time[-1] - self.running) / HOUR]
+        parts.append(f"{hours[0]:.3g} h" if self.kind == "etve" else f"{hours[0]:.3g} h, cool-down {hours[1]:.3g} h")
+        if self.ambient is not None:
+            low, high = self.ambient_range
+            parts.append(f"surroundings ({self.ambient.name}) {low:.2f} to {high:.2f} degC, range {high - low:.2f} K")
+        parts += [f"{p.tip} and {p.spindle} {p.distance:g} mm apart" for p in self.pairs]
+        return "; ".join(parts)
+
+    @property
+    def all_curves(self) -> tuple[Curve, ...]:
+        """Everything that was evaluated: displacements, tilts, targets, lengths."""
+        at_targets = (c for t in self.targets for c in (*t.curves, t.length))
+        return (*self.curves, *self.tilts, *at_targets)
+
+
+def figures_of(time: FloatArray, course: Course, rows: FloatArray, stop: int) -> Figures:
+    """Return what is told of an averaged curve, with its uncertainty.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the start of the test [s].
+    course : Course
+    rows : ndarray of shape (n_rows,)
+        The curve before it was averaged; nan where missing.
+    stop : int
+        Row in which the drives stop; the last one if they do not.
+
+    Returns
+    -------
+    Figures
+    """
+    told = figures(time, course.values, stop)
+    known = np.flatnonzero(np.isfinite(course.values))
+    run, after = known[known <= stop], known[known > stop]
+    if not run.size:
+        return told
+    at_end, zero = course.u[run[-1]], course.zero.u
+    at_60 = float(np.interp(HOUR, time[known], course.u[known])) if np.isfinite(told.at_60) else float("nan")
+    return replace(
+        told,
+        range_rows=float(np.ptp(rows[known])),
+        U_60=float(K * np.hypot(at_60, zero)),
+        U_end=float(K * np.hypot(at_end, zero)),
+        U_cool_down=float(K * np.hypot(course.u[after[-1]], at_end)) if after.size else float("nan"),
+    )
+
+
+def figures(time: FloatArray, values: FloatArray, stop: int) -> Figures:
+    """Return what is told of a curve as it stands, row by row.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the start of the test [s].
+    values : ndarray of shape (n_rows,)
+        Since the start of the test; nan where missing.
+    stop : int
+        Row in which the drives stop; the last one if they do not.
+
+    Returns
+    -------
+    Figures
+        All nan without a value.
+    """
+    nan = float("nan")
+    there = np.isfinite(values)
+    run = there & (np.arange(len(values)) <= stop)
+    if not run.any():
+        return Figures(*[nan] * 8)
+    first = there & (time <= HOUR)
+    at_60 = float(np.interp(HOUR, time[there], values[there]))
+    hour = time[run][-1] >= HOUR
+    # the value at 60 min belongs to the first 60 min, even if no row is at that very time
+    range_60 = float(np.ptp([*values[first], at_60])) if hour else nan
+    v, at_end = values[run], float(values[run][-1])
+    ends = float(time[run][-1])
+    # the value an hour before the end belongs to the last hour, even if no row is at that very time
+    an_hour_before = float(np.interp(ends - HOUR, time[there], values[there]))
+    last = float(np.ptp([*v[time[run] >= ends - HOUR], an_hour_before])) if ends >= 2.0 * HOUR else nan
+    after = values[there & (np.arange(len(values)) > stop)]
+    return Figures(
+        range_60=range_60,
+        range_run=float(np.ptp(v)),
+        range_all=float(np.ptp(values[there])),
+        at_60=at_60 if hour else nan,
+        at_end=at_end,
+        largest=float(v[np.argmax(np.abs(v))]),
+        cool_down=float(after[-1] - at_end) if after.size else nan,
+        range_last=last,
+    )

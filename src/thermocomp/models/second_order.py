@@ -1,0 +1,166 @@
+"""`mra`: second-order regression with stepwise choice of the terms (Chen, Yuan, Ni 1996)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.terms import Term, TermTable, Variable, second_order_terms
+from thermocomp.models import steplog
+from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.leastsquares import solve, triangle
+from thermocomp.models.numerics.stepwise import ENOUGH, AlphaThresholds, stepwise
+
+FloatArray = NDArray[np.float64]
+
+
+class SecondOrderRegression(TermRegressor):
+    """Chen's multiple regression analysis: linear terms, squares and products, chosen by significance.
+
+    The form is ``A1' dT + dT' A2 dT`` without constant (Chen 1996, Eq. 4; C-09), over variables which are inputs or
+    differences of inputs (C-12). SYSTAT's stepwise rule chooses among its n + n(n+1)/2 terms (C-10): one action a
+    step, removal before entering, by default with alpha-to-enter .001 and alpha-to-remove .015 (C-15). The
+    significances take the rows as independent, which those of a time series are not: see `n_effective_` (E-C12). A term
+    of which those inside leave less than 1e-8 of its norm does not enter.
+
+    Parameters
+    ----------
+    alpha_enter, alpha_remove : float
+        Significance levels, ``0 < alpha_enter <= alpha_remove <= 1``.
+    fit_intercept : bool
+        True adds a constant, and R2 becomes a centred one (E-C10).
+    differences : sequence of (str, str)
+        Pairs of feature names; ``("T6", "T7")`` makes the variable ``T6-T7``. Features of a nameless table are called
+        ``x0``, ``x1``, ...
+    subset : sequence of str, optional
+        Variables to use, features and differences, such as ``("T1", "T2", "T3", "T6-T7", "T8-T9")`` (C-13). Without
+        it all features and all differences are used.
+    second_order : bool
+        False: linear terms only, as for Chen's slope (C-23).
+    hierarchy : bool
+        True: a square or product enters only when its factors are in, and these stay while it is. Chen's models are
+        free of that (C-21).
+
+    Attributes
+    ----------
+    variables_ : tuple of str
+        Names of the variables.
+    candidates_ : tuple of str
+        Names of all terms.
+    selected_ : tuple of int
+        Terms in the model, as indices of `candidates_`, in rising order.
+    terms_ : tuple of str
+        Their names.
+    coef_ : ndarray of shape (n_selected,)
+        One for each of `terms_`.
+    intercept_ : float
+    log_ : tuple of Step
+        Each entering and leaving.
+    cycled_ : bool
+        True if the selection was stopped because it went round in a circle.
+    r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
+        See `thermocomp.models.linear.TermRegressor`.
+    """
+
+    def __init__(
+        self,
+        *,
+        alpha_enter: float = 0.001,
+        alpha_remove: float = 0.015,
+        fit_intercept: bool = False,
+        differences: Sequence[tuple[str, str]] = (),
+        subset: Sequence[str] | None = None,
+        second_order: bool = True,
+        hierarchy: bool = False,
+    ) -> None:
+        self.alpha_enter = alpha_enter
+        self.alpha_remove = alpha_remove
+        self.fit_intercept = fit_intercept
+        self.differences = differences
+        self.subset = subset
+        self.second_order = second_order
+        self.hierarchy = hierarchy
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "SecondOrderRegression":
+        """Select and fit.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Temperatures minus their reference.
+        y : array-like of shape (n_rows,)
+            Deviation.
+
+        Returns
+        -------
+        SecondOrderRegression
+
+        Raises
+        ------
+        InputError
+            Bad significance levels, or a variable that does not exist.
+        """
+        rule = AlphaThresholds(self.alpha_enter, self.alpha_remove)
+        _, deviation, both = self._read(X, y)
+        variables = self._variables()
+        self.variables_ = tuple(v.name for v in variables)
+        terms = second_order_terms(len(variables)) if self.second_order else tuple((i,) for i in range(len(variables)))
+        self.candidates_ = TermTable(self.n_features_in_, variables, terms).names()
+        values = _values(both[:, :-1], variables)
+        tri = triangle(_columns(values, terms, deviation), intercept=self.fit_intercept)
+        chosen = stepwise(tri, rule, self.candidates_, needs=_factors(terms) if self.hierarchy else None)
+        self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
+        inside = [terms[k] for k in self.selected_]
+        columns = _columns(values, inside, deviation)[:, :-1]
+        found = solve(columns, deviation, tri.part(self.selected_), enough=ENOUGH)
+        self._keep(found, variables, inside, tri.total, self.fit_intercept)
+        return self
+
+    def log_text(self, target: str = "Y") -> str:
+        """Return the steps and the model as text in the style of SYSTAT 5.0 (Chen 1996, Fig. 2; C-16).
+
+        Parameters
+        ----------
+        target : str
+            Name of what is predicted.
+
+        Returns
+        -------
+        str
+        """
+        return steplog.log_text(self, str(AlphaThresholds(self.alpha_enter, self.alpha_remove)), target)
+
+    def _variables(self) -> tuple[Variable, ...]:
+        names = self._names()
+        known = {name: Variable.single(name, i) for i, name in enumerate(names)}
+        for plus, minus in self.differences:
+            known.setdefault(f"{plus}-{minus}", Variable.difference(names, plus, minus))
+        if self.subset is None:
+            return tuple(known.values())
+        for name in self.subset:
+            if name not in known:
+                raise InputError(f"subset: no variable is named {name!r}; there are {', '.join(known)}")
+        return tuple(known[name] for name in dict.fromkeys(self.subset))
+
+
+def _values(X: FloatArray, variables: Sequence[Variable]) -> FloatArray:
+    """Return the values of the variables, shape (n_rows, n_variables), in Fortran order."""
+    singles = tuple((i,) for i in range(len(variables)))
+    return np.asfortranarray(TermTable(X.shape[1], tuple(variables), singles).evaluate(X))
+
+
+def _columns(values: FloatArray, terms: Sequence[Term], y: FloatArray) -> FloatArray:
+    """Return the table [terms y] in Fortran order: column by column, seven times as fast as `TermTable` row by row."""
+    out = np.empty((len(values), len(terms) + 1), order="F")
+    for k, (first, *others) in enumerate(terms):
+        out[:, k] = values[:, first]
+        for i in others:
+            out[:, k] *= values[:, i]
+    out[:, -1] = y
+    return out
+
+
+def _factors(terms: Sequence[Term]) -> list[frozenset[int]]:
+    """Return, per term, the linear terms of its factors if it is a square or a product."""
+    return [frozenset(terms.index((i,)) for i in t) if len(t) > 1 else frozenset() for t in terms]

@@ -1,0 +1,150 @@
+"""The programs in one file of a Fanuc, their line numbers, and their loops."""
+
+import re
+from collections.abc import Sequence
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.parser.tokens import read_line
+
+_NUMBER = re.compile(r"[ \t]*[O:][ \t]*([0-9]+)", re.IGNORECASE)
+_LABEL = re.compile(r"[ \t]*/?[ \t]*N[ \t]*([0-9]+)", re.IGNORECASE)
+_COMMENT = re.compile(r"\([^()]*\)")
+_END = re.compile(r"END([0-9]+)")
+#: a P of M98 that has more digits than that may be how often and which program
+FOUR = 10_000
+
+
+class Program:
+    """One program: its lines from its O number on, up to the next one.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        All lines of the file.
+    start, stop : int
+        Indices of its first line, and one past its last.
+    """
+
+    def __init__(self, texts: Sequence[str], start: int, stop: int) -> None:
+        self.texts = texts
+        self.start = start
+        self.stop = stop
+        self._labels: dict[int, list[int]] | None = None
+
+    def label(self, number: int, line: int, who: str) -> int:
+        """Return the index of the line with a line number.
+
+        Parameters
+        ----------
+        number : int
+        line : int
+            Line that asks, and what stands there, for the message.
+        who : str
+
+        Raises
+        ------
+        ProgramError
+            There is none, or more than one.
+        """
+        if self._labels is None:
+            self._labels = {}
+            for i in range(self.start, self.stop):
+                if found := _LABEL.match(self.texts[i]):
+                    self._labels.setdefault(int(found.group(1)), []).append(i)
+        places = self._labels.get(number, [])
+        if not places:
+            raise ProgramError(line, f"{who}: there is no N{number} in this program")
+        if len(places) > 1:
+            lines = " and ".join(str(i + 1) for i in places[:2])
+            raise ProgramError(line, f"{who}: N{number} stands in lines {lines}: number the lines anew")
+        return places[0]
+
+    def closing(self, begin: int, loop: int) -> int:
+        """Return the index of the END of a loop that begins at an index.
+
+        Raises
+        ------
+        ProgramError
+            There is none.
+        """
+        for i in range(begin + 1, self.stop):
+            text = self.texts[i]
+            if "END" in text.upper():
+                found = _END.fullmatch(squeezed(read_line(text, i + 1, "fanuc").flow))
+                if found and int(found.group(1)) == loop:
+                    return i
+        raise ProgramError(begin + 1, f"DO{loop} without END{loop} behind it in this program")
+
+
+class File:
+    """All programs of a file; the first one is the one that is run.
+
+    Parameters
+    ----------
+    texts : sequence of str
+    """
+
+    def __init__(self, texts: Sequence[str]) -> None:
+        self.texts = texts
+        heads = [(i, int(found.group(1))) for i, text in enumerate(texts) if (found := _NUMBER.match(text))]
+        first = heads[0][0] if heads else 0
+        leader = next((i for i in range(first) if texts[i].strip() == "%"), 0)
+        if any(_COMMENT.sub("", text).strip(" \t\r\n%;") for text in texts[leader:first]):
+            heads.insert(0, (0, -1))  # a main program without a number
+        ends = [i for i, _ in heads[1:]] + [len(texts)]
+        self.main = Program(texts, 0, ends[0])
+        self._programs: dict[int, list[Program]] = {}
+        for k, (start, number) in enumerate(heads):
+            own = self.main if k == 0 else Program(texts, start, ends[k])
+            self._programs.setdefault(number, []).append(own)
+
+    def find(self, number: int, line: int, who: str) -> Program:
+        """Return a program by its number.
+
+        Raises
+        ------
+        ProgramError
+            It is not in the file, or stands there twice.
+        """
+        found = self._programs.get(number, [])
+        if len(found) == 1:
+            return found[0]
+        if found:
+            lines = " and ".join(str(p.start + 1) for p in found[:2])
+            raise ProgramError(line, f"{who}: O{number} stands in lines {lines}; remove the one that is not meant")
+        raise ProgramError(
+            line,
+            f"{who}: O{number:04d} is not in this file; put it behind the program, with its O number and M99, or have "
+            "the CAM system write the moves out",
+        )
+
+    def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
+        """Return the program that M98 P calls, and how often: the P of some controls says both.
+
+        Parameters
+        ----------
+        number : int
+            P.
+        line : int
+        told : bool
+            L or K says how often.
+
+        Raises
+        ------
+        ProgramError
+            See `find`; or P can be read in two ways.
+        """
+        times, last = divmod(number, FOUR)
+        who = f"M98 P{number}"
+        if number < FOUR or told or number in self._programs:
+            if times and not told and last in self._programs:
+                raise ProgramError(
+                    line, f"{who}: O{number}, or O{last:04d} {times} times? write how often with L on the line"
+                )
+            return self.find(number, line, who), 1
+        return self.find(last, line, who), times
+
+
+def squeezed(text: str) -> str:
+    """Return a text without blanks, in upper case."""
+    return "".join(text.split()).upper()

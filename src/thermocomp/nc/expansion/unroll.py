@@ -1,0 +1,334 @@
+"""Writes subprograms, macros, loops and branches of a Fanuc's program out: what comes out is plain lines.
+
+Everything that depends on what is stored in the control, and not in the file, is refused with its line.
+"""
+
+import math
+import re
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.expansion.programs import File, Program, squeezed
+from thermocomp.nc.expansion.variables import Variables, arguments
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.parser.expressions import Key
+from thermocomp.nc.parser.line import Assignment, Line, Word
+from thermocomp.nc.parser.tokens import read_line
+
+#: lines that are written at most, and run at most
+MOST: Final = 1_000_000
+MOST_STEPS: Final = 5_000_000
+#: calls inside each other
+DEEPEST: Final = 4
+
+# a line without any of this is plain
+_MAY_ACT = re.compile(r"[#\[O:%]|M[ \t]*[0-9 \t]*[02789]|G[ \t0]*(65|2[ \t]*[01])|GO|IF|WH|DO|END", re.IGNORECASE)
+_IF = re.compile(r"IF(?P<condition>\[.*\])(?:GOTO(?P<goto>[0-9]+|[#\[].*)|THEN(?P<then>#.*))")
+_LOOP = re.compile(r"(?:WH(?:ILE)?(?P<condition>\[.*\]))?DO(?P<loop>[123])")
+_END = re.compile(r"END(?P<loop>[123])")
+_GOTO = re.compile(r"GO(?:TO)?(?P<goto>[0-9]+|[#\[].*)")
+_SET = re.compile(r"(#.*?)=(.*)")
+#: letters whose numbers count, and have no point
+_COUNTS: Final = frozenset("GMTHDSLNOP")
+_ENDED: Final = -1
+_BACK: Final = 0
+
+Lines = Generator[tuple[str, int], None, int]
+
+
+def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
+    """Write a program out.
+
+    M98 and M97 with what they call in the same file, M99, G65 with arguments, variables, ``IF``, ``GOTO``, ``WHILE``.
+    A line that needs none of it comes out as it stands, and so does the whole of a program without them.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        With their endings; the first program of the file is run.
+    setup : Setup
+
+    Yields
+    ------
+    str
+        A plain line with its ending.
+    int
+        Line it comes from, from 1.
+
+    Raises
+    ------
+    ProgramError
+        Something is not in the file, not certain, or never ends.
+    """
+    return _Unroller(list(lines), setup).lines()
+
+
+@dataclass(slots=True)
+class _Frame:
+    """A program that is being run."""
+
+    program: Program
+    variables: Variables
+    depth: int
+    place: int  #: index of the line that comes next
+    called: bool
+    loops: list[tuple[int, int, int]] = field(default_factory=list)  #: number, index of DO and of END
+
+
+class _Unroller:
+    def __init__(self, texts: list[str], setup: Setup) -> None:
+        self._texts = texts
+        self._file = File(texts)
+        self._setup = setup
+        self._inch = bool(setup.inch)
+        self._written = self._steps = 0
+        self._acted = False
+
+    def lines(self) -> Iterator[tuple[str, int]]:
+        main = _Frame(self._file.main, Variables(), 0, 0, called=False)
+        yield from self._run(main)
+        # behind the end: the programs that were called are not needed any more
+        for i in range(main.place, len(self._texts)):
+            text = self._texts[i]
+            if not self._acted or text.strip() == "%":
+                yield text, i + 1
+
+    def _run(self, frame: _Frame) -> Lines:
+        """Run a program from its place on; return the line number to go on with, 0 for none, or that all has ended."""
+        began = False
+        program, texts = frame.program, self._texts
+        while frame.place < program.stop:
+            i = frame.place
+            frame.place += 1
+            text = texts[i]
+            self._step(i + 1)
+            if not _MAY_ACT.search(text):
+                began = began or bool(text.strip())
+                yield self._out(text, i + 1)
+                continue
+            line = read_line(text, i + 1, "fanuc")
+            if line.demarcation and began and not frame.called:
+                frame.place = i  # the end of the file
+                return _ENDED
+            acts = bool(line.words or line.assignments or line.flow or line.label)
+            began = began or acts or line.demarcation
+            if line.error or not acts or (line.optional and self._setup.skip_optional):
+                yield self._out(text, i + 1)
+                continue
+            done = yield from self._line(frame, line)
+            if done is not None:
+                return done
+        if frame.called:
+            raise ProgramError(program.stop, "a subprogram without M99 at its end; add it")
+        if program.stop < len(texts):
+            raise ProgramError(program.stop, "the program has no M30 or M2 before the next O number; add it")
+        return _ENDED
+
+    def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
+        """Run one line; return None if the program goes on behind it."""
+        if line.flow or line.assignments:
+            self._refuse_optional(line)
+            self._acted = True
+            if line.flow:
+                self._steer(frame, line, squeezed(line.flow))
+            for assignment in line.assignments:
+                frame.variables.assign(line.number, assignment)
+            if line.words:
+                raise ProgramError(line.number, "words beside a variable that is set; put them on a line of their own")
+            return None
+        codes = {(w.letter, w.number) for w in line.words if w.letter in "GM"}
+        if ("G", 65.0) in codes:
+            return (yield from self._macro(frame, line))
+        call = next((int(n) for n in (98.0, 97.0) if ("M", n) in codes), 0)
+        back = ("M", 99.0) in codes
+        if call or back:
+            self._refuse_optional(line)
+            self._acted = True
+        if back and not frame.called:
+            raise ProgramError(line.number, "M99 in the main program begins it again without end; write M30")
+        head = line.label[:1] in ("O", ":")
+        if not (head and frame.called and not line.words):
+            text = self._plain(frame, line, "MPLK" if call else "MP" if back else "")
+            if text is not None:
+                yield self._out(text, line.number)
+        if call:
+            return (yield from self._call(frame, line, call))
+        if back:
+            return self._count(frame, line, "P", 0) or _BACK
+        return _ENDED if codes & {("M", 2.0), ("M", 30.0)} else None
+
+    # -- calls -------------------------------------------------------------------------------------------------------
+
+    def _call(self, frame: _Frame, line: Line, code: int) -> Generator[tuple[str, int], None, int | None]:
+        """M98 and M97."""
+        number = self._count(frame, line, "P", 0)
+        told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
+        if not number or len(told) > 1:
+            raise ProgramError(line.number, f"M{code} needs P, what is called, and L or K at most, how often")
+        times = self._count(frame, line, told[0], 1) if told else 1
+        if code == 97:
+            program, place = frame.program, frame.program.label(number, line.number, f"M97 P{number}")
+        else:
+            program, repeats = self._file.called(number, line.number, told=bool(told))
+            place, times = program.start, times * repeats
+        return (yield from self._repeat(frame, line, program, place, times, None))
+
+    def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
+        """G65."""
+        self._refuse_optional(line)
+        self._acted = True
+        number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
+        if not number:
+            raise ProgramError(line.number, "G65 needs P, the number of the macro")
+        program = self._file.find(number, line.number, f"G65 P{number}")
+        least = self._setup.least / (10.0 if self._inch else 1.0)
+        given = arguments(line, frame.variables, self._setup.integers, least)
+        return (yield from self._repeat(frame, line, program, program.start, times, given))
+
+    def _repeat(
+        self, frame: _Frame, line: Line, program: Program, place: int, times: int, given: dict[Key, float] | None
+    ) -> Generator[tuple[str, int], None, int | None]:
+        if frame.depth >= DEEPEST:
+            raise ProgramError(line.number, f"more than {DEEPEST} calls inside each other, which controls refuse")
+        if times < 1:
+            raise ProgramError(line.number, "a call that is made 0 times; remove it")
+        for _ in range(times):
+            own = frame.variables if given is None else frame.variables.called(given)
+            done = yield from self._run(_Frame(program, own, frame.depth + 1, place, called=True))
+            if given is not None:
+                frame.variables.returned(own)
+            if done == _ENDED:
+                return _ENDED
+            if done != _BACK:
+                self._jump(frame, done, line.number, f"M99 P{done}")
+                break
+        return None
+
+    # -- loops and branches ------------------------------------------------------------------------------------------
+
+    def _steer(self, frame: _Frame, line: Line, flow: str) -> None:
+        if found := _IF.fullmatch(flow):
+            if not frame.variables.holds(line.number, found.group("condition")):
+                return
+            if found.group("goto"):
+                self._go(frame, line, found.group("goto"))
+            else:
+                self._then(frame, line, found.group("then"))
+        elif found := _GOTO.fullmatch(flow):
+            self._go(frame, line, found.group("goto"))
+        elif found := _LOOP.fullmatch(flow):
+            self._begin(frame, line, found.group("condition"), int(found.group("loop")))
+        elif found := _END.fullmatch(flow):
+            number, index = int(found.group("loop")), line.number - 1
+            if not frame.loops or (frame.loops[-1][0], frame.loops[-1][2]) != (number, index):
+                raise ProgramError(line.number, f"END{number} without its DO{number}, or loops across each other")
+            frame.place = frame.loops.pop()[1]
+        else:
+            raise ProgramError(
+                line.number,
+                f"{line.flow}: not understood; IF [..] GOTO, IF [..] THEN #i=.., GOTO, WHILE [..] DO, END are",
+            )
+
+    def _begin(self, frame: _Frame, line: Line, condition: str | None, number: int) -> None:
+        index = line.number - 1
+        if any(loop == number for loop, _, _ in frame.loops):
+            raise ProgramError(line.number, f"DO{number} inside DO{number}; give the inner loop another number")
+        end = frame.program.closing(index, number)
+        if condition is None or frame.variables.holds(line.number, condition):
+            frame.loops.append((number, index, end))
+        else:
+            frame.place = end + 1
+
+    def _then(self, frame: _Frame, line: Line, text: str) -> None:
+        found = _SET.fullmatch(text)
+        if found is None:
+            raise ProgramError(line.number, "IF [..] THEN needs a variable that is set")
+        frame.variables.assign(line.number, Assignment(found.group(1).lower(), found.group(2), 0, 0))
+
+    def _go(self, frame: _Frame, line: Line, goal: str) -> None:
+        value = frame.variables.value(line.number, goal, "GOTO")
+        if value != int(value):
+            raise ProgramError(line.number, f"GOTO {value:g}, which is no line number")
+        self._jump(frame, int(value), line.number, f"GOTO {value:g}")
+
+    def _jump(self, frame: _Frame, number: int, line: int, who: str) -> None:
+        place = frame.program.label(number, line, who)
+        frame.loops = [loop for loop in frame.loops if loop[1] < place <= loop[2]]
+        inside = {loop[1] for loop in frame.loops}
+        for i in range(frame.program.start, place):
+            text = self._texts[i]
+            if i in inside or "DO" not in text.upper():
+                continue
+            found = _LOOP.fullmatch(squeezed(read_line(text, i + 1, "fanuc").flow))
+            if found and frame.program.closing(i, int(found.group("loop"))) >= place:
+                raise ProgramError(line, f"{who} leads into a loop (line {i + 1}), which controls refuse")
+        frame.place = place
+
+    # -- words -------------------------------------------------------------------------------------------------------
+
+    def _plain(self, frame: _Frame, line: Line, taken: str) -> str | None:
+        """Return a line with numbers for its variables and without what calls; None if nothing is left."""
+        text, kept = line.text, 0
+        arc = any(w.letter in "IJ" or (w.letter == "G" and w.number in (2.0, 3.0)) for w in line.words)
+        for word in line.words:
+            if word.letter == "G" and word.number in (20.0, 21.0):
+                self._inch = word.number == 20.0
+        for word in reversed(line.words):
+            if word.letter in taken and (word.letter != "M" or word.number in (97.0, 98.0, 99.0)):
+                text = text[: word.start] + text[word.end :]
+            elif word.number is not None:
+                kept += 1
+            else:
+                self._acted = True
+                new = self._number(frame, line, word, counts=word.letter in _COUNTS or (word.letter == "K" and not arc))
+                kept += bool(new)
+                text = text[: word.start] + new + text[word.end :]
+        if kept or not line.words:
+            return text
+        return None
+
+    def _number(self, frame: _Frame, line: Line, word: Word, *, counts: bool) -> str:
+        if frame.variables.leaves_out(line.number, word):
+            return ""
+        value = frame.variables.value(line.number, word.value, f"the value of {word.letter}")
+        if counts:
+            if word.letter == "G" and abs(value * 10 - round(value * 10)) < 1e-6:  # G54.1
+                return f"{word.letter}{round(value, 1):g}"
+            if abs(value - round(value)) > 1e-6:
+                raise ProgramError(line.number, f"{word.letter} is {value:g}, and has to be a whole number")
+            return f"{word.letter}{round(value)}"
+        # the control rounds what a variable puts into a word to its least increment
+        decimals = max(0, round(-math.log10(self._setup.least))) + self._inch
+        rounded = math.copysign(math.floor(abs(value) * 10**decimals + 0.5 + 1e-6) / 10**decimals, value)
+        digits = f"{rounded + 0.0:.{decimals}f}".rstrip("0")
+        return f"{word.letter}{digits.removeprefix('-') if not digits.strip('-0.') else digits}"
+
+    def _count(self, frame: _Frame, line: Line, letter: str, default: int) -> int:
+        for word in line.words:
+            if word.letter == letter:
+                value = word.number
+                if value is None:
+                    value = frame.variables.value(line.number, word.value, letter)
+                if value != int(value) or value < 0:
+                    raise ProgramError(line.number, f"{letter} is {value:g}, and has to be a whole number")
+                return int(value)
+        return default
+
+    def _refuse_optional(self, line: Line) -> None:
+        if line.optional:
+            raise ProgramError(
+                line.number, "an optional line (/) that calls, jumps or sets a variable: decide with --block-delete on"
+            )
+
+    def _step(self, line: int) -> None:
+        self._steps += 1
+        if self._steps > MOST_STEPS:
+            raise ProgramError(line, f"more than {MOST_STEPS} lines are run: does a loop never end?")
+
+    def _out(self, text: str, line: int) -> tuple[str, int]:
+        self._written += 1
+        if self._acted and self._written > MOST:
+            raise ProgramError(line, f"more than {MOST} lines come out: does a loop never end?")
+        return text, line

@@ -1,0 +1,168 @@
+"""The variables of Fanuc's custom macro B: what is certain of them, level by level."""
+
+import re
+from collections.abc import Mapping
+from typing import Final, Literal
+
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.parser.expressions import Key, Parameters, evaluate
+from thermocomp.nc.parser.line import Assignment, Line, Word
+
+#: G65: the local variable that each letter sets (argument specification I)
+ARGUMENTS: Final = {
+    **{"A": 1, "B": 2, "C": 3, "I": 4, "J": 5, "K": 6, "D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17},
+    **{"R": 18, "S": 19, "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26},
+}
+#: letters whose arguments count whole units without a point
+_WHOLE: Final = frozenset("DEFHMST")
+_LOCAL: Final = range(1, 34)
+_COMMON: Final = range(100, 200)
+_EMPTY = re.compile(r"\[#([0-9]+)(EQ|NE)#0\]")
+_ALONE = re.compile(r"[-+]?#([0-9]+)")
+
+
+class Variables:
+    """The variables as one level of calls sees them.
+
+    Parameters
+    ----------
+    values : mapping of int to float, optional
+        Those that are known.
+    macro : bool
+        The level was called by G65: its local variables are empty unless it has set them.
+    """
+
+    def __init__(self, values: Mapping[Key, float] | None = None, *, macro: bool = False) -> None:
+        self._parameters = Parameters("fanuc", values)
+        self.macro = macro
+
+    def called(self, arguments: Mapping[Key, float]) -> "Variables":
+        """Return the variables of a macro that is called from here."""
+        return Variables({**self._common(), **arguments}, macro=True)
+
+    def returned(self, inner: "Variables") -> None:
+        """Take over the common variables of a macro that has ended."""
+        own: dict[Key, float] = {key: self._parameters[key] for key in _LOCAL if key in self._parameters}
+        self._parameters = Parameters("fanuc", {**own, **inner._common()})
+
+    def _common(self) -> dict[Key, float]:
+        return {key: self._parameters[key] for key in _COMMON if key in self._parameters}
+
+    def assign(self, line: int, assignment: Assignment) -> None:
+        """Carry out one assignment.
+
+        Raises
+        ------
+        ProgramError
+            Its value is not certain, or the variable is stored in the control beyond the program.
+        """
+        try:
+            key = self._parameters.key(assignment.target)
+            if key not in _LOCAL and key not in _COMMON:
+                raise InputError(
+                    f"{assignment.target} is set, and only #1 to #33 and #100 to #199 are the program's own: the "
+                    "others stay in the control; use one of those"
+                )
+            if squeezed_is_empty(assignment.value):
+                raise InputError(f"{assignment.target} is made empty (#0), which is not followed; give it a value")
+            self._parameters.assign([assignment])
+        except InputError as error:
+            raise ProgramError(line, f"a variable: {error}") from None
+
+    def value(self, line: int, text: str, what: str, *, word: bool = True) -> float:
+        """Return the value of an expression.
+
+        Parameters
+        ----------
+        line : int
+            It stands in.
+        text : str
+        what : str
+            It is, for the error.
+        word : bool
+            See `thermocomp.nc.parser.expressions.evaluate`.
+
+        Raises
+        ------
+        ProgramError
+            It is not certain.
+        """
+        try:
+            return evaluate(text, self._parameters, word=word)
+        except InputError as error:
+            raise ProgramError(line, f"{what}: {error}") from None
+
+    def holds(self, line: int, condition: str) -> bool:
+        """Return whether a condition holds, such as ``[#1LT10]`` or ``[#1EQ#0]``."""
+        found = _EMPTY.fullmatch(condition)
+        if found:
+            return self._empty(int(found.group(1)), line) == (found.group(2) == "EQ")
+        return self.value(line, condition, "the condition", word=False) != 0.0
+
+    def leaves_out(self, line: int, word: Word) -> bool:
+        """Return whether a word is ignored because its variable is empty, such as ``X#24``."""
+        found = _ALONE.fullmatch("".join(word.value.split()))
+        return bool(found) and self.macro and self._empty(int(found.group(1)), line)  # type: ignore[union-attr]
+
+    def _empty(self, key: int, line: int) -> bool:
+        if key in self._parameters:
+            return False
+        if key in _LOCAL and self.macro:
+            return True
+        raise ProgramError(
+            line, f"whether #{key} is empty is not certain: the program has not set it, and another one may have"
+        )
+
+
+def squeezed_is_empty(value: str) -> bool:
+    """Return whether an assignment makes its variable empty."""
+    return "".join(value.split()) == "#0"
+
+
+def arguments(
+    line: Line, variables: Variables, integers: Literal["whole", "least", "refuse"], least: float
+) -> dict[Key, float]:
+    """Return the local variables that the words of a G65 set.
+
+    Parameters
+    ----------
+    line : Line
+    variables : Variables
+        Of the level that calls.
+    integers : {'whole', 'least', 'refuse'}
+        What a length without a decimal point is.
+    least : float
+        In the unit in force.
+
+    Raises
+    ------
+    ProgramError
+        A letter that is no argument, I J K in another order, a length without a decimal point.
+    """
+    found: dict[Key, float] = {}
+    order = [word.letter for word in line.words if word.letter in "IJK"]
+    if order != sorted(order):
+        raise ProgramError(line.number, "I J K of G65 have to be in this order: else they set other variables")
+    for word in line.words:
+        letter = word.letter
+        if letter in "PL" or (letter == "G" and word.number == 65.0):
+            continue
+        if letter not in ARGUMENTS:
+            raise ProgramError(
+                line.number, f"{letter} on the line of G65, which is no argument; put it on its own line"
+            )
+        if variables.leaves_out(line.number, word):
+            continue
+        value = word.number
+        if value is None:
+            value = variables.value(line.number, word.value, letter)
+        elif "." not in word.value and value and letter not in _WHOLE:
+            if integers == "refuse":
+                raise ProgramError(
+                    line.number,
+                    f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends "
+                    "on the control; say which with --integers",
+                )
+            value *= least if integers == "least" else 1.0
+        found[ARGUMENTS[letter]] = value
+    return found

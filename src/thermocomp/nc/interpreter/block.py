@@ -1,0 +1,243 @@
+"""What a line of an NC program makes the machine do: the state it runs in, and its moves."""
+
+from dataclasses import dataclass, field
+from typing import Final, Literal, NamedTuple
+
+from thermocomp.nc.parser.line import Line, Word
+
+Point = tuple[float, float, float]
+Known = tuple[bool, bool, bool]
+
+#: what a block does to the position: ``none`` nothing; ``line`` G0, G1, G33; ``arc`` G2, G3; ``cycle`` G73, G81 ...;
+#: ``machine`` a move in machine coordinates (G53); ``home`` G28, G30; ``set`` the place gets another name: G92, G10
+#: L20, L10, L11; ``curve`` G5, G5.1; ``probe`` G38
+Kind = Literal["none", "line", "arc", "cycle", "machine", "home", "set", "curve", "probe"]
+
+
+@dataclass(frozen=True, slots=True)
+class Modal:
+    """The modal state a block runs in, its own words included.
+
+    Parameters
+    ----------
+    motion : str
+        Motion code in force, such as ``G1``; empty before the first one, and after ``G80``.
+    plane : {17, 18, 19}
+        Plane of arcs and cycles.
+    inch : bool
+        G20.
+    absolute : bool
+        G90; False in G91.
+    arc_absolute : bool
+        G90.1: centres of arcs are absolute.
+    feed_mode : {93, 94, 95}
+    cutter : bool
+        G41 or G42: cutter radius compensation is on.
+    diameter : bool
+        G7: words of X are diameters.
+    system : int
+        Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
+    rotation : float
+        Of the program's coordinates about Z, stored or by G68 [deg].
+    rotation_told : bool
+        Program or setup say it; else one that is stored in the controller may be in force.
+    origin_told : bool
+        Program or setup say where the work coordinate system begins.
+    untold_tool : int or None
+        Tool whose length is in force, and neither program nor setup say it; -1: of a tool that is not known either.
+    turned : bool
+        G68 is in force.
+    retract : {98, 99}
+    retract_stated : bool
+        The program has said which; else it is what the controller happens to stand at.
+    blend : float or None
+        G64 P: how far the path may leave the corners [mm]; 0 without P, None in G61 and G61.1 (exact).
+    naive : float
+        G64 Q, or P without it: how far points may be off a line that replaces their lines [mm]; 0: none is replaced.
+    exact_stop : bool
+        G61.1, or G61 of a Fanuc: the axes stop at the end of every move.
+    """
+
+    motion: str = ""
+    plane: int = 17
+    inch: bool = False
+    absolute: bool = True
+    arc_absolute: bool = False
+    feed_mode: int = 94
+    cutter: bool = False
+    diameter: bool = False
+    system: int = 1
+    rotation: float = 0.0
+    rotation_told: bool = False
+    origin_told: bool = False
+    untold_tool: int | None = None
+    turned: bool = False
+    retract: int = 98
+    retract_stated: bool = False
+    blend: float | None = 0.0
+    naive: float = 0.0
+    exact_stop: bool = False
+
+
+#: plane -> its two axes and the one across
+PLANES: Final = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+
+class Arc(NamedTuple):
+    """How a move turns."""
+
+    plane: int  #: 17, 18, 19
+    centre: tuple[float, float]  #: in the plane's own axes (17: X Y, 18: Z X, 19: Y Z), machine coordinates [mm]
+    clockwise: bool
+    turns: int  #: at least 1: the arc ends in its first turn
+
+
+@dataclass(slots=True)
+class Move:
+    """One move of the machine.
+
+    Parameters
+    ----------
+    rapid : bool
+    start, end : tuple of float
+        Machine coordinates [mm], work and tool offsets as far as they are known.
+    arc : Arc or None
+    feed : float
+        Along the path [mm/min], 0 for rapids and inverse time; degrees per minute if only rotary axes move.
+    seconds : float or None
+        How long it takes, where the program says so (G93) or the spindle does (G95, G33, taps).
+    rotary : float
+        Way of the rotary axes [deg].
+    """
+
+    rapid: bool
+    start: Point
+    end: Point
+    arc: Arc | None = None
+    feed: float = 0.0
+    seconds: float | None = None
+    rotary: float = 0.0
+
+
+@dataclass(slots=True)
+class Block:
+    """What one line does.
+
+    Parameters
+    ----------
+    line : Line
+    modal : Modal
+    kind : str
+        See `Kind`.
+    codes : tuple of str
+        G and M codes of the line, such as ``("G90", "G1", "M8")``.
+    words : dict of str to Word
+        Words of X, Y, Z, R, I, J, K, P, Q, F, S, T, H, L ... (not G, M, N) by letter.
+    values : dict of str to float
+        Their values, expressions evaluated, in the program's units.
+    start, end : tuple of float
+        Where the tool is before and after it, in the coordinates an absolute word would have at that time [mm].
+    known : tuple of bool
+        Per axis: `end` is certain, and was reached in work coordinates: an absolute word of that axis with the value of
+        `end` would not move it. False at the start of the program, after G53, G28, G30, M6 and stops, after a
+        change of the coordinate system or of the tool length that the file does not tell, and after an optional line
+        that moved it.
+    moves : list of Move
+    feed : float
+        F in force, in mm per minute, mm per turn or 1/min, according to ``modal.feed_mode``.
+    speed : float
+        Spindle speed, its turning on M3, M4, M5 included; 0 while it stands, negative in M4 [1/min].
+    pause : float
+        Dwell [s].
+    tool_change : int or None
+        Number of the tool that M6 puts in; -1 unknown.
+    turned : dict of str to float
+        Rotary axes that are not at 0, and where they are [deg]; nan: they have got another zero.
+    stops : bool
+        M0, M1, M60: the operator decides how long, and may move the axes.
+    ends : bool
+        M2, M30 or the closing ``%``: nothing after it is run.
+    sticky : dict of str to float
+        In a cycle: R, Z, Q, P ... in force, in the program's units.
+    """
+
+    line: Line
+    modal: Modal
+    kind: Kind = "none"
+    codes: tuple[str, ...] = ()
+    words: dict[str, Word] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
+    start: Point = (0.0, 0.0, 0.0)
+    end: Point = (0.0, 0.0, 0.0)
+    known: Known = (False, False, False)
+    moves: list[Move] = field(default_factory=list)
+    feed: float = 0.0
+    speed: float = 0.0
+    pause: float = 0.0
+    tool_change: int | None = None
+    turned: dict[str, float] = field(default_factory=dict)
+    stops: bool = False
+    ends: bool = False
+    sticky: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What stands at the controller and not in the program.
+
+    Parameters
+    ----------
+    controller : {'linuxcnc', 'fanuc'}
+        Whose habits the program has.
+    inch : bool or None
+        Unit in force when the program starts; None: unknown, and the program has to say it before the first length.
+    startup : str
+        Codes in force when the program starts, from `thermocomp.nc.interpreter.startup.tidy`.
+    speed : float
+        Spindle speed S in force when the program starts [1/min]; 0: none.
+    offsets : dict of int to tuple of float
+        Origins of work coordinate systems, X Y Z [mm]; those that are not there are taken as 0. They tell about where
+        the machine is, but are never certain: only what the program itself sets keeps an axis known.
+    tools : dict of int to float
+        Lengths of the tools [mm]; the same holds for them.
+    home : tuple of float or None
+        Where G28 goes, in machine coordinates [mm]; None: not stated.
+    rotations : dict of int to float
+        Rotations of work coordinate systems about Z that are stored in the controller [deg], as far as they are stated.
+    no_shift : bool
+        It is stated that no G92 or G52 is in force when the program starts.
+    rotary : dict of str to {'head', 'table'}
+        What the rotary axes A, B, C turn, as far as it is stated: the spindle or the workpiece.
+    integers : {'whole', 'least', 'refuse'}
+        What a length without a decimal point is: whole millimetres or inches, the least increment, or a reason to
+        refuse.
+    least : float
+        Least input increment [mm], for `integers` 'least'.
+    skip_optional : bool
+        Block delete is on: lines that begin with ``/`` are not run.
+    harmless : frozenset of int
+        M codes of the machine's maker or user that move no axis and leave the spindle as it is; known codes keep their
+        meaning.
+    """
+
+    controller: Literal["linuxcnc", "fanuc"] = "linuxcnc"
+    inch: bool | None = None
+    startup: str = ""
+    speed: float = 0.0
+    offsets: dict[int, Point] = field(default_factory=dict)
+    tools: dict[int, float] = field(default_factory=dict)
+    home: Point | None = None
+    rotations: dict[int, float] = field(default_factory=dict)
+    no_shift: bool = False
+    rotary: dict[str, Literal["head", "table"]] = field(default_factory=dict)
+    integers: Literal["whole", "least", "refuse"] = "whole"
+    least: float = 0.001
+    skip_optional: bool = False
+    harmless: frozenset[int] = frozenset()
+
+
+def system_name(system: int) -> str:
+    """Return the code of a work coordinate system, such as ``G54``."""
+    if system > 100:
+        return f"G54.1 P{system - 100}"
+    return f"G{53 + system}" if system <= 6 else f"G59.{system - 6}"

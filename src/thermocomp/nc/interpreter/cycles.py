@@ -1,0 +1,156 @@
+"""The moves of canned cycles, as LinuxCNC makes them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from thermocomp.nc.interpreter.block import PLANES, Point
+
+#: how far chip breaking and peck drilling stay off the ground [inch]
+BACK_OFF: Final = 0.01
+#: levels nearer than that are equal but for the arithmetic
+ROUNDING: Final = 1e-9
+#: more holes or pecks than this are a mistake in the program
+MOST: Final = 100_000
+
+
+class CycleError(Exception):
+    """The cycle cannot be; the text says why."""
+
+
+class Step(NamedTuple):
+    """A move of a cycle."""
+
+    rapid: bool
+    place: Point  #: program coordinates and program units
+
+
+#: words that a cycle needs the first time, and keeps
+KEPT: Final = {
+    "G73": "RQ",
+    "G74": "R",
+    "G81": "R",
+    "G82": "RP",
+    "G83": "RQ",
+    "G84": "R",
+    "G85": "R",
+    "G86": "RP",
+    "G87": "RIJK",
+    "G89": "RP",
+}
+#: tapping: P is a dwell that may be left out
+_TAPS: Final = ("G74", "G84")
+
+
+@dataclass(slots=True)
+class Cycle:
+    """One line of a cycle.
+
+    Parameters
+    ----------
+    code : str
+    plane : {17, 18, 19}
+        Drilling goes across it.
+    absolute : bool
+    to_r : bool
+        G99: back to R only.
+    inch : bool
+    start : tuple of float
+        Where the tool is, as program coordinates in program units; so is all the rest.
+    named : dict of str to float
+        Axis words of the line.
+    sticky : dict of str to float
+        R, Q, P, I, J, K and the depth (by its axis) in force, those of the line included.
+    level : float
+        Where the tool was across the plane when the cycle began, which G98 goes back to.
+    repeats : int
+    direct : bool
+        From R to the next hole it goes at R, also in G98 (Fanuc).
+    """
+
+    code: str
+    plane: int
+    absolute: bool
+    to_r: bool
+    inch: bool
+    start: Point
+    named: dict[str, float]
+    sticky: dict[str, float]
+    level: float
+    repeats: int = 1
+    direct: bool = False
+
+    def steps(self) -> Iterator[Step]:
+        """Yield the moves; their number does not change if the whole cycle is shifted a little.
+
+        Raises
+        ------
+        CycleError
+        """
+        first, second, across = PLANES[self.plane]
+        r, bottom = self.sticky["R"], self.sticky["XYZ"[across]]
+        if not self.absolute:
+            r += self.level
+            bottom += r
+        if r < bottom:
+            raise CycleError(f"R is at {r:g}, below the bottom at {bottom:g}; check R and {'XYZ'[across]}")
+        if self.code in ("G73", "G83") and (r - bottom) / self.sticky["Q"] > MOST:
+            raise CycleError(f"Q{self.sticky['Q']:g} makes more than {MOST} pecks; check Q")
+
+        a, b, now = self.start[first], self.start[second], self.start[across]
+        level = self.level
+        if level < r:
+            level = now = r
+        yield Step(True, self._at(a, b, now))
+        back = r if self.to_r else level
+        height = now if now > r + ROUNDING or self.direct else back
+        da, db = self.named.get("XYZ"[first]), self.named.get("XYZ"[second])
+        for _ in range(self.repeats):
+            if self.absolute:
+                a, b = a if da is None else da, b if db is None else db
+            else:
+                a, b = a + (da or 0.0), b + (db or 0.0)
+            yield Step(True, self._at(a, b, height))
+            yield Step(True, self._at(a, b, r))
+            yield from self._hole(a, b, r, bottom, back)
+            height = back
+
+    def _at(self, a: float, b: float, c: float) -> Point:
+        """Return a point from its coordinates in the plane and across it."""
+        if self.plane == 17:
+            return (a, b, c)
+        return (b, c, a) if self.plane == 18 else (c, a, b)
+
+    def _hole(self, a: float, b: float, r: float, bottom: float, back: float) -> Iterator[Step]:
+        """Yield the moves from R to the bottom and back."""
+        code, sticky, at = self.code, self.sticky, self._at
+        if code == "G87":
+            beside = a + sticky["I"], b + sticky["J"]
+            top = sticky["K"] + (0.0 if self.absolute else bottom)
+            yield Step(True, at(*beside, r))
+            yield Step(True, at(*beside, bottom))
+            yield Step(True, at(a, b, bottom))
+            yield Step(False, at(a, b, top))
+            yield Step(False, at(a, b, bottom))
+            yield Step(True, at(*beside, bottom))
+            yield Step(True, at(*beside, back))
+            yield Step(True, at(a, b, back))
+            return
+        if code in ("G73", "G83"):
+            off = BACK_OFF if self.inch else BACK_OFF * 25.4
+            depth = r - sticky["Q"]
+            while depth > bottom:
+                yield Step(False, at(a, b, depth))
+                if code == "G83":
+                    yield Step(True, at(a, b, r))
+                yield Step(True, at(a, b, depth + off))
+                depth -= sticky["Q"]
+        yield Step(False, at(a, b, bottom))
+        if code == "G85":
+            yield Step(False, at(a, b, r))
+        yield Step(code not in ("G89", *_TAPS), at(a, b, back))
+
+
+def pause(code: str, sticky: dict[str, float]) -> float:
+    """Return the dwell at the bottom of one hole, as the word P has it."""
+    return sticky.get("P", 0.0) if "P" in KEPT[code] or code in _TAPS else 0.0

@@ -1,0 +1,323 @@
+"""Follows a program as the controller would: line after line, what state it runs in and what moves it makes.
+
+The order of execution within a line, the tolerances and the moves of cycles are LinuxCNC's; the tests compare every
+move with its interpreter. What cannot be followed for certain is refused with line and reason.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Final
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter import fanuc, modal, motion, offsetcodes
+from thermocomp.nc.interpreter.block import Block, Setup
+from thermocomp.nc.interpreter.codes import CYCLES, STOPS, TAKES_AXES
+from thermocomp.nc.interpreter.state import State
+from thermocomp.nc.interpreter.words import Orders, Reader
+from thermocomp.nc.parser.expressions import Parameters
+from thermocomp.nc.parser.line import Line
+
+_AXIS_LETTERS: Final = frozenset("XYZABC")
+_PLAIN_LETTERS: Final = frozenset("XYZF")
+_PROBES: Final = frozenset({"G31", "G38.2", "G38.3", "G38.4", "G38.5"})
+_THREADS: Final = frozenset({"G33", "G33.1"})
+_STATED_ANEW: Final = frozenset({"", "G0", "G1", "G2", "G3"})
+_CURVES: Final = frozenset({"G5", "G5.1"})
+
+
+def follow(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
+    """Follow a program.
+
+    Parameters
+    ----------
+    lines : iterable of Line
+    setup : Setup
+        What stands at the controller and not in the program.
+
+    Yields
+    ------
+    Block
+        One for every line.
+
+    Raises
+    ------
+    ProgramError
+        A line cannot be followed for certain; its reason says what was found and what to do.
+    """
+    step = Follower(setup).step
+    for line in lines:
+        yield step(line)
+
+
+class Follower:
+    """A controller that goes through a program.
+
+    Parameters
+    ----------
+    setup : Setup
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.state = State(setup)
+        self._setup = setup
+        self._parameters = Parameters(setup.controller)
+        self._reader = Reader(setup, self._parameters)
+        self._began = False
+        self._demarcated = False
+        self._ended = False
+        self._if_skipped: str | None = None  # motion in force if the optional lines are not run
+
+    def step(self, line: Line) -> Block:
+        """Run one line.
+
+        Raises
+        ------
+        ProgramError
+            See `follow`.
+        """
+        if self._ended:
+            return self._idle(line)
+        if line.demarcation:
+            return self._percent(line)
+        if not self._began:  # what stands before the first % of a Fanuc program is a leader
+            acts = line.words or line.assignments or line.flow if self.state.fanuc else line.text.strip()
+            self._began = bool(acts)
+        if line.optional and self._setup.skip_optional:
+            return self._idle(line)
+        if line.error:
+            raise ProgramError(line.number, line.error)
+        if line.flow:
+            remedy = "--expand writes them out" if self.state.fanuc else "--expand lets the interpreter unroll them"
+            raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
+        if not line.words and not line.assignments:
+            return self._idle(line)
+        orders = self._reader.read(line)
+        if line.optional:
+            return self._optional(orders)
+        if self._if_skipped is not None:
+            self._check_motion(orders, self._if_skipped)
+        return self._run(orders)
+
+    def _idle(self, line: Line) -> Block:
+        state = self.state
+        return Block(
+            line,
+            state.modal,
+            start=state.place,
+            end=state.place,
+            known=state.known,
+            feed=state.feed,
+            speed=0.0 if self._ended else state.speed,
+        )
+
+    def _percent(self, line: Line) -> Block:
+        """Begin or end the program at ``%``."""
+        if self._began:
+            if not self._demarcated and not self.state.fanuc:
+                raise ProgramError(line.number, "'%' in a program that does not begin with it; remove it")
+            block = self._idle(line)
+            block.ends = self._ended = True
+            return block
+        self._began = self._demarcated = True
+        return self._idle(line)
+
+    def _optional(self, orders: Orders) -> Block:
+        """Run a line that the operator may skip: then nothing after it may depend on it."""
+        before, motion = self._summary(), self.state.modal.motion
+        block = self._run(orders)
+        after = self._summary()
+        if self.state.modal.motion != motion and self._if_skipped is None:
+            self._if_skipped = motion
+        changed = [what for what, was in before.items() if after[what] != was]
+        if block.ends:
+            changed.append("the end of the program")
+        if block.kind in ("cycle", "set"):
+            changed.append(f"the state of {' '.join(block.codes) or 'the cycle'}")
+        if block.moves and not block.modal.absolute and block.kind != "home":
+            changed.append("the place of all G91 moves behind it")
+        if changed:
+            raise orders.error(
+                f"an optional line (/) that changes {changed[0]}: what comes after depends on whether the operator "
+                "skips it; decide with --block-delete"
+            )
+        if block.moves:
+            x, y, z = (
+                k and letter not in block.values and a == b
+                for k, letter, a, b in zip(block.known, "XYZ", block.start, block.end, strict=True)
+            )
+            block.known = self.state.known = (x, y, z)
+        return block
+
+    def _check_motion(self, orders: Orders, otherwise: str) -> None:
+        """Refuse a line that is run by a motion code of an optional line."""
+        told, force = orders.groups.get("motion"), self.state.modal.motion
+        if told is None and force != otherwise and self._motion(orders):
+            raise orders.error(
+                f"is run by {force} of an optional line (/), or by {otherwise or 'none'} if the operator skips that; "
+                "write its motion code, or decide with --block-delete"
+            )
+        if told is not None or force == otherwise:
+            self._if_skipped = None
+
+    def _summary(self) -> dict[str, object]:
+        state = self.state
+        # whoever needs a motion code or a feed after optional lines has to state the one; the other tells the time only
+        plain = state.modal.motion in _STATED_ANEW and not state.fanuc
+        return {
+            "modal codes": replace(state.modal, motion="") if plain else state.modal,
+            "offsets": state.offsets.state(),
+            "tool lengths": (dict(state.lengths), dict(state.doubtful)),
+            "the feed": None if plain else (state.feed, state.feed_word),
+            "the spindle's speed": (state.spindle, state.turning),
+            "the tool": (state.tool, state.selected),
+            "the cycle": (dict(state.sticky), state.level),
+        }
+
+    def _run(self, orders: Orders) -> Block:
+        state, values, groups = self.state, orders.values, orders.groups
+        before = state.modal
+        code = self._motion(orders)
+        if state.fanuc:
+            fanuc.check_codes(state, orders, code)
+        if values.keys() - _PLAIN_LETTERS:
+            self._reader.check_letters(orders, code)
+        block = Block(orders.line, before, "none", orders.codes, orders.words, values, state.place)
+        if groups and not (len(groups) == 1 and "motion" in groups):
+            modal.settle(state, orders, block)
+        else:
+            modal.check_units(state, orders)
+            modal.speeds(state, orders, before.inch)
+        once = groups.get("once")
+        if once is not None:
+            self._once(orders, block, once)
+        if state.turned_anew:
+            fanuc.check_place(state, orders, code)
+        if code:
+            self._move(orders, block, code)
+        self._after(groups, block, code, before.motion)
+        if state.lathe and not all(move.rapid for move in block.moves):
+            raise modal.lathe(orders, f"{state.lathe} before, and no M6")
+        stop = groups.get("stop")
+        if stop is not None:
+            block.ends = self._ended = stop not in STOPS
+        if stop in STOPS:  # the operator may move the axes
+            block.stops = True
+            state.known, state.level_known = (False, False, False), False
+        block.end = state.place
+        block.known = state.known
+        block.turned = state.turned
+        block.feed = state.feed
+        block.speed = block.speed or state.speed
+        return block
+
+    def _after(self, groups: dict[str, str], block: Block, code: str, before: str) -> None:
+        """Put the motion code in force that holds behind the line; `before` was in force before it."""
+        state = self.state
+        block.modal = state.modal
+        if groups.get("motion") == "G80":
+            state.sticky = {}
+            state.level = None
+            if not state.fanuc:
+                state.moves_by("")
+            elif state.modal.motion in CYCLES:  # these are a group of their own there
+                state.moves_by(state.under)
+            block.modal = state.modal
+        elif code in _CURVES:
+            state.moves_by("")
+        elif code == "G31":  # holds for its line only
+            state.moves_by(before)
+
+    def _motion(self, orders: Orders) -> str:
+        """Return the motion code that this line runs; empty if it makes no move of its own."""
+        groups, values = orders.groups, orders.values
+        told = groups.get("motion")
+        once = groups.get("once")
+        turns = groups.get("rotation") == "G68"
+        smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
+        if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros say which are smoothed
+            raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
+        if once is None and not smoothed and not turns and "tool length" not in groups:
+            if told == "G80":
+                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(orders)
+            if told is not None:
+                return told
+        takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
+        if once in ("G4", "G92.1") and self.state.fanuc:
+            takes = True
+        if takes:
+            self._beside(orders, told, "G68" if turns else once or "G43.1")
+            return ""
+        if told is not None and told != "G80":
+            return told
+        if _AXIS_LETTERS.isdisjoint(values) and not self._turns(orders):
+            return ""
+        force = self.state.modal.motion
+        if not force or told == "G80":
+            raise orders.error("axis words, and no motion code is in force; write G0, G1 ... before them")
+        return force
+
+    def _beside_g80(self, orders: Orders) -> str:
+        if not self.state.fanuc:
+            raise orders.error("axis words beside G80; write the motion code they are for")
+        return fanuc.motion_beside_g80(self.state, orders)
+
+    def _beside(self, orders: Orders, told: str | None, other: str) -> None:
+        """Take in a motion code beside another one that takes the axis words."""
+        if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
+            fanuc.put_in_force(self.state, told)
+        elif told not in (None, "G80"):
+            raise orders.error(f"{told} beside {other}: both would use the axis words; put one on its own line")
+
+    def _turns(self, orders: Orders) -> bool:
+        """Whether the line is an arc without axis words: a full circle."""
+        force = self.state.modal.motion
+        return force in ("G2", "G3") and not orders.values.keys().isdisjoint("IJK") and "once" not in orders.groups
+
+    def _once(self, orders: Orders, block: Block, once: str) -> None:
+        """Do the code that holds for this line only; G53 belongs to the motion."""
+        state, values = self.state, orders.values
+        if once == "G4":
+            if "P" in values:
+                if state.fanuc:
+                    fanuc.check_dwell(orders)
+                seconds = motion.dwell_seconds(state, values["P"])
+            elif state.fanuc and "X" in values:
+                seconds = fanuc.dwell_of_x(state, orders)
+            else:
+                raise orders.error("G4 needs P, the time")
+            if seconds < 0.0:
+                raise orders.error("G4 with a negative time")
+            block.pause += seconds
+        elif once in ("G28", "G30"):
+            motion.home(state, orders, block)
+        elif once == "G10":
+            offsetcodes.g10(state, orders, block)
+        elif once != "G53":
+            offsetcodes.local(state, orders, block)
+
+    def _move(self, orders: Orders, block: Block, code: str) -> None:
+        state = self.state
+        again = state.modal.motion == code
+        if not again:
+            state.moves_by(code)
+        if code not in CYCLES:
+            if state.level is not None:
+                state.level, state.sticky = None, {}
+        elif _AXIS_LETTERS.isdisjoint(orders.values):
+            raise orders.error(f"{code} without axis words; say where")
+        if orders.groups.get("once") == "G53":
+            motion.in_machine(state, orders, block)
+        elif code in ("G0", "G1"):
+            motion.straight(state, orders, block)
+        elif code in ("G2", "G3"):
+            motion.arc(state, orders, block)
+        elif code in CYCLES:
+            motion.cycle(state, orders, block, again)
+        elif _AXIS_LETTERS.isdisjoint(orders.values):
+            raise orders.error(f"{code} without axis words; say where")
+        elif code in _PROBES:
+            motion.probe(state, orders, block)
+        elif code in _THREADS:
+            motion.in_step(state, orders, block)
+        else:
+            motion.curve(state, orders, block)

@@ -1,0 +1,230 @@
+"""Program coordinates and machine coordinates, and what a program does to the offsets between them.
+
+Machine = origin of the work coordinate system + rotation about Z of (program + G92 or G52) + tool offset, in mm, as
+LinuxCNC has it; there G92 and G52 share one store.
+"""
+
+import math
+from collections.abc import Mapping
+
+from thermocomp.nc.interpreter.block import Known, Point, Setup
+
+_ZERO: Point = (0.0, 0.0, 0.0)
+_NEVER: Known = (False, False, False)
+_ALL: Known = (True, True, True)
+
+#: Fanuc: the external offset, added to all work coordinate systems
+EXTERNAL = 0
+
+
+def both(a: Known, b: Known) -> Known:
+    """Return per axis whether both hold."""
+    return (a[0] and b[0], a[1] and b[1], a[2] and b[2])
+
+
+def put(point: Point, values: Mapping[int, float]) -> Point:
+    """Return a point with some of its coordinates replaced."""
+    x, y, z = (values.get(i, point[i]) for i in range(3))
+    return (x, y, z)
+
+
+def mark(known: Known, axes: Mapping[int, object], to: bool) -> Known:
+    """Return `known` with some axes set."""
+    x, y, z = (to if i in axes else known[i] for i in range(3))
+    return (x, y, z)
+
+
+class Offsets:
+    """The offsets in force, and per axis whether they are certain.
+
+    An offset that stood at the controller before the program started is not, nor is what the setup says of it; what the
+    program states is. After a change, a program coordinate is only known if the offset was certain before it and after
+    it.
+
+    Parameters
+    ----------
+    setup : Setup
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.system = 1
+        self.origins: dict[int, Point] = dict(setup.offsets)
+        self.rotations: dict[int, float] = dict(setup.rotations)
+        self._certain_origins: dict[int, Known] = {}
+        self._told_origins = set(setup.offsets)
+        self.shift: Point = _ZERO
+        self._kept: Point = _ZERO
+        self._certain_shift: Known = _NEVER
+        self._turn: tuple[float, float, float] | None = None
+        self.tool: Point = _ZERO
+        self.certain_tool: Known = (True, True, False)
+        self._update()
+
+    def _update(self) -> None:
+        """Work out what conversions need, which are many, when the offsets change, which is rare."""
+        origin = self.origins.get(self.system, _ZERO)
+        external = self.origins.get(EXTERNAL, _ZERO)
+        self.rotation = self.rotations.get(self.system, 0.0)
+        turned = math.radians(self.rotation)
+        self._cos, self._sin = math.cos(turned), math.sin(turned)
+        x, y, z = (origin[i] + external[i] + self.tool[i] for i in range(3))
+        if self._turn is not None:  # within the system: its centre stays where it was without it
+            a, b, angle = self._turn
+            x, y = x + a * self._cos - b * self._sin, y + a * self._sin + b * self._cos
+            self.rotation += angle
+            turned = math.radians(self.rotation)
+            self._cos, self._sin = math.cos(turned), math.sin(turned)
+            x, y = x - a * self._cos + b * self._sin, y - a * self._sin - b * self._cos
+        self._base = (x, y, z)
+        #: what is added to program coordinates; None while they are rotated
+        self.sum: Point | None = None
+        if not self.rotation:
+            self.sum = (x + self.shift[0], y + self.shift[1], z + self.shift[2])
+
+    @property
+    def certain(self) -> Known:
+        """Per axis, whether program coordinates tell machine coordinates."""
+        origin = self._certain_origins.get(self.system, _NEVER)
+        return both(origin, both(self._certain_shift, self.certain_tool))
+
+    @property
+    def origin_told(self) -> bool:
+        """Whether program or setup say where the system in force begins."""
+        return self.system in self._told_origins
+
+    @property
+    def rotation_told(self) -> bool:
+        """Whether program or setup say how the system in force is turned."""
+        return self.system in self.rotations
+
+    def state(self) -> tuple[object, ...]:
+        """Return all that tells whether something has changed."""
+        return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
+
+    def machine(self, place: Point) -> Point:
+        """Return the machine coordinates of a place in program coordinates [mm]."""
+        x, y, z = place
+        if self.sum is not None:
+            a, b, c = self.sum
+            return (x + a, y + b, z + c)
+        a, b, c = self._base
+        x, y, z = x + self.shift[0], y + self.shift[1], z + self.shift[2]
+        return (x * self._cos - y * self._sin + a, x * self._sin + y * self._cos + b, z + c)
+
+    def program(self, point: Point) -> Point:
+        """Return the program coordinates of a point in machine coordinates [mm]."""
+        x, y, z = (point[i] - self._base[i] for i in range(3))
+        x, y = x * self._cos + y * self._sin, y * self._cos - x * self._sin
+        return (x - self.shift[0], y - self.shift[1], z - self.shift[2])
+
+    def turn(self, centre: tuple[float, float] | None, angle: float = 0.0) -> None:
+        """G68: turn X and Y of the program about a place in program coordinates [mm, deg]; None: G69."""
+        self._turn = None if centre is None else (centre[0] + self.shift[0], centre[1] + self.shift[1], angle)
+        self._update()
+
+    def select(self, system: int) -> Known:
+        """G54 and its like; returns per axis whether a known program coordinate still is."""
+        if system == self.system:
+            return _ALL
+        before, turned = self._certain_origins.get(self.system, _NEVER), self.rotation
+        self.system = system
+        self._update()
+        still = both(before, self._certain_origins.get(system, _NEVER))
+        # where the coordinates turn, X and Y depend on each other
+        return (False, False, still[2]) if turned != self.rotation else still
+
+    def set_origin(
+        self, system: int, values: Mapping[int, float], rotation: float | None = None, add: bool = False
+    ) -> None:
+        """G10 L2: set the origin of a system.
+
+        Parameters
+        ----------
+        system : int
+        values : mapping of int to float
+            By axis [mm].
+        rotation : float or None
+            [deg]; None: as it is.
+        add : bool
+            Shift it instead.
+        """
+        old = self.origins.get(system, _ZERO)
+        if add:
+            values = {i: old[i] + v for i, v in values.items()}
+        else:
+            certain = self._certain_origins.get(system, _NEVER)
+            self._certain_origins[system] = mark(certain, values, to=True)
+        self.origins[system] = put(old, values)
+        if values:
+            self._told_origins.add(system)
+        if rotation is not None:
+            self.rotations[system] = rotation
+        self._update()
+
+    def name_origin(self, system: int, point: Point, values: Mapping[int, float], known: Known) -> None:
+        """G10 L20: set the origin of a system so that a point of the machine gets these program coordinates in it.
+
+        Parameters
+        ----------
+        system : int
+        point : tuple of float
+            Machine coordinates [mm].
+        values : mapping of int to float
+            Program coordinates, by axis [mm].
+        known : tuple of bool
+            Per axis: `point` is certain.
+        """
+        own = self.system
+        certain = both(known, self.certain)
+        self.system = system
+        self._update()
+        wanted = put(self.program(point), values)
+        old = self.origins.get(system, _ZERO)
+        reached = self.machine(wanted)
+        x, y, z = (old[i] + point[i] - reached[i] for i in range(3))
+        self.origins[system] = (x, y, z)
+        stays = mark(self._certain_origins.get(system, _NEVER), values, to=False)
+        told = mark(_NEVER, values, to=True)
+        self._certain_origins[system] = tuple(  # type: ignore[assignment]
+            s or (t and c) for s, t, c in zip(stays, told, certain, strict=True)
+        )
+        self.system = own
+        self._update()
+
+    def name_place(self, place: Point, values: Mapping[int, float], known: Known) -> None:
+        """G92: shift the coordinates so that a place in program coordinates gets these ones."""
+        told = both(self._certain_shift, known)
+        self._certain_shift = mark(self._certain_shift, {i: v for i, v in values.items() if not told[i]}, to=False)
+        self._set_shift(put(self.shift, {i: self.shift[i] + place[i] - v for i, v in values.items()}))
+
+    def set_shift(self, values: Mapping[int, float]) -> Known:
+        """G52; returns per axis whether a known program coordinate still is."""
+        still = tuple(c or i not in values for i, c in enumerate(self._certain_shift))
+        self._certain_shift = mark(self._certain_shift, values, to=True)
+        self._set_shift(put(self.shift, values))
+        return still  # type: ignore[return-value]
+
+    def drop_shift(self, keep: bool) -> Known:
+        """G92.1, and G92.2 that keeps the values for G92.3; returns whether program coordinates are still known."""
+        kept, still = self._kept, self._certain_shift
+        self._set_shift(_ZERO)
+        self._kept = kept if keep else _ZERO
+        self._certain_shift = _ALL
+        return still
+
+    def restore_shift(self) -> Known:
+        """G92.3; returns whether program coordinates are still known, which they are not."""
+        self._set_shift(self._kept)
+        self._certain_shift = _NEVER
+        return _NEVER
+
+    def _set_shift(self, shift: Point) -> None:
+        self.shift = self._kept = shift
+        self._update()
+
+    def set_tool(self, tool: Point, certain: Known) -> Known:
+        """G43 and its like; returns per axis whether a known program coordinate still is."""
+        still = both(self.certain_tool, certain)
+        self.tool, self.certain_tool = tool, certain
+        self._update()
+        return still

@@ -1,0 +1,63 @@
+"""Codes that are in force when a program starts, that it need not say, and that no program's end puts back."""
+
+from typing import Final
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.nc.interpreter.block import Modal, Setup
+from thermocomp.nc.parser.line import Word
+from thermocomp.nc.parser.tokens import Controller, read_line
+
+_PATHS: Final = {61.0: "G61", 61.1: "G61.1", 64.0: "G64"}
+_RETRACTS: Final = {98.0: "G98", 99.0: "G99"}
+
+
+def tidy(text: str, controller: Controller) -> str:
+    """Return startup codes as they stand in a `Setup`, such as ``G64 P0.01 G98``.
+
+    Raises
+    ------
+    InputError
+        There is something else among them, or two that exclude each other.
+    """
+    line = read_line(text, 1, controller)
+    rest = line.assignments or line.comment or line.label or line.flow or line.demarcation or line.optional
+    if line.error or rest or any(w.number is None for w in line.words):
+        raise InputError(f"{text!r}: {line.error or 'want codes and plain numbers only'}")
+    path, retract = _of(line.words, _PATHS), _of(line.words, _RETRACTS)
+    lengths = {w.letter: w.value for w in line.words if w.letter in "PQ"}
+    if len(path) + len(retract) + len(lengths) < len(line.words) or not line.words:
+        raise InputError(f"{text!r}: want G61, G61.1 or G64, and G98 or G99; all else the program has to say itself")
+    if len(path) > 1 or len(retract) > 1:
+        raise InputError(f"{text!r}: {' and '.join(path if len(path) > 1 else retract)} exclude each other")
+    if lengths and (path != ["G64"] or controller == "fanuc" or "P" not in lengths or "-" in "".join(lengths.values())):
+        raise InputError(f"{text!r}: P and Q are tolerances of LinuxCNC's G64 [mm]: P alone or P and Q, not negative")
+    return " ".join((*path, *(letter + value.replace(" ", "") for letter, value in sorted(lengths.items())), *retract))
+
+
+def modal(setup: Setup) -> Modal:
+    """Return the modal state at the start of a program; of a path that is not stated ``G64`` without a tolerance."""
+    words = read_line(setup.startup, 1, setup.controller).words
+    path, retract = _of(words, _PATHS), _of(words, _RETRACTS)
+    lengths = {w.letter: w.number or 0.0 for w in words if w.letter in "PQ"}
+    blend = lengths.get("P", 0.0)
+    return Modal(
+        inch=bool(setup.inch),
+        # where nothing is stated LinuxCNC's interpreter begins with G99, Fanuc with G98
+        retract=int(retract[0][1:]) if retract else 98 if setup.controller == "fanuc" else 99,
+        retract_stated=bool(retract),
+        blend=None if path and path != ["G64"] else blend,
+        naive=lengths.get("Q", blend) if blend else 0.0,
+        exact_stop=path == ["G61.1"],
+    )
+
+
+def whole(setup: Setup) -> str:
+    """Return the startup codes for an interpreter, with those that `modal` takes where nothing is stated."""
+    words = read_line(setup.startup, 1, setup.controller).words
+    path = "" if _of(words, _PATHS) else "G64"
+    retract = "" if _of(words, _RETRACTS) else f"G{modal(setup).retract}"
+    return " ".join(filter(None, (path, setup.startup, retract)))
+
+
+def _of(words: list[Word], group: dict[float, str]) -> list[str]:
+    return [group[w.number] for w in words if w.letter == "G" and w.number in group]

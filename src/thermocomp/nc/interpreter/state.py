@@ -1,0 +1,208 @@
+"""What a controller knows while it runs a program."""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+from thermocomp.nc.interpreter import startup
+from thermocomp.nc.interpreter.arcs import length
+from thermocomp.nc.interpreter.block import Arc, Known, Modal, Move, Point, Setup
+from thermocomp.nc.interpreter.codes import CYCLES, ROTARY
+from thermocomp.nc.interpreter.offsets import Offsets
+from thermocomp.nc.interpreter.words import Orders
+
+MM: Final = 25.4  # per inch
+_TRUE: Known = (True, True, True)
+
+
+class State:
+    """Where the tool is, and everything that words and codes have set.
+
+    Parameters
+    ----------
+    setup : Setup
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.fanuc = setup.controller == "fanuc"
+        self.modal = startup.modal(setup)
+        self._variants: dict[str, Modal] = {}
+        self.unit_told = setup.inch is not None
+        self.scale = MM if setup.inch else 1.0
+        self.offsets = Offsets(setup)
+        self.place: Point = self.offsets.program((0.0, 0.0, 0.0))
+        self.machine: Point = (0.0, 0.0, 0.0)
+        self.known: Known = (False, False, False)
+        self.rotary: dict[str, float] = dict.fromkeys(ROTARY, 0.0)
+        self.rezeroed: set[str] = set()  # rotary axes that have got another zero
+        self.turned: dict[str, float] = {}
+        self.feed = 0.0
+        self.feed_word = 0.0
+        self.spindle: float | None = setup.speed or None
+        self.turning = 0
+        self.selected = -1
+        self.tool = -1
+        self.lathe: str | None = ""  # Fanuc: a T word that may be a lathe's; None: M6 has come
+        self.under = ""  # Fanuc: the motion that G80 brings back
+        self.turned_anew = ""  # Fanuc: G68 or G69, and X and Y have not been named since
+        self.lengths: dict[int, float] = {}  # that the program has set
+        self.doubtful: dict[int, float] = dict(setup.tools)
+        self.shifted_by = ""
+        self.length_number: int | None = None
+        self.untold_tool: int | None = None
+        self.length_inch: bool | None = None
+        self.sticky: dict[str, float] = {}
+        self.last_dwell = 0.0
+        self.level: float | None = None
+        self.level_known = False
+        self.level_frame = (17, False, False)
+
+        self.placed()
+
+    @property
+    def speed(self) -> float:
+        """Spindle speed, negative in M4 [1/min]."""
+        return self.turning * (self.spindle or 0.0)
+
+    def changed(self, **fields: object) -> None:
+        """Take over new modal fields."""
+        modal = replace(self.modal, **fields)  # type: ignore[arg-type]
+        if modal != self.modal:
+            self.modal = modal
+            self._variants = {modal.motion: modal}
+
+    def moves_by(self, motion: str) -> None:
+        """Put a motion code in force; snapshots of before are used again."""
+        if motion == self.modal.motion:
+            return
+        if motion in CYCLES and self.modal.motion not in CYCLES:
+            self.under = self.modal.motion
+        self._variants[self.modal.motion] = self.modal
+        known = self._variants.get(motion)
+        if known is None:
+            known = self._variants[motion] = replace(self.modal, motion=motion)
+        self.modal = known
+
+    def placed(self) -> None:
+        """Take over what is known of the coordinates in force."""
+        offsets = self.offsets
+        self.changed(
+            system=offsets.system,
+            rotation=offsets.rotation,
+            rotation_told=self.fanuc or offsets.rotation_told,
+            origin_told=offsets.origin_told,
+            untold_tool=self.untold_tool,
+        )
+
+    def axis_values(self, orders: Orders) -> dict[int, float]:
+        """Return the line's X Y Z by axis [mm]; X as a radius."""
+        values, scale = orders.values, self.scale
+        found = {i: values[letter] * scale for i, letter in enumerate("XYZ") if letter in values}
+        if self.modal.diameter and 0 in found:
+            found[0] /= 2.0
+        return found
+
+    def goal(self, orders: Orders) -> tuple[Point, Known]:
+        """Return where the axis words lead to in program coordinates [mm], and what is known of it."""
+        values, scale, modal = orders.values, self.scale, self.modal
+        x, y, z = self.place
+        if modal.absolute:
+            a, b, c = self.known
+            if "X" in values:
+                x = values["X"] * scale
+                a = True
+                if modal.diameter:
+                    x /= 2.0
+            if "Y" in values:
+                y = values["Y"] * scale
+                b = True
+            if "Z" in values:
+                z = values["Z"] * scale
+                c = True
+            return (x, y, z), (a, b, c) if a is not b or b is not c or not a else _TRUE
+        step = values.get("X", 0.0) * scale
+        x += step / 2.0 if modal.diameter else step
+        y += values.get("Y", 0.0) * scale
+        z += values.get("Z", 0.0) * scale
+        return (x, y, z), self.known
+
+    def turned_to(self) -> None:
+        """Note which rotary axes are not at 0 [deg]; nan: they have got another zero."""
+        at = self.rotary | dict.fromkeys(self.rezeroed, math.nan)
+        self.turned = {letter: angle for letter, angle in at.items() if angle % 360.0}
+
+    def turn(self, orders: Orders) -> float:
+        """Move the rotary axes; return how far they go [deg]."""
+        way = 0.0
+        for letter in ROTARY & orders.values.keys():
+            value = orders.values[letter]
+            step = value - self.rotary[letter] if self.modal.absolute else value
+            self.rotary[letter] += step
+            way = math.hypot(way, step)
+        if way:
+            self.turned_to()
+        return way
+
+    def reach(self, place: Point, known: Known) -> None:
+        """Be at a place in program coordinates."""
+        self.place, self.known = place, known
+        self.machine = self.offsets.machine(place)
+
+    def renamed(self, still: Known) -> None:
+        """Be where the tool was, under new offsets; coordinates stay known where `still` says so."""
+        self.place = self.offsets.program(self.machine)
+        a, b, c = self.known
+        self.known = (a and still[0], b and still[1], c and still[2])
+
+    def cut(self, orders: Orders, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
+        """Return a move in feed.
+
+        Parameters
+        ----------
+        orders : Orders
+        start, end : tuple of float
+            Machine coordinates [mm].
+        arc : Arc or None
+        rotary : float
+            Way of the rotary axes [deg].
+
+        Raises
+        ------
+        ProgramError
+            No feed; G93 without F on the line; G95 while the spindle stands.
+        """
+        mode, feed = self.modal.feed_mode, self.feed
+        if mode == 93:
+            if not orders.values.get("F"):
+                raise orders.error("G93 needs F on every line that cuts; add it, or write G94")
+            return Move(False, start, end, arc, 0.0, 60.0 / feed, rotary)
+        if not feed:
+            raise orders.error("a move in feed, and no F is in force (G93, G94 and G95 forget it in LinuxCNC); write F")
+        if rotary and start == end and arc is None:
+            feed = self.feed_word
+        if mode == 94:
+            return Move(False, start, end, arc, feed, None, rotary)
+        return self.per_turn(orders, start, end, feed, arc, rotary)
+
+    def per_turn(
+        self, orders: Orders, start: Point, end: Point, pitch: float, arc: Arc | None = None, rotary: float = 0.0
+    ) -> Move:
+        """Return a move that goes with the turns of the spindle.
+
+        Parameters
+        ----------
+        orders : Orders
+        start, end : tuple of float
+            Machine coordinates [mm].
+        pitch : float
+            Way per turn [mm], or degrees.
+        arc : Arc or None
+        rotary : float
+            Way of the rotary axes [deg].
+        """
+        feed = pitch * abs(self.speed)
+        if not feed:
+            raise orders.error("a feed per turn while the spindle stands; start it with S and M3 before")
+        way = length(arc, start, end) if arc else math.dist(start, end)
+        return Move(False, start, end, arc, feed, (way or rotary) / feed * 60.0, rotary)

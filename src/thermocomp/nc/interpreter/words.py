@@ -1,0 +1,165 @@
+"""What a line orders: its codes by modal group, and the values of its words, checked as far as they stand alone."""
+
+from dataclasses import dataclass
+
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code, find
+from thermocomp.nc.parser.expressions import Parameters, evaluate
+from thermocomp.nc.parser.line import Line, Word
+
+#: LinuxCNC takes no more M codes on a line
+_MOST_M = 4
+
+
+@dataclass(slots=True)
+class Orders:
+    """A line's orders.
+
+    Parameters
+    ----------
+    line : Line
+    codes : tuple of str
+        In the order they stand.
+    groups : dict of str to str
+        The code of each modal group; G80 beside another motion code is left out.
+    words : dict of str to Word
+    values : dict of str to float
+        In program units.
+    """
+
+    line: Line
+    codes: tuple[str, ...]
+    groups: dict[str, str]
+    words: dict[str, Word]
+    values: dict[str, float]
+
+    def error(self, reason: str) -> ProgramError:
+        """Return the error of this line."""
+        return ProgramError(self.line.number, reason)
+
+    def whole(self, letter: str, least: int = 0) -> int | None:
+        """Return the value of a word that counts; None if the line does not have it."""
+        value = self.values.get(letter)
+        if value is None:
+            return None
+        number = round(value)
+        if abs(value - number) > 1e-4 or number < least:
+            raise self.error(f"{letter} is {value:g} and has to be a whole number, at least {least}")
+        return number
+
+
+class Reader:
+    """Makes orders of lines.
+
+    Parameters
+    ----------
+    setup : Setup
+    parameters : Parameters
+        The parameters the program sets and uses.
+    """
+
+    def __init__(self, setup: Setup, parameters: Parameters) -> None:
+        self.parameters = parameters
+        self._controller = setup.controller
+        self._used_by = USED_BY[setup.controller]
+        self._harmless = {f"M{number}" for number in setup.harmless}
+        self._codes: dict[tuple[str, float], Code] = {}
+
+    def read(self, line: Line) -> Orders:
+        """Read a line; words are evaluated before its assignments take effect, as LinuxCNC does.
+
+        Raises
+        ------
+        ProgramError
+            Unknown and refused codes, two codes of one group, letters that stand twice, values that cannot be
+            evaluated.
+        """
+        words: dict[str, Word] = {}
+        values: dict[str, float] = {}
+        codes: tuple[str, ...] = ()
+        groups: dict[str, str] = {}
+        for word in line.words:
+            letter, number = word.letter, word.number
+            if number is None:
+                number = self._evaluate(line, word)
+            if letter in "GM":
+                code = self._codes.get((letter, number)) or self._find(line, letter, number)
+                if code.group in groups:
+                    self._two(line, groups, code)
+                else:
+                    groups[code.group] = code.name
+                codes += (code.name,)
+            elif letter in values:
+                raise ProgramError(line.number, f"{letter} stands on the line twice; one has to go")
+            else:
+                words[letter] = word
+                values[letter] = number
+        orders = Orders(line, codes, groups, words, values)
+        if len(codes) > _MOST_M:
+            self._count(orders)
+        if line.assignments:
+            self._assign(line)
+        return orders
+
+    def check_letters(self, orders: Orders, motion: str) -> None:
+        """Refuse letters that no code of the line uses; `motion` is the motion that it makes."""
+        for letter in orders.values.keys() - FREE:
+            if letter in REFUSED_LETTERS:
+                raise orders.error(f"{letter}: {REFUSED_LETTERS[letter]}")
+            users = self._used_by.get(letter, frozenset())
+            if letter in "PQ" and not self._harmless.isdisjoint(orders.codes):
+                continue
+            if letter == "P" and "G54" in orders.codes and self._controller == "fanuc":
+                raise orders.error(
+                    f"G54 with P: write G54.1 P{orders.values['P']:g} for an additional coordinate system"
+                )
+            if motion not in users and users.isdisjoint(orders.codes):
+                raise orders.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
+
+    def _evaluate(self, line: Line, word: Word) -> float:
+        try:
+            return evaluate(word.value, self.parameters)
+        except InputError as error:
+            raise ProgramError(line.number, f"the value of {word.letter}: {error}") from None
+
+    def _find(self, line: Line, letter: str, number: float) -> Code:
+        code = find(letter, number, self._controller)
+        name = f"{letter}{number:g}"
+        if code is None and name in self._harmless:
+            code = Code(name, name, "moves nothing")
+        if code is None:
+            user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
+            remedy = f"if it leaves axes and spindle as they are: --harmless {name}; else" if letter == "M" else ""
+            raise ProgramError(
+                line.number,
+                f"{name} is unknown ({'a code of the user' if user else self._controller}): nobody knows what it does; "
+                f"{remedy} remove it".replace(";  ", "; "),
+            )
+        if code.refused:
+            raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")
+        self._codes[letter, number] = code
+        return code
+
+    @staticmethod
+    def _two(line: Line, groups: dict[str, str], code: Code) -> None:
+        other = groups[code.group]
+        if "G80" in (other, code.name) and other != code.name:
+            groups[code.group] = other if code.name == "G80" else code.name
+            return
+        raise ProgramError(
+            line.number, f"{other} and {code.name} on one line exclude each other; put them on two lines"
+        )
+
+    def _count(self, orders: Orders) -> None:
+        if self._controller == "linuxcnc" and sum(name[0] == "M" for name in orders.codes) > _MOST_M:
+            raise orders.error(f"more than {_MOST_M} M codes on one line; put them on two lines")
+
+    def _assign(self, line: Line) -> None:
+        try:
+            self.parameters.assign(line.assignments)
+            if line.optional:
+                for assignment in line.assignments:
+                    self.parameters.forget(assignment.target, "an optional line sets it; decide with --block-delete")
+        except InputError as error:
+            raise ProgramError(line.number, f"a parameter: {error}") from None

@@ -1,0 +1,384 @@
+"""Evaluate the values of NC words and parameters as LinuxCNC or Fanuc's custom macro B do.
+
+Only what is certain has a value: parameters that the program has set itself, and those the caller knows. All others,
+such as probe results, offsets and positions, are unknown, and a value that needs one is refused.
+
+LinuxCNC, from loosest to tightest, each from left to right: AND OR XOR; EQ NE GT GE LT LE; ``+ -``; ``* / MOD``;
+``**``; a sign belongs to the value behind it, so ``-2 ** 2`` is 4. Fanuc: comparisons; ``+ - OR XOR``; ``* / MOD AND``.
+"""
+
+import math
+import operator
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Literal
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.nc.parser.line import Assignment
+from thermocomp.nc.parser.systemparameters import machine_meaning, what_is
+
+#: brackets inside brackets inside ...; a control's own limit is about 5 (Fanuc)
+DEEPEST = 60
+
+_BLANKS = re.compile("[ \t]+")
+_NUMBER = re.compile(r"[0-9]+\.?[0-9]*|\.[0-9]+")
+_NAME = re.compile(r"<([^<>]*)>")
+_FUNCTION = re.compile(r"[a-z]+(?=\[)")
+_OPERATOR = re.compile(r"\*\*|[-+*/]|mod|and|xor|or|eq|ne|gt|ge|lt|le")
+
+#: numbers of a Fanuc nearer than this part of theirs may be the same to it
+_ROUNDED = 1e-8
+
+Key = int | str  # number or name of a parameter
+Binary = Callable[[float, float], float]
+
+
+def _modulo(a: float, b: float) -> float:
+    rest = math.fmod(a, b)
+    return rest + abs(b) if rest < 0 else rest
+
+
+def _equal(a: float, b: float) -> float:
+    return float(abs(a - b) < 1e-4)
+
+
+def _round(a: float) -> float:
+    return math.copysign(math.floor(abs(a) + 0.5), a)
+
+
+def _angle(a: float) -> float:
+    if abs(a) > 1e9:  # its digits behind the point are lost
+        raise ValueError(f"an angle of {a:g} degrees")
+    return math.radians(a)
+
+
+def _tangent(a: float) -> float:
+    if abs(math.cos(_angle(a))) < 1e-9:
+        raise ValueError(f"TAN of {a:g} degrees")
+    return math.tan(_angle(a))
+
+
+def _sure(what: Binary) -> Binary:
+    """Return a comparison that refuses what two controls may see in two ways, as their numbers are rounded."""
+
+    def compared(a: float, b: float) -> float:
+        if a != b and abs(a - b) <= _ROUNDED * max(abs(a), abs(b)):
+            raise ValueError(f"{a:.12g} and {b:.12g} are the same but for rounding; compare with half a step between")
+        return float(what(a, b))
+
+    return compared
+
+
+def _sure_whole(what: Callable[[float], float]) -> Callable[[float], float]:
+    def cut(a: float) -> float:
+        if a != round(a) and abs(a - round(a)) <= _ROUNDED * max(abs(a), 1.0):
+            raise ValueError(f"FIX or FUP of {a:.12g}, which is whole but for rounding")
+        return what(a)
+
+    return cut
+
+
+def _sure_half(a: float) -> float:
+    rest = abs(a) % 1.0
+    if rest != 0.5 and abs(rest - 0.5) <= _ROUNDED * max(abs(a), 1.0):
+        raise ValueError(f"ROUND of {a:.12g}, which is a half but for rounding")
+    return math.copysign(math.floor(abs(a) + 0.5), a)
+
+
+def _bits(what: Callable[[int, int], int]) -> Binary:
+    def on_integers(a: float, b: float) -> float:
+        if a != int(a) or b != int(b) or min(a, b) < 0:
+            raise ValueError(f"AND, OR and XOR of {a:g} and {b:g}: they are for whole numbers")
+        return float(what(int(a), int(b)))
+
+    return on_integers
+
+
+# name: (how tightly it binds, what it does)
+_LINUXCNC: dict[str, tuple[int, Binary]] = {
+    "and": (1, lambda a, b: float(a != 0 and b != 0)),
+    "or": (1, lambda a, b: float(a != 0 or b != 0)),
+    "xor": (1, lambda a, b: float((a != 0) != (b != 0))),
+    "eq": (2, _equal),
+    "ne": (2, lambda a, b: 1.0 - _equal(a, b)),
+    "gt": (2, operator.gt),
+    "ge": (2, operator.ge),
+    "lt": (2, operator.lt),
+    "le": (2, operator.le),
+    "+": (3, operator.add),
+    "-": (3, operator.sub),
+    "*": (4, operator.mul),
+    "/": (4, operator.truediv),
+    "mod": (4, _modulo),
+    "**": (5, math.pow),
+}
+_FANUC: dict[str, tuple[int, Binary]] = {
+    **{name: (2, _sure(getattr(operator, name))) for name in ("gt", "ge", "lt", "le", "eq", "ne")},
+    "+": (3, operator.add),
+    "-": (3, operator.sub),
+    "or": (3, _bits(operator.or_)),
+    "xor": (3, _bits(operator.xor)),
+    "*": (4, operator.mul),
+    "/": (4, operator.truediv),
+    "mod": (4, math.fmod),
+    "and": (4, _bits(operator.and_)),
+}
+_OPERATORS = {"linuxcnc": _LINUXCNC, "fanuc": _FANUC}
+
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "abs": abs,
+    "acos": lambda a: math.degrees(math.acos(a)),
+    "asin": lambda a: math.degrees(math.asin(a)),
+    "cos": lambda a: math.cos(_angle(a)),
+    "exp": math.exp,
+    "fix": math.floor,
+    "fup": math.ceil,
+    "ln": math.log,
+    "round": _round,
+    "sin": lambda a: math.sin(_angle(a)),
+    "sqrt": math.sqrt,
+    "tan": _tangent,
+}
+# where Fanuc differs: FIX cuts off, FUP goes away from zero
+_FANUC_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "fix": _sure_whole(math.trunc),
+    "fup": _sure_whole(lambda a: math.copysign(math.ceil(abs(a)), a)),
+    "round": _sure_half,
+}
+_REFUSED_BY_FANUC = {
+    "round": "ROUND in a word rounds to the control's least increment, which the program does not tell",
+    "exists": "EXISTS is LinuxCNC's",
+}
+
+
+class Parameters:
+    """What parameters are known to be, local and global ones in one table.
+
+    Parameters
+    ----------
+    controller : {'linuxcnc', 'fanuc'}
+        Whose rules expressions follow.
+    values : mapping of int or str to float, optional
+        What is known before the program starts; names without ``#<`` and ``>``.
+    """
+
+    def __init__(
+        self, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc", values: Mapping[Key, float] | None = None
+    ) -> None:
+        self.controller = controller
+        self._values = {_key(key): float(value) for key, value in (values or {}).items()}
+        self._lost: dict[Key, str] = {}
+
+    def __contains__(self, key: Key) -> bool:
+        return _key(key) in self._values
+
+    def __getitem__(self, key: Key) -> float:
+        """Return the value; InputError tells why it is unknown."""
+        key = _key(key)
+        if key in self._values:
+            return self._values[key]
+        raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or what_is(key, self.controller)}")
+
+    def assign(self, assignments: Iterable[Assignment]) -> None:
+        """Carry out the assignments of one line; all values are those before the line, as in LinuxCNC.
+
+        Raises
+        ------
+        InputError
+            A value cannot be evaluated, or a parameter of the machine itself is set. Then no parameter is changed.
+        """
+        known: dict[Key, float] = {}
+        for target, value, _, _ in assignments:
+            key = self.key(target)
+            if meaning := machine_meaning(key, self.controller):
+                raise InputError(
+                    f"{target} is set, which changes the machine: {meaning}; set it at the control instead"
+                )
+            known[key] = evaluate(value, self, word=False)
+        self._values.update(known)
+
+    def forget(self, target: str, reason: str) -> None:
+        """Make a parameter unknown, such as one that an optional line sets: ``#5``, ``#<depth>``, ``#[#1 + 2]``."""
+        key = self.key(target)
+        self._values.pop(key, None)
+        self._lost[key] = reason
+
+    def key(self, target: str) -> Key:
+        """Return number or name of the parameter that is written ``#5``, ``##2``, ``#<depth>`` or ``#[#1 + 2]``."""
+        reader = _Reader(target, self)
+        if not reader.takes("#"):
+            raise InputError(f"found '{target}' where a parameter, such as #5, should be")
+        key = reader.parameter()
+        reader.end()
+        return key
+
+
+def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
+    """Return the value of a word or of an assignment.
+
+    Parameters
+    ----------
+    text : str
+        As written, such as ``[#1 + 2]``, ``-#<depth>``, ``sin[30]``, ``12.5``; for Fanuc also ``#1 + 2``.
+    parameters : Parameters
+    word : bool
+        It is the value of a word: there a Fanuc's ROUND gives no whole number.
+
+    Raises
+    ------
+    InputError
+        The expression is wrong, has no value (1 / 0), or needs a parameter that is unknown.
+    """
+    reader = _Reader(text, parameters, word=word)
+    try:
+        value = reader.expression() if parameters.controller == "fanuc" else reader.value()
+        reader.end()
+    except (ArithmeticError, ValueError) as error:  # 1 / 0, sqrt[-1], exp[1000]
+        raise InputError(f"'{text.strip()}' has no value: {error}") from error
+    if not math.isfinite(value):
+        raise InputError(f"'{text.strip()}' has no value: it is too large")
+    return value
+
+
+class _Reader:
+    """Reads a squeezed, lower case text from left to right."""
+
+    def __init__(self, text: str, parameters: Parameters, *, word: bool = True) -> None:
+        self.word = word
+        self.written = text.strip()
+        self.text = _BLANKS.sub("", text).lower()
+        self.place = 0
+        self.depth = 0
+        self.parameters = parameters
+        self.operators = _OPERATORS[parameters.controller]
+
+    def takes(self, mark: str) -> bool:
+        found = self.text.startswith(mark, self.place)
+        self.place += len(mark) * found
+        return found
+
+    def matches(self, pattern: re.Pattern[str]) -> re.Match[str] | None:
+        if found := pattern.match(self.text, self.place):
+            self.place = found.end()
+        return found
+
+    def error(self, missing: str) -> InputError:
+        rest = self.text[self.place :]
+        return InputError(f"in '{self.written}': {f'found {rest[:12]!r}' if rest else 'found the end'}, not {missing}")
+
+    def end(self) -> None:
+        if self.place < len(self.text):
+            raise self.error("the end of the value")
+
+    def expression(self) -> float:
+        """Read values and operators: of two operators beside each other the one that binds tighter goes first."""
+        values = [self.value()]
+        waiting: list[tuple[int, Binary]] = []
+        while True:
+            found = self.matches(_OPERATOR)
+            if found and found.group() not in self.operators:
+                raise InputError(
+                    f"in '{self.written}': {found.group()} is not an operator of {self.parameters.controller}"
+                )
+            tightness, action = self.operators[found.group()] if found else (0, operator.add)
+            while waiting and waiting[-1][0] >= tightness:
+                right = values.pop()
+                values.append(float(waiting.pop()[1](values.pop(), right)))
+            if not found:
+                return values[0]
+            waiting.append((tightness, action))
+            values.append(self.value())
+
+    def bracket(self) -> float:
+        if not self.takes("["):
+            raise self.error("'['")
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise InputError(f"in '{self.written[:40]}...': more than {DEEPEST} brackets inside each other")
+        value = self.expression()
+        self.depth -= 1
+        if not self.takes("]"):
+            raise self.error("']' or an operator")
+        return value
+
+    def value(self) -> float:
+        sign = 1.0
+        while self.text.startswith(("+", "-"), self.place):
+            sign = -sign if self.text[self.place] == "-" else sign
+            self.place += 1
+        return sign * self._unsigned()
+
+    def _unsigned(self) -> float:
+        if found := self.matches(_NUMBER):
+            return float(found.group())
+        if self.text.startswith("[", self.place):
+            return self.bracket()
+        if self.takes("#"):
+            return self.parameters[self.parameter()]
+        if found := self.matches(_FUNCTION):
+            return self.function(found.group())
+        raise self.error("a number, a parameter, a function or '['")
+
+    def parameter(self) -> Key:
+        """Read what stands behind ``#``."""
+        marks = 0
+        while self.takes("#"):
+            marks += 1
+        if found := self.matches(_NAME):
+            key: Key = found.group(1)
+        elif found := self.matches(_NUMBER):
+            key = self._index(float(found.group()))
+        elif self.text.startswith("[", self.place):
+            key = self._index(self.bracket())
+        else:
+            raise self.error("a number, a <name> or '[' behind '#'")
+        for _ in range(marks):
+            key = self._index(self.parameters[key])
+        return key
+
+    def _index(self, value: float) -> int:
+        if not math.isfinite(value) or abs(value - round(value)) > 1e-4 or round(value) < 1:
+            raise InputError(f"in '{self.written}': {value:g} is not the number of a parameter")
+        return round(value)
+
+    def function(self, name: str) -> float:
+        fanuc = self.parameters.controller == "fanuc"
+        if fanuc and name in _REFUSED_BY_FANUC and (self.word or name != "round"):
+            raise InputError(f"in '{self.written}': {_REFUSED_BY_FANUC[name]}")
+        if name == "exists":
+            return self._exists()
+        if name != "atan" and name not in _FUNCTIONS:
+            raise InputError(f"in '{self.written}': the function {name.upper()} is not supported")
+        value = self.bracket()
+        if name == "atan":
+            if not self.takes("/"):
+                raise self.error("'/[' and the second value of ATAN")
+            result = math.degrees(math.atan2(value, self.bracket()))
+        else:
+            own = _FANUC_FUNCTIONS if fanuc else _FUNCTIONS
+            result = float(own.get(name, _FUNCTIONS[name])(value))
+        if fanuc and name in {"asin", "atan"} and result < 0:
+            raise InputError(
+                f"in '{self.written}': {name.upper()} is {result:g} or {result + 360:g} degrees, as the control is set"
+            )
+        return result
+
+    def _exists(self) -> float:
+        if not self.takes("[#"):
+            raise self.error("'[#' behind EXISTS")
+        key = self.parameter()
+        if not self.takes("]"):
+            raise self.error("']'")
+        if isinstance(key, int) or key in self.parameters or machine_meaning(key):
+            return 1.0
+        if key.startswith("_"):
+            raise InputError(f"whether #<{key}> exists is unknown: another program may have set it")
+        return 0.0
+
+
+def _key(key: Key) -> Key:
+    return key if isinstance(key, int) else _BLANKS.sub("", key).lower()
+
+
+def _written(key: Key) -> str:
+    return f"#{key}" if isinstance(key, int) else f"#<{key}>"

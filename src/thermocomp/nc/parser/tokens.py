@@ -1,0 +1,392 @@
+"""Take lines of ISO 6983 programs apart, and lose nothing (habits of LinuxCNC and of Fanuc).
+
+Both controls ignore blanks, tabs and case outside comments: ``g 0 x - 1 . 5`` is ``G0X-1.5``. Ordinary lines (words,
+comments, line number, block delete) are read by one regular expression as they stand; all other lines are squeezed
+first, that is freed of blanks and comments, read in that form, and their columns are looked up afterwards.
+"""
+
+import io
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from math import isinf
+from typing import Literal, TextIO
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.nc.parser.line import Assignment, Line, Word
+
+Controller = Literal["linuxcnc", "fanuc"]
+
+#: no line of a program is longer [characters]; without a bound a file of rubbish would be read into memory whole
+LONGEST = 1_000_000
+
+_BLANK = " \t\n\r\f\v"
+_UPPER = str.maketrans("abcdefghijklmnopqrstuvwxyz", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+_BYTE_ORDER_MARKS = ("\ufeff", "ï»¿")
+
+# The fast way. What it does not match is left to the slow way, so it may be strict: numbers without blanks inside,
+# no brackets inside brackets, no assignments. [0-9] because \d takes digits of all scripts.
+_NO_MORE_DIGITS = r"(?![ \t]*[0-9.])"
+_HEAD = re.compile(r"[ \t]*(/?)[ \t]*(?:[Nn][ \t]*([0-9]++)" + _NO_MORE_DIGITS + ")?").match
+_NUMBER, _VALUE, _COMMENT, _REST, _END = 2, 3, 4, 5, 6  # groups of an item
+
+
+def _item(letters: str, rest: str) -> re.Pattern[str]:
+    return re.compile(
+        rf"[ \t]*(?:([{letters}])[ \t]*"
+        rf"(?:([-+]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++){_NO_MORE_DIGITS})"
+        rf"|([-+]?(?:\[[^][()\r\n;\0]*\]|\#(?:[0-9]++{_NO_MORE_DIGITS}|<[^][<>()\r\n;\0]*>))))"
+        r"|\(([^()\r\n\0]*)\)"
+        rf"|;({rest})"
+        r"|([ \t\f\v]*(?:\r?\n)?\Z))"
+    )
+
+
+_ITEM = {
+    "linuxcnc": _item("A-MP-Za-mp-z@^$", r"[^\r\n\0]*").match,  # @ ^ polar coordinates, $ number of the spindle
+    "fanuc": _item("A-MP-Za-mp-z", r"[ \t]*(?=[\r\n]|\Z)").match,
+}
+
+# The fastest way, for most lines of a long program: nothing but a few words with plain numbers.
+_FEW = 6
+_PLAIN_WORD = r"[ \t]*([A-MP-Z])([-+]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++))"
+_WORDS = re.compile(_PLAIN_WORD + f"(?:{_PLAIN_WORD}" * (_FEW - 1) + ")?" * (_FEW - 1) + r"[ \t]*(?:\r?\n)?\Z").match
+
+_ORDINARY = 300  # characters: no number of an ordinary line can be infinite
+_new_word = tuple.__new__  # half the time of Word(...)
+
+# The slow way, on squeezed lines.
+_PIECE = re.compile(r"\(([^()]*)(\)?)|;(.*)|[^ \t(;]+")
+_PLAIN = re.compile(r"[0-9]+\.?[0-9]*|\.[0-9]+")
+_LABEL = {"linuxcnc": re.compile(r"N([0-9]+(?:\.[0-9]+)?)"), "fanuc": re.compile(r"N([0-9]+)")}
+_DELETE = {"linuxcnc": re.compile("/"), "fanuc": re.compile("/[1-9]?")}
+_NAME = re.compile(r"<[^<>(]*>")
+_FUNCTION = re.compile(r"(?:ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|ROUND|SIN|SQRT|TAN|BIN|BCD)(?=\[)")
+_CONTROL = re.compile("SUB|ENDSUB|CALL|RETURN|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE")
+_PROGRAM_NUMBER = re.compile(r"[O:][0-9]+|O?<[^<>(]*>")
+_FANUC_FLOW = re.compile(r"IF\[|WH(?:ILE)?\[|GO(?:TO)?[0-9#\[]|(?:DO|END)[0-9#\[]")
+_FANUC_OUTPUT = re.compile(r"DPRNT|BPRNT|POPEN|PCLOS|SETVN")
+
+
+class _NotUnderstoodError(Exception):
+    """Something at a place of the squeezed line."""
+
+    def __init__(self, place: int, what: str) -> None:
+        super().__init__(what)
+        self.place = place
+        self.what = what
+
+
+def program_lines(stream: TextIO) -> Iterator[str]:
+    r"""Give the lines of a program one after the other, with their endings: joined, they are the file.
+
+    Parameters
+    ----------
+    stream : text stream
+        Opened with ``newline=""`` and ``encoding="latin-1"``: then lines end at ``\n``, ``\r\n`` and a lone ``\r``, and
+        any bytes come through.
+
+    Raises
+    ------
+    InputError
+        A line has more than a million characters.
+    """
+    while text := stream.readline(LONGEST):
+        if len(text) == LONGEST:
+            raise InputError(
+                f"a line has {LONGEST} characters or more: this is no NC program; "
+                "give the program as text, with line ends"
+            )
+        yield text
+
+
+def split_lines(text: str) -> Iterator[str]:
+    r"""Give the lines of a text one after the other, as `program_lines` does those of a file."""
+    return program_lines(io.StringIO(text, newline=""))
+
+
+def read_lines(texts: Iterable[str], controller: Controller = "linuxcnc") -> Iterator[Line]:
+    """Read line after line, numbered from 1, see `read_line`."""
+    for number, text in enumerate(texts, 1):
+        yield read_line(text, number, controller)
+
+
+def read_line(text: str, number: int, controller: Controller = "linuxcnc") -> Line:
+    """Take a line apart. Never raises: what cannot be understood is told in ``Line.error``, with its column.
+
+    Parameters
+    ----------
+    text : str
+        The line with its ending.
+    number : int
+        Number of the line, from 1.
+    controller : {'linuxcnc', 'fanuc'}
+        Whose habits the program has. LinuxCNC: O-words, several assignments on a line, ``;`` begins a comment.
+        Fanuc: program numbers, ``IF [..] GOTO``, ``/2``, assignments without brackets, ``;`` ends the line.
+
+    Returns
+    -------
+    Line
+        If it has an error, its words are those before the place that is not understood.
+    """
+    found = _WORDS(text)
+    if found is not None and len(text) < _ORDINARY and (few := _few_words(found)) is not None:
+        return Line(number, text, few, [], False, "", False, "", "")
+    item = _ITEM[controller]
+    found = _HEAD(text)
+    if found is None or len(text) >= _ORDINARY:  # every part of the head may be missing, so it is always found
+        return _read_slowly(text, number, controller)
+    slash, label = found.groups()
+    place = found.end()
+    words: list[Word] = []
+    letters = comment = ""
+    while True:
+        found = item(text, place)
+        if found is None:
+            return _read_slowly(text, number, controller)
+        kind = found.lastindex or 0
+        place = found.end()
+        if kind <= _VALUE:
+            letter, value = found.group(1, kind)
+            letter = letter.upper()
+            if letter in letters and letter not in "GM":
+                return _read_slowly(text, number, controller)
+            letters += letter
+            plain = float(value) if kind == _NUMBER else None
+            words.append(_new_word(Word, (letter, found.start(1), place, value, plain)))
+        elif kind == _END:
+            return Line(number, text, words, [], slash != "", "", False, comment, label or "")
+        else:
+            remark = found.group(kind) if kind == _COMMENT else found.group(kind).rstrip(_BLANK)
+            if controller == "linuxcnc" and _runs_python(remark):
+                return _read_slowly(text, number, controller)
+            comment = f"{comment} {remark}" if comment and remark else comment or remark
+
+
+def _few_words(found: re.Match[str]) -> list[Word] | None:
+    """Return the words of a line that has no others; None if a letter stands there twice."""
+    groups, spans = found.groups(), found.regs
+    last = found.lastindex or 0
+    letters = groups[0:last:2]
+    if len(set(letters)) < len(letters):
+        return None
+    return [
+        _new_word(Word, (groups[k], spans[k + 1][0], spans[k + 2][1], groups[k + 1], float(groups[k + 1])))
+        for k in range(0, last, 2)
+    ]
+
+
+def _runs_python(comment: str) -> bool:
+    return comment.lstrip()[:3].lower() == "py,"
+
+
+def _read_slowly(text: str, number: int, controller: Controller) -> Line:
+    """Read any line; `read_line` gives the same for the lines that it reads itself."""
+    line = Line(number, text)
+    body = text.rstrip(_BLANK)
+    columns: Sequence[int] = range(len(body))
+    try:
+        _refuse_bytes(text, body)
+        squeezed, columns = _squeeze(body, controller, line)
+        _read_squeezed(squeezed, columns, controller, line)
+    except _NotUnderstoodError as problem:
+        column = columns[problem.place] if problem.place < len(columns) else len(body)
+        line.error = f"column {column + 1}: {problem.what}"
+    return line
+
+
+def _refuse_bytes(text: str, body: str) -> None:
+    """Refuse what controls disagree about: where the line ends, and what the bytes are."""
+    for mark in _BYTE_ORDER_MARKS:
+        if text.startswith(mark):
+            raise _NotUnderstoodError(0, "a byte order mark, which controls do not read; save the program without it")
+    if "\0" in text:
+        raise _NotUnderstoodError(text.index("\0"), "a NUL byte; LinuxCNC would not read on")
+    if text.endswith("\r") or "\n" in body or "\r" in body:
+        what = "a lone carriage return: LinuxCNC reads on, others begin a new line; save with usual line ends"
+        raise _NotUnderstoodError(len(body), what)
+
+
+def _squeeze(body: str, controller: Controller, line: Line) -> tuple[str, list[int]]:
+    """Return the upper case line without blanks, ``(`` in place of every comment, and the columns of its characters."""
+    pieces: list[str] = []
+    comments: list[str] = []
+    columns: list[int] = []
+    for found in _PIECE.finditer(body):
+        start, end = found.span()
+        remark, closed, rest = found.groups()
+        if rest is not None:
+            remark = rest
+            if controller == "fanuc" and rest.strip(_BLANK):
+                raise _NotUnderstoodError(start, "text after ';', which ends the block; put it on a line of its own")
+        elif remark is not None:
+            if not closed:
+                nested = body.startswith("(", end)
+                what = "comments inside comments" if nested else "the comment is not closed on its line"
+                raise _NotUnderstoodError(end if nested else start, what)
+            pieces.append("(")
+            columns.append(start)
+        else:
+            pieces.append(found.group())
+            columns.extend(range(start, end))
+        if remark is not None:
+            comments.append(remark)
+            if controller == "linuxcnc" and _runs_python(remark):
+                raise _NotUnderstoodError(start, "this comment runs Python in LinuxCNC: nobody knows what it will do")
+    line.comment = " ".join(filter(None, comments))
+    return "".join(pieces).translate(_UPPER), columns
+
+
+def _read_squeezed(text: str, columns: Sequence[int], controller: Controller, line: Line) -> None:
+    """Fill the line in."""
+    if line.text.strip(_BLANK) == "%":
+        line.demarcation = True
+        return
+    place = 0
+    if found := _DELETE[controller].match(text):
+        line.optional, place = True, found.end()
+    if found := _LABEL[controller].match(text, place):
+        line.label, place = found.group(1), found.end()
+        if controller == "fanuc" and not line.optional and (found := _DELETE[controller].match(text, place)):
+            line.optional, place = True, found.end()
+    if controller == "linuxcnc":
+        flow = text.startswith("O", place)
+        if flow:
+            end = _NAME.match(text, place + 1) or _value(text, place + 1, "O", controller)
+            end = end if isinstance(end, int) else end.end()
+            if not text[end:].strip("("):
+                line.label = text[place:end]
+                return
+            _check_control(text, end)
+    else:
+        if found := _PROGRAM_NUMBER.match(text, place):
+            line.label, place = found.group(), found.end()
+        if found := _FANUC_OUTPUT.match(text, place):
+            raise _NotUnderstoodError(
+                place, f"{found.group()} is not supported: it gives values of the program to the outside"
+            )
+        flow = _FANUC_FLOW.match(text, place) is not None
+    if flow:
+        last = len(text.rstrip("(")) - 1
+        line.flow = line.text[columns[place] : columns[last] + 1]
+        return
+    _read_words(text, place, columns, controller, line)
+
+
+def _check_control(text: str, place: int) -> None:
+    """Check what follows the name of an O-word."""
+    found = _CONTROL.match(text, place)
+    if found is None:
+        raise _NotUnderstoodError(place, "an O-word needs sub, call, if, while, repeat ... after its number or name")
+    place, control = found.end(), found.group()
+    if control in {"IF", "ELSEIF", "WHILE", "REPEAT"} and not text.startswith("[", place):
+        raise _NotUnderstoodError(place, f"'{control.lower()}' needs '[' after it")
+    while place < len(text):
+        if text[place] == "[":
+            place = _closed(text, place)
+        elif text[place] == "(":
+            place += 1
+        else:
+            raise _NotUnderstoodError(
+                place, f"found '{text[place]}' behind the O-word, where only brackets and comments may be"
+            )
+
+
+def _read_words(text: str, place: int, columns: Sequence[int], controller: Controller, line: Line) -> None:
+    """Read words and assignments up to the end of the line."""
+    letters = "ABCDEFGHIJKLMPQRSTUVWXYZ@^$" if controller == "linuxcnc" else "ABCDEFGHIJKLMPQRSTUVWXYZ"
+    first: dict[str, int] = {}  # column of the first word of each letter
+    while place < len(text):
+        begin, letter = place, text[place]
+        start = columns[begin]
+        if letter == "(":
+            place += 1
+        elif letter == "#":
+            target = _parameter(text, place)
+            if not text.startswith("=", target):
+                raise _NotUnderstoodError(target, f"'=' is missing after {text[place:target]}")
+            place = _assigned(text, target, controller)
+            value = line.text[columns[target] + 1 : columns[place - 1] + 1].lstrip(_BLANK)
+            line.assignments.append(Assignment(text[begin:target].lower(), value, start, columns[place - 1] + 1))
+        elif letter in letters:
+            place = _value(text, place + 1, letter, controller)
+            if first.setdefault(letter, start) != start and letter not in "GM":
+                what = f"{letter} stands on the line twice, first in column {first[letter] + 1}"
+                raise _NotUnderstoodError(begin, what)
+            end = columns[place - 1] + 1
+            value = line.text[start + 1 : end].lstrip(_BLANK)
+            plain = _PLAIN.fullmatch(text, begin + 1 + (text[begin + 1] in "+-"), place)
+            number = float(text[begin + 1 : place]) if plain else None
+            if number is not None and isinf(number):
+                raise _NotUnderstoodError(begin, f"the number of {letter} is too large")
+            line.words.append(Word(letter, start, end, value, number))
+        else:
+            raise _NotUnderstoodError(begin, _complaint(text, begin))
+
+
+def _complaint(text: str, place: int) -> str:
+    """Say what is wrong with a character that begins nothing."""
+    letter = text[place]
+    if letter == "," and text[place + 1 : place + 2] in {"R", "C", "A"}:
+        return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; write the moves out"
+    if letter == "N":
+        return "the line number N has to be a whole number, at the beginning of the line"
+    if letter == "O":
+        return "an O-word has to be at the beginning of the line"
+    if letter == "/":
+        return "block delete '/' has to be at the beginning of the line"
+    if letter == "%":
+        return "'%' has to be alone on its line"
+    return f"found {letter!r}, which begins no word"
+
+
+def _value(text: str, place: int, letter: str, controller: Controller) -> int:
+    """Return where the value ends."""
+    begin = place
+    while text[place : place + 1] in {"+", "-"} and (controller == "linuxcnc" or place == begin):
+        place += 1  # LinuxCNC takes X--5 for X5
+    if found := _PLAIN.match(text, place):
+        return found.end()
+    head = text[place : place + 1]
+    if head == "#":
+        return _parameter(text, place)
+    if head == "[":
+        return _closed(text, place)
+    if found := _FUNCTION.match(text, place):
+        place = _closed(text, found.end())
+        return _closed(text, place + 1) if found.group() == "ATAN" and text.startswith("/[", place) else place
+    what = f"found {head!r}" if head and head != "(" else "found nothing"
+    raise _NotUnderstoodError(place, f"{what} where the value of {letter} should be")
+
+
+def _parameter(text: str, place: int) -> int:
+    """Return where a parameter ends that begins here."""
+    while text.startswith("#", place):
+        place += 1
+    if found := _NAME.match(text, place) or re.compile("[0-9]+").match(text, place):
+        return found.end()
+    if text.startswith("[", place):
+        return _closed(text, place)
+    raise _NotUnderstoodError(place, "'#' needs a number, a <name> or a bracket after it")
+
+
+def _assigned(text: str, equals: int, controller: Controller) -> int:
+    """Return where the value of an assignment ends; Fanuc's is an expression without brackets, up to the end."""
+    if controller == "linuxcnc":
+        return _value(text, equals + 1, "the parameter", controller)
+    end = text.find("(", equals)
+    end = len(text) if end < 0 else end
+    if end == equals + 1:
+        raise _NotUnderstoodError(end, "found nothing where the value of the parameter should be")
+    return end
+
+
+def _closed(text: str, place: int) -> int:
+    """Return one past the bracket that closes the one here."""
+    depth = 0
+    for found in re.compile(r"[][(]").finditer(text, place):
+        if found.group() == "(":
+            raise _NotUnderstoodError(found.start(), "a comment stands inside brackets")
+        depth += 1 if found.group() == "[" else -1
+        if depth == 0:
+            return found.end()
+    raise _NotUnderstoodError(place, "the bracket '[' is not closed")

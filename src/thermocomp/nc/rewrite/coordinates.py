@@ -1,0 +1,362 @@
+"""The paper's way: the correction is added to the words of X, Y and Z (P-06).
+
+What becomes of a block, by its kind:
+
+- a line: every word of an axis gets the correction of that axis; an axis that is not named, but whose correction has
+  changed, gets a word;
+- in G91 a word gets what the correction has changed since that axis moved last;
+- an arc: the axes of its plane keep what they carry, so that its radius stays; its third axis is that of a line;
+- a drilling cycle: depth and retract plane both get the correction of the drilling axis;
+- G92 and G10 L20: the value gets what the axis carries, so that the coordinates stay where they were;
+- G53, G28, G30: machine coordinates, they carry nothing;
+- with cutter radius compensation on: everything stays as it was when it was switched on.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.block import PLANES, Block
+from thermocomp.nc.interpreter.codes import CYCLES
+from thermocomp.nc.rewrite.contact import CLEAR, Contact
+from thermocomp.nc.rewrite.frame import Frame, Vector
+from thermocomp.nc.rewrite.method import AXES, STILL, Method
+from thermocomp.nc.rewrite.path import length
+from thermocomp.nc.rewrite.text import number, shifted, written
+
+#: motions that take a word they did not have
+PLAIN = ("G0", "G1")
+#: by how much the time of a cut may change: relatively, and in any case [s]
+SLOWER, LATER = 0.015, 0.004
+
+
+@dataclass
+class Coordinates(Method):
+    """Adds the correction to the words.
+
+    Parameters
+    ----------
+    helix : bool
+        An arc may get a word of its third axis.
+    """
+
+    helix: bool = True
+    contact: Contact = field(init=False)
+    #: what depth and retract plane of the cycle in force got
+    _cycle: float = field(default=0.0, init=False)
+    #: level at which a series of cycles began [mm], if nobody has moved the axis, and what the axes carry there [um]
+    _series: tuple[float, Vector] | None = field(default=None, init=False)
+    #: axis and retract plane [mm] of the last cycle, as long as the tool may still stand there
+    _plane: tuple[int, float] | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.contact = Contact(self.step, self.safe_z)
+
+    def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]:
+        self.contact.begin(block)
+        before = self.carried
+        kind = block.kind
+        if self.names_place(block):
+            text = self._named_anew(block)
+        elif kind in ("none", "set"):
+            text = block.line.text
+        elif kind == "machine":
+            self.leave(block)
+            text = block.line.text
+        else:
+            frame = self.frame(block)
+            old = frame.words(self.carried)
+            if kind in ("line", "arc", "curve"):
+                text = self._path(block, frame, old, demand)
+            elif kind == "cycle":
+                text = self._drill(block, frame, old, demand)
+            else:
+                text = self._homewards(block, frame, old)
+        if kind != "cycle" and (block.moves or block.modal.motion not in CYCLES):
+            self._series = None
+        if kind not in ("none", "set", "cycle") and self._plane and AXES[self._plane[0]] in block.words:
+            self._plane = None
+        self.contact.end(block, [a != b for a, b in zip(self.carried, before, strict=True)])
+        return (text,)
+
+    @property
+    def splits(self) -> bool:
+        """Whether a cut that is split can follow the drift more nearly: where the places inside it can be written."""
+        return self.digits.mm >= 4
+
+    def held_by(self, block: Block) -> str:
+        """Return what keeps the correction from following the drift in a block."""
+        if block.modal.cutter:
+            return "cutter radius compensation"
+        if block.kind in ("arc", "curve", "cycle"):
+            return {"arc": "arcs", "curve": "splines", "cycle": "the levels of a cycle"}[block.kind]
+        return "the step in cuts" if block.modal.absolute else "G91"
+
+    # -- kinds of blocks ---------------------------------------------------------------------------------------------
+
+    def _path(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
+        modal = block.modal
+        named = self.named(block)
+        goal = frame.words(demand)
+        if goal != old or frame.turned:
+            goal = frame.words(self._limited(block, frame, demand))
+        holds = self._holds(block, frame)
+        if len(holds) < 3 and goal != old and self._hurries(block, frame, goal, holds):
+            holds = (0, 1, 2)
+        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        for i in named:
+            letter = AXES[i]
+            if modal.absolute:
+                if i not in holds and not (block.line.optional and not self.fixed[i]):
+                    new[i] = goal[i]
+                shifts[letter] = new[i]
+                self._placed(block, i, self.carried[i], moved=new[i] != old[i])
+            elif i not in holds and not self.fixed[i] and not self.doubtful[i]:
+                new[i] = goal[i]
+                shifts[letter] = round(new[i] - old[i], frame.digits)
+        if len(holds) < 3 and self._takes_words(block, named):
+            self._add(block, frame, goal, holds, new, added)
+        if modal.arc_absolute and block.kind == "arc":
+            for i, letter in enumerate("IJK"):
+                if letter in block.words:
+                    shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
+        self._take(block, frame, old, new)
+        return shifted(block, shifts, added, frame.digits)
+
+    def _add(
+        self,
+        block: Block,
+        frame: Frame,
+        goal: Vector,
+        holds: tuple[int, ...],
+        new: list[float],
+        added: dict[str, float],
+    ) -> None:
+        for i, letter in enumerate(AXES):
+            if letter in block.words or i in holds or goal[i] == new[i] or self.fixed[i] or self.doubtful[i]:
+                continue
+            if not block.modal.absolute:
+                added[letter] = goal[i] - new[i]
+            elif self.before[i] and block.known[i]:
+                added[letter] = block.end[i] * (frame.scale[i] * 1e3) + goal[i]
+            else:
+                continue
+            new[i] = goal[i]
+
+    def _drill(self, block: Block, frame: Frame, old: Vector, demand: Vector) -> str:
+        if block.modal.motion == "G87":
+            raise ProgramError(
+                block.line.number, "G87 has levels that are not shifted; --method offset, or --expand writes it out"
+            )
+        axis = PLANES[block.modal.plane][2]
+        self._refuse_mixed_levels(block, axis)
+        goal = frame.words(demand)
+        new, shifts, added = list(old), dict[str, float](), dict[str, float]()
+        repeats = block.values.get("L", block.values.get("K", 1.0))
+        for i in self.named(block):
+            if i == axis:
+                continue
+            if block.modal.absolute:
+                if not self.before[i] or abs(block.end[i] - block.start[i]) > STILL:
+                    new[i] = goal[i]
+                shifts[AXES[i]] = new[i]
+                self.fixed[i] = self.doubtful[i] = False
+            elif repeats == 1 and not self.fixed[i] and not self.doubtful[i]:
+                new[i] = goal[i]
+                shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
+        if block.line.optional and tuple(new) != old:
+            raise ProgramError(block.line.number, "an optional line that drills: decide with --block-delete")
+        if not block.moves:  # K0: it stores its words, and drills where later lines say
+            return self._store(block, axis, frame, old, goal[axis])
+        self._take(block, frame, old, new)
+        if block.modal.absolute:
+            self._levels(block, axis, frame, goal[axis], shifts, added)
+        return shifted(block, shifts, added, frame.digits)
+
+    def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
+        """Raise `ProgramError` if levels that were shifted as places go on as distances in G91."""
+        if block.modal.absolute:
+            return
+        if any(word not in block.words for word in (AXES[axis], "R")):
+            if self._cycle:
+                raise ProgramError(
+                    block.line.number,
+                    f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted places: write "
+                    "G80 before, and the cycle with all its words; or --expand",
+                )
+        else:
+            self._cycle = 0.0
+
+    def _store(self, block: Block, axis: int, frame: Frame, old: Vector, goal: float) -> str:
+        carried, before = self.carried, (self.fixed[axis], self.doubtful[axis])
+        shifts, added = dict[str, float](), dict[str, float]()
+        if block.modal.absolute:
+            self._levels(block, axis, frame, goal, shifts, added)
+            # the axes stay where they are, and may get a word that says so
+            shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
+            self.carried, self.inner = carried, None
+            self.fixed[axis], self.doubtful[axis] = before
+        return shifted(block, shifts, added, frame.digits)
+
+    def _levels(
+        self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
+    ) -> None:
+        """Shift depth and retract plane of a cycle, together or not at all."""
+        words = (AXES[axis], "R")
+        if self._series is None:
+            self._series = block.start[axis], self.carried
+        plane = block.sticky["R"] / (frame.scale[axis] * 1e3)
+        level, carried = self._series
+        # which level is the higher one must not change, if nobody has moved the axis
+        held = True
+        if abs(block.start[axis] - plane) < CLEAR:
+            goal = frame.words(self.carried)[axis]
+        elif abs(level - plane) < CLEAR:
+            goal = frame.words(carried)[axis]
+        elif not self.before[axis] and self._plane and abs(plane - self._plane[1]) < CLEAR:
+            goal = self._cycle
+        else:
+            held = False
+        self._plane = axis, plane
+        if block.modal.motion in ("G73", "G83"):
+            wanted, goal = goal, _same_pecks(block, words[0], goal, frame.digits)
+            if held and goal != wanted:
+                raise ProgramError(
+                    block.line.number,
+                    f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
+                    "the tool stands at R, which must not move: write G80 and a rapid above R before, or --expand",
+                )
+        if goal != self._cycle or all(word in block.words for word in words):
+            added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
+            self._cycle = goal
+        shifts |= {word: goal for word in words if word in block.words}
+        within = list(frame.words(self.carried))
+        within[axis] = goal
+        self.inner = frame.shift((within[0], within[1], within[2]))
+        back = list(self.carried)
+        at_r = abs(block.end[axis] - plane) < CLEAR
+        back[axis], other = (self.inner[axis], carried[axis]) if at_r else (carried[axis], self.inner[axis])
+        self.carried = (back[0], back[1], back[2])
+        if at_r or not block.known[axis]:
+            self.fixed[axis] = self.doubtful[axis] = False
+        if not block.known[axis] and other != back[axis]:
+            self.doubt(axis, other)
+
+    def _homewards(self, block: Block, frame: Frame, old: Vector) -> str:
+        shifts = {AXES[i]: old[i] for i in self.named(block)} if block.modal.absolute else {}
+        self.leave(block)
+        return shifted(block, shifts, {}, frame.digits)
+
+    def _named_anew(self, block: Block) -> str:
+        for i in self.named(block):
+            if self.doubtful[i]:
+                raise ProgramError(
+                    block.line.number,
+                    f"names the place of {AXES[i]}, and nobody knows where it is: a tool change or an optional line "
+                    "may have moved it; position it before, or decide with --block-delete",
+                )
+        frame = self.frame(block)
+        old = frame.words(self.carried)
+        return shifted(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
+
+    # -- what may change ---------------------------------------------------------------------------------------------
+
+    def _placed(self, block: Block, axis: int, carried: float, *, moved: bool) -> None:
+        """Take in that an axis goes to a place in absolute coordinates, if the line is run."""
+        self.fixed[axis] = False
+        if not block.line.optional:
+            self.doubtful[axis] = False
+        elif moved:
+            self.doubt(axis, carried)
+
+    def _hurries(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...]) -> bool:
+        """Return whether a change of the correction would alter the time of a cut by more than is allowed."""
+        if len(block.moves) != 1 or block.moves[0].rapid or not block.moves[0].feed:
+            return False
+        move = block.moves[0]
+        moved = frame.shift(goal)
+        gaps = [
+            0.0 if i in holds or self.fixed[i] or self.doubtful[i] else (moved[i] - self.carried[i]) * 1e-3
+            for i in range(3)
+        ]
+        way = length(move)
+        if move.arc is None:
+            longer = math.hypot(*(b - a + g for a, b, g in zip(move.start, move.end, gaps, strict=True)))
+        else:
+            across = PLANES[move.arc.plane][2]
+            rise = move.end[across] - move.start[across]
+            longer = math.sqrt(max(way * way - rise * rise, 0.0) + (rise + gaps[across]) ** 2)
+        return abs(longer - way) > max(SLOWER * way, move.feed / 60.0 * LATER)
+
+    def _holds(self, block: Block, frame: Frame) -> tuple[int, ...]:
+        """Return the axes that have to keep what they carry in this block."""
+        modal = block.modal
+        if block.kind == "curve" or modal.motion == "G33.1" or self.stands(block):
+            return (0, 1, 2)
+        if modal.cutter:
+            return tuple(i for i in range(3) if not (self.fixed[i] and i == PLANES[modal.plane][2]))
+        if block.kind == "arc":
+            first, second, third = PLANES[modal.plane]
+            return (0, 1, 2) if frame.turned and third != 2 else (first, second)
+        return ()
+
+    def _takes_words(self, block: Block, named: list[int]) -> bool:
+        """Return whether a block may get words that it does not have."""
+        modal = block.modal
+        if block.line.optional or modal.cutter or not block.moves:
+            return False
+        if block.kind == "arc":
+            first, second, _ = PLANES[modal.plane]
+            return self.helix and (AXES[first] in block.words or AXES[second] in block.words)
+        return block.kind == "line" and modal.motion in PLAIN and bool(named)
+
+    def _limited(self, block: Block, frame: Frame, demand: Vector) -> Vector:
+        """Return the demand, or what a cut may take of it, spread over the block."""
+        out = []
+        for i in range(3):
+            gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
+            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self.before[i] or self.contact.touching):
+                out.append(demand[i])
+            else:
+                # where a least increment is coarser than the step, nothing smaller can be written
+                least = 10.0**-frame.digits / frame.scale[i]
+                out.append(self.carried[i] + math.copysign(min(abs(gap), max(most, least)) if most else 0.0, gap))
+        return out[0], out[1], out[2]
+
+    def _take(self, block: Block, frame: Frame, old: Vector, new: list[float]) -> None:
+        """Carry the new words; an axis whose word has not changed does too if it stands on the line in G90."""
+        words = block.words if block.modal.absolute else {}
+        taken = [n != o or letter in words for letter, n, o in zip(AXES, new, old, strict=True)]
+        if frame.turned:
+            taken[0] = taken[1] = taken[0] or taken[1]
+        moved = frame.shift((new[0], new[1], new[2]))
+        x, y, z = (m if t else c for t, m, c in zip(taken, moved, self.carried, strict=True))
+        self.carried = (x, y, z)
+
+
+def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:
+    """Return the nearest shift with which a cycle pecks as often as without it.
+
+    Where Q divides the depth, the rounding of numbers decides whether there is one more.
+    """
+    feed = block.sticky["Q"]
+
+    def pecks(by: float) -> int:
+        levels = []
+        for letter in ("R", depth):
+            value, word = block.sticky[letter], block.words.get(letter)
+            plain = word is not None and word.number is not None
+            text = written(word, value, by, digits) if word and plain else number(value + by, digits)
+            levels.append(float(text) if by else value)
+        plane, bottom = levels
+        count, plane = 0, plane - feed
+        while plane > bottom:
+            count, plane = count + 1, plane - feed
+        return count
+
+    wanted, least = pecks(0.0), 10.0**-digits
+    for k in sorted(range(-20, 21), key=abs):
+        near = round(shift + k * least, digits)
+        if pecks(near) == wanted:
+            return near
+    return shift

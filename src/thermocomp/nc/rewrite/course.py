@@ -1,0 +1,124 @@
+"""How a revised program runs, in as many points as a picture needs, however long it is."""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.nc.rewrite.demand import Cut
+from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.revise import Revised
+
+FloatArray = NDArray[np.float64]
+
+_NOT_CUTTING = (math.nan,) * 3
+
+
+class Run(NamedTuple):
+    """A run in stretches of time: the lowest and the highest value in each."""
+
+    time: FloatArray  #: (n,), end of each stretch [s]; the first begins at 0
+    deviation: FloatArray  #: (n, 2, 3), drift of X, Y, Z [um]
+    carried: FloatArray  #: (n, 2, 3), correction in force [um]
+    left: FloatArray  #: (n, 2, 3), what it leaves of the drift in the cuts [um]; nan where nothing is cut
+    speed: FloatArray  #: (n, 2), of the spindle [1/min]
+
+
+class Bound(NamedTuple):
+    """How far the tool may be off in a cut, of one axis [um]."""
+
+    axis: str
+    low: float  #: of the drift, in the whole run
+    high: float
+    without: float  #: largest drift in a cut
+    left: float  #: what the correction leaves of it, between its updates
+    line: int  #: where
+    model: float  #: how wrong the models may be; nan: they were never judged
+
+    @property
+    def most(self) -> float:
+        """Return the bound; nan if there is none."""
+        return self.left + self.model
+
+
+@dataclass
+class Course:
+    """Collects a run.
+
+    Parameters
+    ----------
+    most : int
+        Stretches that are kept; neighbours are put together as soon as there are more.
+    """
+
+    most: int = 1500
+    _times: list[float] = field(default_factory=list, init=False)
+    _low: list[tuple[float, ...]] = field(default_factory=list, init=False)
+    _high: list[tuple[float, ...]] = field(default_factory=list, init=False)
+    _last: tuple[Vector, Vector, float, Cut | None] | None = field(default=None, init=False)
+    _rows: int = field(default=0, init=False)  # in the last stretch
+    _stride: int = field(default=1, init=False)  # rows of a stretch
+
+    def take(self, revised: Revised) -> None:
+        """Take a line in, in its order."""
+        block = revised.block
+        if block is None:
+            return
+        speed, cut = abs(block.speed), revised.cut
+        row = revised.deviation, revised.carried, speed, cut
+        if row == self._last:  # nothing moves but time
+            self._times[-1] = revised.end
+            return
+        self._last = row
+        if cut is None:
+            low = high = (*revised.deviation, *revised.carried, speed, *_NOT_CUTTING)
+        else:
+            low = (*cut.drift[0], *revised.carried, speed, *cut.left[0])
+            high = (*cut.drift[1], *revised.carried, speed, *cut.left[1])
+        if self._rows and self._rows < self._stride:
+            self._times[-1] = revised.end
+            self._low[-1] = tuple(map(_least, self._low[-1], low))
+            self._high[-1] = tuple(map(_most, self._high[-1], high))
+            self._rows += 1
+            return
+        self._times.append(revised.end)
+        self._low.append(low)
+        self._high.append(high)
+        self._rows = 1
+        if len(self._times) > self.most:
+            self._join()
+
+    def run(self) -> Run:
+        """Return the run so far."""
+        table = np.array([self._low, self._high], dtype=np.float64).reshape(2, -1, 10).swapaxes(0, 1)
+        return Run(
+            np.array(self._times, dtype=np.float64),
+            table[:, :, 0:3],
+            table[:, :, 3:6],
+            table[:, :, 7:10],
+            table[:, :, 6],
+        )
+
+    def _join(self) -> None:
+        """Put neighbours together; an odd one stays open at the end."""
+        n = len(self._times) // 2 * 2
+        odd = len(self._times) > n
+        self._times = self._times[1:n:2] + self._times[n:]
+        self._low = [
+            tuple(map(_least, a, b)) for a, b in zip(self._low[0:n:2], self._low[1:n:2], strict=True)
+        ] + self._low[n:]
+        self._high = [
+            tuple(map(_most, a, b)) for a, b in zip(self._high[0:n:2], self._high[1:n:2], strict=True)
+        ] + self._high[n:]
+        self._rows = self._rows if odd else 2 * self._stride
+        self._stride *= 2
+
+
+def _least(a: float, b: float) -> float:
+    return b if a != a or b < a else a  # noqa: PLR0124 - nan gives way
+
+
+def _most(a: float, b: float) -> float:
+    return b if a != a or b > a else a  # noqa: PLR0124 - nan gives way

@@ -1,0 +1,60 @@
+"""Corrections in machine axes, and as the numbers that stand in a program."""
+
+import math
+from dataclasses import dataclass
+
+from thermocomp.nc.interpreter.block import Modal
+from thermocomp.nc.rewrite.text import Digits
+
+Vector = tuple[float, float, float]
+
+_MM = 1e-3  # mm per um
+
+
+@dataclass(frozen=True)
+class Frame:
+    """How a shift of the tool [um, machine axes] stands in the words of X, Y and Z, under one modal state.
+
+    Parameters
+    ----------
+    scale : tuple of float
+        Program units per um, of X, Y and Z.
+    cosine, sine : float
+        Of the work coordinate system's rotation about Z.
+    digits : int
+        Decimals.
+    """
+
+    scale: Vector
+    cosine: float
+    sine: float
+    digits: int
+
+    @classmethod
+    def of(cls, modal: Modal, digits: Digits) -> "Frame":
+        """Return the frame of a modal state."""
+        unit = _MM / 25.4 if modal.inch else _MM
+        turned = math.radians(modal.rotation)
+        scale = (2 * unit if modal.diameter else unit, unit, unit)
+        return cls(scale, math.cos(turned), math.sin(turned), digits.of(modal.inch))
+
+    @property
+    def turned(self) -> bool:
+        """Whether X and Y of the program are not those of the machine."""
+        return self.sine != 0 or self.cosine != 1
+
+    def words(self, shift: Vector) -> Vector:
+        """Return what a shift [um, machine axes] adds to absolute words, rounded to the decimals."""
+        x, y, z = shift
+        if self.turned:
+            x, y = self.cosine * x + self.sine * y, self.cosine * y - self.sine * x
+        digits = self.digits
+        a, b, c = self.scale
+        return round(a * x, digits) + 0.0, round(b * y, digits) + 0.0, round(c * z, digits) + 0.0
+
+    def shift(self, words: Vector) -> Vector:
+        """Return the shift [um, machine axes] of numbers that were added to words."""
+        x, y, z = (w / s for w, s in zip(words, self.scale, strict=True))
+        if self.turned:
+            x, y = self.cosine * x - self.sine * y, self.cosine * y + self.sine * x
+        return x, y, z

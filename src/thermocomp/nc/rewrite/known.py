@@ -1,0 +1,100 @@
+"""What has to be known before a block can be corrected, and what is said where it is not."""
+
+import math
+from dataclasses import dataclass
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.block import Block, Setup, system_name
+from thermocomp.nc.rewrite.frame import Vector
+
+
+@dataclass
+class Spindle:
+    """Spindle speed, also of a program that finds the spindle running."""
+
+    setup: Setup
+    _told: bool = False
+
+    def speed(self, block: Block) -> float:
+        """Return the speed in a block [1/min].
+
+        Raises
+        ------
+        ProgramError
+            The program cuts, and nobody knows how fast the spindle turns.
+        """
+        if not self._told:
+            self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
+            if not self._told and self.setup.speed:
+                return self.setup.speed
+            if not self._told and any(not m.rapid for m in block.moves):
+                raise ProgramError(
+                    block.line.number,
+                    "the program cuts, but has not said how fast the spindle turns (S, M3): its drift is unknown; "
+                    "state the speed it finds with --speed",
+                )
+        return block.speed
+
+
+def refuse(block: Block, setup: Setup, *, by_position: bool) -> None:
+    """Refuse a block in which the drift would not be known.
+
+    Parameters
+    ----------
+    block : Block
+    setup : Setup
+    by_position : bool
+        The drift depends on the place.
+
+    Raises
+    ------
+    ProgramError
+        It depends on the place, and origin or tool length are not told; a rotary axis may tilt the spindle.
+    """
+    if by_position:
+        _refuse_unknown_place(block)
+    if block.turned:
+        _refuse_turned(block, setup)
+
+
+def _refuse_unknown_place(block: Block) -> None:
+    """Raise `ProgramError` if a block cuts in coordinates whose origin, or with a tool whose length, is unknown."""
+    modal = block.modal
+    if (modal.origin_told and modal.untold_tool is None) or all(m.rapid for m in block.moves):
+        return
+    name, tool = system_name(modal.system), modal.untold_tool
+    if not modal.origin_told:
+        what = f"where {name} begins is unknown: --origin '{name}=0 mm, 0 mm, 0 mm'"
+    elif tool == -1:
+        what = "the length of the tool in the spindle is unknown: write its number (T, M6, or H)"
+    else:
+        what = f"the length of tool {tool} is unknown: --tool '{tool}=120 mm'"
+    raise ProgramError(block.line.number, f"the drift depends on the place, and {what}")
+
+
+def _refuse_turned(block: Block, setup: Setup) -> None:
+    """Raise `ProgramError` if a rotary axis is not at 0 and may tilt the spindle: it grows along the tool."""
+    for letter, angle in block.turned.items():
+        side = setup.rotary.get(letter)
+        if side == "table":
+            continue
+        where = "gets another zero" if math.isnan(angle) else f"is at {angle:g} deg"
+        what = (
+            "it is in the head, so the spindle grows along the tool and not along Z: not supported"
+            if side
+            else "does it turn the spindle or the workpiece? say so with --machine, whose structure names it: "
+            f'"w {letter}\' X\' b Y Z (C1) t" in the table, "w X\' b Y Z {letter} (C1) t" in the head'
+        )
+        raise ProgramError(block.line.number, f"{letter} {where}, and {what}")
+
+
+def refuse_untold_rotation(block: Block, carried: Vector) -> None:
+    """Raise `ProgramError` if a rotation that is stored in the controller would turn corrections of X and Y."""
+    if not (carried[0] or carried[1]) or block.modal.rotation_told:
+        return
+    name = system_name(block.modal.system)
+    raise ProgramError(
+        block.line.number,
+        f"X or Y is corrected, and a rotation of {name} that is stored in the controller (G10 L2 R) would turn that: "
+        f"say that there is none (--rotation none) or which (--rotation '{name}=12 deg')",
+    )

@@ -1,0 +1,211 @@
+"""What the two ways of revising share: what each axis carries, and the change a block makes to it."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.block import Block, Known, Modal
+from thermocomp.nc.interpreter.codes import ROTARY
+from thermocomp.nc.rewrite.frame import Frame, Vector
+from thermocomp.nc.rewrite.text import LONGEST, Digits, parted
+
+AXES = "XYZ"
+ALL: Known = (True, True, True)
+#: shorter ways are none: F counts degrees then, if rotary axes turn [mm]
+STILL = 1e-7
+
+
+class Change(NamedTuple):
+    """What became of a block."""
+
+    texts: tuple[str, ...]  #: lines to write instead of its line; the last one is the line itself
+    before: Vector  #: correction that the axes carried when it began [um, machine axes]
+    after: Vector  #: correction that they carry at its end
+    inner: Vector  #: and on the way, in a cycle that ends where it began
+    other: Vector | None = None  #: what they may carry instead at its end, where the program leaves open which
+    placed: bool = True  #: it is known where the axes stood that it names
+
+
+@dataclass
+class Method(ABC):
+    """A way of getting a correction into a program.
+
+    Parameters
+    ----------
+    digits : Digits
+    step : float
+        In a cut the correction changes by that at most, per 10 mm of way [um].
+    safe_z : float or None
+        At and above this Z of the work coordinates the tool is up [mm].
+    """
+
+    digits: Digits
+    step: float
+    safe_z: float | None = None
+    #: correction that each axis carries now [um]
+    carried: Vector = field(default=(0.0, 0.0, 0.0), init=False)
+    #: axes that stand where machine coordinates or an optional line have put them: no correction to build on
+    fixed: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
+    #: axes of which nobody knows what they carry: an optional line, a tool change, a stop or a cycle whose end is not
+    #: certain may have moved them
+    doubtful: list[bool] = field(default_factory=lambda: [False, False, False], init=False)
+    #: what doubtful axes may carry instead [um]
+    other: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0], init=False)
+    #: axes whose place was known before the block
+    before: Known = field(default=(False, False, False), init=False)
+    #: what the axes carry within a cycle [um]
+    inner: Vector | None = field(default=None, init=False)
+    _modal: Modal | None = field(default=None, init=False)
+    _frame: Frame = field(default_factory=lambda: Frame.of(Modal(), Digits()), init=False)
+
+    def revise(self, block: Block, demand: Vector) -> Change:
+        """Take the correction into a block, as far as it can.
+
+        Parameters
+        ----------
+        block : Block
+        demand : tuple of float
+            What the axes should carry at its end [um, machine axes].
+
+        Returns
+        -------
+        Change
+
+        Raises
+        ------
+        ProgramError
+            The block cannot be shifted safely.
+        """
+        before, self.inner = self.carried, None
+        refuse_probing(block)
+        if block.tool_change is not None:  # the changer may have moved any axis
+            self.doubt_all()
+        texts = self._revise(block, demand)
+        if block.stops:  # the operator may move any axis now
+            self.doubt_all()
+        if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
+            texts = (*texts[:-1], *parted(texts[-1]))
+        placed = self.before == ALL or all(self.before[i] for i in self.named(block))
+        self.before = block.known
+        other = None
+        if any(self.doubtful):
+            x, y, z = (o if d else c for o, d, c in zip(self.other, self.doubtful, self.carried, strict=True))
+            other = None if (x, y, z) == self.carried else (x, y, z)
+        return Change(texts, before, self.carried, self.inner or self.carried, other, placed)
+
+    @property
+    def splits(self) -> bool:
+        """Whether a cut that is split can follow the drift more nearly."""
+        return False
+
+    @property
+    def leaves_mark(self) -> bool:
+        """Whether something may stay in the controller if the program is aborted."""
+        return False
+
+    @property
+    def leaves_offset(self) -> bool:
+        """Whether an offset is in force that the program has to take back."""
+        return False
+
+    @abstractmethod
+    def held_by(self, block: Block) -> str:
+        """Return what keeps the correction from following the drift in a block."""
+
+    @abstractmethod
+    def _revise(self, block: Block, demand: Vector) -> tuple[str, ...]: ...
+
+    def doubt(self, axis: int, other: float) -> None:
+        """Take in that an axis may carry something else [um]; one that stands in machine coordinates does not."""
+        if not self.fixed[axis]:
+            if not self.doubtful[axis]:
+                self.other[axis] = other
+            self.doubtful[axis] = True
+
+    def doubt_all(self) -> None:
+        """Take in that any axis may have been moved by hand or by the machine itself."""
+        for i in range(3):
+            self.doubt(i, self.carried[i])
+
+    def stands(self, block: Block) -> bool:
+        """Return whether a block moves no linear axis: it must not do so afterwards either.
+
+        So does a rapid with a rotary axis after a stop, if no hand has moved the axes since.
+
+        Raises
+        ------
+        ProgramError
+            It turns rotary axes in feed, and nobody knows whether it moves linear axes too, which decides what F means.
+        """
+        if block.kind != "line":
+            return False
+        a, b = block.start, block.end
+        moves = abs(b[0] - a[0]) > STILL or abs(b[1] - a[1]) > STILL or abs(b[2] - a[2]) > STILL
+        if moves and ROTARY.isdisjoint(block.words):
+            return False
+        unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
+        if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
+            raise ProgramError(
+                block.line.number,
+                f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
+                f"counts degrees: position {' '.join(unknown)} by a rapid before",
+            )
+        return not moves and not (unknown and ROTARY.isdisjoint(block.words))
+
+    def frame(self, block: Block) -> Frame:
+        """Return how corrections stand in the words of a block."""
+        if block.modal is not self._modal:  # one snapshot serves many blocks
+            self._modal, self._frame = block.modal, Frame.of(block.modal, self.digits)
+        return self._frame
+
+    def named(self, block: Block) -> list[int]:
+        """Return the axes that a block names."""
+        return [i for i, letter in enumerate(AXES) if letter in block.words]
+
+    def names_place(self, block: Block) -> bool:
+        """Return whether a block gives the place where the tool stands another name.
+
+        Raises
+        ------
+        ProgramError
+            It does so in a way that is not followed.
+        """
+        if "G92" in block.codes:
+            return True
+        if "G10" not in block.codes or block.values.get("L") not in (10.0, 11.0, 20.0):
+            return False
+        if block.values["L"] != 20:
+            raise ProgramError(
+                block.line.number,
+                "G10 L10 and L11 take the tool's length from where it stands, which holds the drift already; "
+                "measure tools outside the program",
+            )
+        if int(block.values.get("P", 0)) not in (0, block.modal.system):
+            raise ProgramError(block.line.number, "G10 L20 for a system that is not in force is not supported")
+        return True
+
+    def leave(self, block: Block) -> None:
+        """Take in a move in machine coordinates: its axes carry nothing afterwards."""
+        all_go = block.kind == "home" and ROTARY.isdisjoint(block.words)
+        axes = self.named(block) or ([0, 1, 2] if all_go else [])
+        if axes and self.frame(block).turned and {0, 1} & set(axes):
+            axes = sorted({0, 1, *axes})
+            if any(self.carried[i] for i in axes if i not in self.named(block) and i != 2):
+                raise ProgramError(
+                    block.line.number, "a move in machine coordinates of X or Y alone while the coordinates are rotated"
+                )
+        after = list(self.carried)
+        for i in axes:
+            after[i], self.fixed[i], self.doubtful[i] = 0.0, True, False
+        self.carried = (after[0], after[1], after[2])
+
+
+def refuse_probing(block: Block) -> None:
+    """Raise `ProgramError` if a block probes: what it finds holds a correction nobody knows of."""
+    if block.kind == "probe":
+        raise ProgramError(
+            block.line.number,
+            f"{block.modal.motion} probes: the program goes on with what it finds, which holds the drift already; "
+            "revise the part of the program that cuts",
+        )

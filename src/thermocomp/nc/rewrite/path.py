@@ -1,0 +1,27 @@
+"""Along a move: how long it is, and where the tool is on it."""
+
+import math
+
+from thermocomp.nc.interpreter import arcs
+from thermocomp.nc.interpreter.block import PLANES, Move, Point
+
+
+def length(move: Move) -> float:
+    """Return the length of a move [mm]."""
+    if move.arc is None:
+        return math.dist(move.start, move.end)
+    return arcs.length(move.arc, move.start, move.end)
+
+
+def at(move: Move, share: float) -> Point:
+    """Return where the tool is when it has gone a share of a move [mm, machine coordinates]."""
+    point = [a + share * (b - a) for a, b in zip(move.start, move.end, strict=True)]
+    arc = move.arc
+    if arc is not None:
+        i, j, _ = PLANES[arc.plane]
+        p, q = arc.centre
+        turned = share * arcs.sweep(arc, move.start, move.end)
+        angle = math.atan2(move.start[j] - q, move.start[i] - p) + (-turned if arc.clockwise else turned)
+        radius = math.hypot(move.start[i] - p, move.start[j] - q)
+        point[i], point[j] = p + radius * math.cos(angle), q + radius * math.sin(angle)
+    return point[0], point[1], point[2]

@@ -1,0 +1,388 @@
+"""Precompensation: a program is revised before it is run, by the drift it will cause (P-06).
+
+Everything streams: lines are read, followed, timed, corrected and read again one after the other; what a run tells as a
+whole (`Revision`) grows with it.
+"""
+
+import copy
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from operator import add, sub
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.interpreter.block import Block, Point, Setup
+from thermocomp.nc.interpreter.codes import ROTARY
+from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.parser.line import Line
+from thermocomp.nc.parser.recognise import recognise
+from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.nc.planner.timeline import Kinematics, timed
+from thermocomp.nc.rewrite import header, known
+from thermocomp.nc.rewrite.check import Check
+from thermocomp.nc.rewrite.demand import Cut, Demand, Drifting, Left
+from thermocomp.nc.rewrite.elsewhere import Elsewhere
+from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.method import Change, Method
+from thermocomp.nc.rewrite.offset import ending
+from thermocomp.nc.rewrite.path import at, length
+from thermocomp.nc.rewrite.split import Sample, axes_to_split, may_split, pieces, shares
+
+#: lines by which the control is recognised that a program is for
+FIRST = 200
+#: how often a cut is looked at: in time [s], and along the way where the drift depends on the place [mm]
+OFTEN = 20.0
+DENSE = 20.0
+MOST_PIECES = 1000
+#: the drift goes on within a line: so much more than the tolerance may be left before anything is said to hold it
+TELLING = 1.1
+_PLAIN = frozenset(("G0", "G1"))
+
+
+class Revised(NamedTuple):
+    """A line, and what has become of it."""
+
+    number: int  #: of the original line; 0 for the header
+    text: str  #: the original line; empty for the header
+    texts: tuple[str, ...]  #: what stands in its place
+    block: Block | None  #: what it does; None for the header and for what stands behind the end
+    start: float  #: when it begins [s]
+    end: float  #: when it ends [s]
+    deviation: Vector  #: drift at its end, at its place [um, machine axes]
+    carried: Vector  #: correction that the axes carry at its end [um, machine axes]
+    inner: Vector  #: and on the way, in a cycle that ends where it began
+    cut: Cut | None = None  #: what was met in it, if the tool cuts
+    other: Vector | None = None  #: what the axes may carry instead at its end, where the program leaves open which
+    placed: bool = True  #: it is known where the axes stood that it names: if they do not move, they may not
+    knots: tuple[Vector, ...] = ()  #: what the axes carry at the inner ends of its pieces, where it is split [um]
+
+
+@dataclass
+class Revision:
+    """One run of the revision.
+
+    Parameters
+    ----------
+    setup : Setup
+    kinematics : Kinematics
+    drift : Drifting
+        At its start state.
+    method : Method
+    demand : Demand
+    header_lines : int
+        Lines of the header.
+    split : bool
+        A long cut is split where one change of the correction would leave more than the method's step in its middle.
+
+    Attributes
+    ----------
+    left : Left
+        What the correction leaves of the drift in the cuts.
+    elsewhere : Elsewhere
+        What another work offset would cost, where the drift depends on the place.
+    corrected : bool
+        A correction was in force at some time.
+    lines, changed : int
+        Lines read, and how many of them are not as they were.
+    seconds : float
+        How long the program runs [s].
+    tool_changes : list of float
+        When [s].
+    slowest, fastest : float
+        Spindle speeds met [1/min].
+    held : dict of str to (float, int)
+        What kept a correction from following the drift in a cut, what was left there at most [um], and in which line.
+    standing : int
+        First line that cuts while the spindle stands; 0: none does.
+    idle : int
+        Lines behind the end of the program that have words: nothing is corrected there.
+    """
+
+    setup: Setup
+    kinematics: Kinematics
+    drift: Drifting
+    method: Method
+    demand: Demand
+    header_lines: int = header.LINES
+    split: bool = True
+    left: Left = field(default_factory=Left, init=False)
+    elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
+    corrected: bool = field(default=False, init=False)
+    lines: int = field(default=0, init=False)
+    changed: int = field(default=0, init=False)
+    seconds: float = field(default=0.0, init=False)
+    tool_changes: list[float] = field(default_factory=list, init=False)
+    slowest: float = field(default=float("inf"), init=False)
+    fastest: float = field(default=0.0, init=False)
+    held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
+    standing: int = field(default=0, init=False)
+    idle: int = field(default=0, init=False)
+    _touching: bool = field(default=False, init=False)
+    _why: str = field(default="", init=False)  # what has held the correction in the cut before
+
+    def rehearse(self, texts: Iterable[str]) -> Iterator[Block]:
+        """Go through a program and correct nothing: what will be refused whatever the drift is refused now, and soon.
+
+        Parameters
+        ----------
+        texts : iterable of str
+            Its lines, with their endings.
+
+        Yields
+        ------
+        Block
+            One for every line.
+
+        Raises
+        ------
+        ProgramError
+            A line cannot be read, followed or shifted safely.
+        """
+        method, steered = copy.deepcopy(self.method), known.Spindle(self.setup)
+        nothing: Vector = (0.0, 0.0, 0.0)
+        modal, seen = None, set[tuple[str, ...]]()
+        for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
+            steered.speed(block)
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
+            # lines with the words and in the state of one before tell a method that corrects nothing nothing new
+            words = tuple(block.words)
+            plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional
+            if not plain or block.modal is not modal:
+                modal = block.modal
+                seen.clear()
+            elif words in seen:
+                yield block
+                continue
+            if plain and ROTARY.isdisjoint(words):  # of those the place counts too
+                seen.add(words)
+            method.revise(block, nothing)
+            yield block
+
+    def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
+        """Revise a program.
+
+        Parameters
+        ----------
+        texts : iterable of str
+            Its lines, with their endings.
+
+        Yields
+        ------
+        Revised
+            For every line in order, and once for an empty header (`thermocomp.nc.rewrite.header`).
+
+        Raises
+        ------
+        ProgramError
+            The program cannot be revised safely; what was yielded before is worth nothing.
+        InputError
+            It is not an ISO program.
+        """
+        lines = self._guarded(read_lines(_recognised(texts), self.setup.controller))
+        check = Check(self.setup)
+        steered = known.Spindle(self.setup)
+        point: Point = (0.0, 0.0, 0.0)
+        deviation = self.drift.deviation(point)
+        headed = ended = False
+        carried = self.method.carried
+        for block, start, end in timed(follow(lines, self.setup), self.kinematics):
+            line = block.line
+            if not headed and not header.comes_first(line):
+                yield self._header(line.text, deviation, carried)
+                headed = True
+            known.refuse(block, self.setup, by_position=self.drift.by_position)
+            cutting = self._cuts(block)
+            speed = steered.speed(block)
+            if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
+                self.standing = line.number
+            samples = self._advance(block, end - self.seconds, speed, point, cutting)
+            self.seconds = end
+            if block.tool_change is not None:
+                self.tool_changes.append(start)
+            if block.moves:
+                point = block.moves[-1].end
+            deviation = self.drift.deviation(point)
+            demand = self._demanded(line.number, end, point)
+            samples.append(Sample(1.0, deviation, demand))
+            change, knots = self._changed(block, samples, check)
+            carried = change.after
+            known.refuse_untold_rotation(block, carried)
+            cut = None
+            if cutting:
+                if block.kind == "cycle":
+                    knots = [(0.0, change.inner), (1.0, change.inner)]
+                cut = self.left.take(line.number, _beside(samples, knots))
+                self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
+                if self.drift.by_position:
+                    self.elsewhere.take(end, point, self.drift)
+            else:
+                self._why = ""
+            self.idle += ended and bool(line.words)
+            ended |= block.ends
+            yield self._told(
+                Revised(
+                    line.number,
+                    line.text,
+                    change.texts,
+                    block,
+                    start,
+                    end,
+                    deviation,
+                    carried,
+                    change.inner,
+                    cut,
+                    change.other,
+                    change.placed,
+                    tuple(carried for _, carried in knots[1:-1]),
+                )
+            )
+        if not headed:
+            raise ProgramError(max(self.lines, 1), "there is nothing in this program")
+        if not ended and any(carried):
+            self._refuse_open()
+
+    def _guarded(self, lines: Iterable[Line]) -> Iterator[Line]:
+        for line in lines:
+            if line.comment:
+                header.refuse_revised(line)
+            yield line
+
+    def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
+        return Revised(
+            0, "", header.blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+        )
+
+    def _told(self, revised: Revised) -> Revised:
+        self.lines += 1
+        self.changed += revised.texts != (revised.text,)
+        self.corrected = self.corrected or any(revised.carried) or any(revised.inner)
+        return revised
+
+    def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
+        """Return what becomes of a block, and what the axes carry where on its way."""
+        method = self.method
+        before, begun = method.before, method.carried
+        parts = [1.0]
+        if len(samples) > 2 and samples[1].demand is not None:
+            axes = axes_to_split(block, before)
+            parts = shares(samples, begun, axes, method.step, length(block.moves[0]))
+        if len(parts) > 1 and not self._worth(block, samples, parts):
+            parts = [1.0]
+        if len(parts) == 1:
+            change = method.revise(block, samples[-1].demand or begun)
+            check.check(block, change)
+            return change, [(0.0, begun), (1.0, change.after)]
+        demands = {s.share: s.demand for s in samples}
+        changes = []
+        for piece, share in zip(pieces(block, parts, before, self.setup.controller), parts, strict=True):
+            change = method.revise(piece, demands[share] or begun)
+            check.check(piece, change)
+            changes.append(change)
+        knots = [(0.0, begun), *((share, c.after) for share, c in zip(parts, changes, strict=True))]
+        texts = tuple(text for c in changes for text in c.texts)
+        return Change(texts, begun, changes[-1].after, changes[-1].inner, changes[-1].other, changes[0].placed), knots
+
+    def _worth(self, block: Block, samples: list[Sample], parts: list[float]) -> bool:
+        """Return whether less is left in a cut that is split, and at its end not more than a step more."""
+        found = []
+        for ends in ([1.0], parts):
+            method = copy.deepcopy(self.method)
+            demands = {s.share: s.demand or method.carried for s in samples}
+            knots = [(0.0, method.carried)]
+            for piece, share in zip(pieces(block, ends, method.before, self.setup.controller), ends, strict=True):
+                knots.append((share, method.revise(piece, demands[share]).after))
+            left = [max(map(abs, map(add, *pair))) for pair in _beside(samples, knots)]
+            found.append((max(left), left[-1]))
+        (whole, at_end), (split, at_its_end) = found
+        return bool(split < whole and at_its_end <= at_end + self.method.step)
+
+    def _demanded(self, line: int, end: float, point: Point) -> Vector:
+        try:
+            return self.demand.at(end, self.drift, point)
+        except InputError as e:
+            raise ProgramError(line, str(e)) from e
+
+    def _cuts(self, block: Block) -> bool:
+        """Return whether the tool may cut in a block: it moves in feed, or stands where it has cut."""
+        if block.tool_change is not None or block.kind in ("machine", "home"):
+            self._touching = False
+        elif block.moves:
+            self._touching = not block.moves[-1].rapid
+            return any(not m.rapid for m in block.moves)
+        return self._touching
+
+    def _advance(self, block: Block, dt: float, speed: float, point: Point, cutting: bool) -> list[Sample]:
+        """Let the time of a block pass; return where a cut is looked at, but for its end."""
+        if dt > 0 and speed:
+            self.slowest = min(self.slowest, abs(speed))
+            self.fastest = max(self.fastest, abs(speed))
+        if not cutting:
+            if dt > 0:
+                self.drift.advance(dt, speed)
+            return []
+        move = block.moves[0] if len(block.moves) == 1 else None
+        count = math.ceil(dt / OFTEN)
+        if move is not None and self.drift.by_position:
+            count = max(count, math.ceil(length(move) / DENSE))
+        count = min(max(count, 1), MOST_PIECES)
+        samples = [Sample(0.0, self.drift.deviation(point), None)]
+        asked = count > 1 and self.split and self.method.splits and may_split(block, self.method.before)
+        for k in range(1, count + 1):
+            if dt > 0:
+                self.drift.advance(dt / count, speed)
+            if k < count:
+                place = point if move is None else at(move, k / count)
+                time = self.seconds + dt * k / count
+                demand = self._demanded(block.line.number, time, place) if asked else None
+                samples.append(Sample(k / count, self.drift.deviation(place), demand))
+        return samples
+
+    def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
+        """Note what keeps the correction from following in a cut that began at a drift."""
+        tolerance = self.demand.tolerance
+        gap = max(*cut.left[1], -min(cut.left[0]))
+        if gap <= TELLING * tolerance:
+            self._why = ""
+            return
+        if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
+            self._why = self.method.held_by(block)
+        elif self.demand.every is not None:
+            self._why = "the time between renewals"
+        elif gap > max(map(abs, map(add, drift, ends[0]))):
+            self._why = "the length of the line, along which the drift is uneven"
+        else:
+            self._why = self._why or "the moves before the cut, which could not take it up"
+        if gap > self.held.get(self._why, (0.0, 0))[0]:
+            self.held[self._why] = gap, block.line.number
+
+    def _refuse_open(self) -> None:
+        """Raise `ProgramError` if an offset would stay in force behind the last line."""
+        if self.method.leaves_offset:
+            raise ProgramError(
+                self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
+            )
+
+
+def _recognised(texts: Iterable[str]) -> Iterator[str]:
+    """Pass lines on, if they are of a control that is known."""
+    rest = iter(texts)
+    first = list(itertools.islice(rest, FIRST))
+    recognise(first)
+    return itertools.chain(first, rest)
+
+
+def _beside(samples: list[Sample], knots: list[tuple[float, Vector]]) -> Iterator[tuple[Vector, Vector]]:
+    """Yield deviation and the correction that is in force there: it changes evenly from knot to knot."""
+    k = 1
+    for sample in samples:
+        while sample.share > knots[k][0]:
+            k += 1
+        (first, before), (last, after) = knots[k - 1 : k + 1]
+        if before == after:
+            yield sample.deviation, after
+            continue
+        part = (sample.share - first) / (last - first)
+        x, y, z = (b + part * (a - b) for b, a in zip(before, after, strict=True))
+        yield sample.deviation, (x, y, z)

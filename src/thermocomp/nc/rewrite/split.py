@@ -1,0 +1,211 @@
+"""Splits a long cut into pieces where one straight change of the correction would leave too much in its middle."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+from thermocomp.nc.interpreter.arcs import CENTRE
+from thermocomp.nc.interpreter.block import PLANES, Block, Known, Move, Point
+from thermocomp.nc.interpreter.codes import ROTARY
+from thermocomp.nc.parser.tokens import Controller, read_line
+from thermocomp.nc.rewrite.frame import Vector
+from thermocomp.nc.rewrite.method import AXES
+from thermocomp.nc.rewrite.offset import ending
+from thermocomp.nc.rewrite.path import at
+from thermocomp.nc.rewrite.text import number
+
+#: decimals of places inside a cut: they lie beside the path by a thousandth of what a correction is rounded to
+DIGITS: Final = 6
+#: shorter pieces are not made [mm]
+SHORTEST: Final = 2.0
+#: pieces of one cut at most
+MOST: Final = 64
+#: what may stand beside the motion code: all that comes into force before the first piece and stays so
+_BESIDE: Final = frozenset(
+    {
+        "G1",
+        "G2",
+        "G3",
+        "G17",
+        "G18",
+        "G19",
+        "G90",
+        "G90.1",
+        "G91.1",
+        "G94",
+        "M3",
+        "M4",
+        "M5",
+        "M7",
+        "M8",
+        "M9",
+        "M48",
+        "M49",
+    }
+)
+
+
+class Sample(NamedTuple):
+    """A place in a block."""
+
+    share: float  #: of its way
+    deviation: Vector  #: of the tool point [um]
+    demand: Vector | None  #: what the axes should carry there [um]; None: not asked for
+
+
+def may_split(block: Block, before: Known) -> bool:
+    """Return whether a block is a plain cut of which every place is known.
+
+    Parameters
+    ----------
+    block : Block
+    before : tuple of bool
+        Axes whose place was known before it.
+    """
+    modal, words = block.modal, block.words
+    ends = block.line.text.endswith(("\r", "\n"))  # not the last line of a file
+    if len(block.moves) != 1 or block.kind not in ("line", "arc") or block.line.optional or not ends:
+        return False
+    move = block.moves[0]
+    if move.rapid or modal.motion not in ("G1", "G2", "G3") or not _BESIDE.issuperset(block.codes):
+        return False
+    if modal.cutter or modal.diameter or modal.blend is None or modal.exact_stop or modal.feed_mode != 94:
+        return False
+    if not modal.absolute or not ROTARY.isdisjoint(words) or any(w.number is None for w in words.values()):
+        return False
+    needed = [i for i, letter in enumerate(AXES) if letter in words]
+    if move.arc is not None:
+        if modal.rotation or move.arc.turns != 1:
+            return False
+        needed += PLANES[move.arc.plane][:2]
+    return all(before[i] for i in needed)
+
+
+def shares(samples: Sequence[Sample], carried: Vector, axes: Sequence[int], step: float, way: float) -> list[float]:
+    """Return where the pieces of a cut end, as shares of its way; one alone if it is not split.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        From the start to the end.
+    carried : tuple of float
+        What the axes carry at the start [um].
+    axes : sequence of int
+        Those whose correction can change within it.
+    step : float
+        As much may be left inside a piece [um].
+    way : float
+        Length of the cut [mm].
+    """
+    wanted = [carried if k == 0 else s.demand or carried for k, s in enumerate(samples)]
+    ends = [0, len(samples) - 1]
+    while len(ends) <= MOST:
+        worst, where = step, 0
+        for first, last in pairwise(ends):
+            if (samples[last].share - samples[first].share) * way < 2.0 * SHORTEST:
+                continue
+            for k in range(first + 1, last):
+                part = (samples[k].share - samples[first].share) / (samples[last].share - samples[first].share)
+                for i in axes:
+                    between = wanted[first][i] + part * (wanted[last][i] - wanted[first][i])
+                    if abs(wanted[k][i] - between) > worst:
+                        worst, where = abs(wanted[k][i] - between), k
+        if not where:
+            break
+        ends = sorted([*ends, where])
+    return [samples[k].share for k in ends[1:]]
+
+
+def axes_to_split(block: Block, before: Known) -> list[int]:
+    """Return the axes whose correction can change within a block: all of a line, the third one of an arc."""
+    arc = block.moves[0].arc
+    found = range(3) if arc is None else (PLANES[arc.plane][2],)
+    return [i for i in found if AXES[i] in block.words or before[i]]
+
+
+def pieces(block: Block, parts: Sequence[float], before: Known, controller: Controller) -> Iterator[Block]:
+    """Yield the pieces of a block, each as if it were a line of the program.
+
+    Parameters
+    ----------
+    block : Block
+        One that `may_split`.
+    parts : sequence of float
+        Where they end, as shares of its way; the last is 1.
+    before : tuple of bool
+        Axes whose place was known before it.
+    controller : {'linuxcnc', 'fanuc'}
+    """
+    move, modal = block.moves[0], block.modal
+    unit = 25.4 if modal.inch else 1.0
+    shift = [p - m for p, m in zip(block.start, move.start, strict=True)]
+    place, start = block.start, move.start
+    x, y, z = (b or letter in block.words for letter, b in zip(AXES, before, strict=True))
+    words, drop = _words(block), "R" if move.arc else ""
+    for k, share in enumerate(parts):
+        last = k == len(parts) - 1
+        end = move.end if last else at(move, share)
+        goal = block.end if last else _place(block, end, share, shift)
+        values = {AXES[i]: goal[i] / unit for i in words}
+        if move.arc is not None:
+            values |= _centre(move, place, shift, modal.arc_absolute, unit)
+        text = _bare(values) + ending(block.line.text) if k else _written(block, values, drop)
+        line = read_line(text, block.line.number, controller)
+        yield replace(
+            block,
+            line=line,
+            codes=() if k else block.codes,
+            words={w.letter: w for w in line.words if w.letter not in "GM"},
+            values={w.letter: w.number for w in line.words if w.letter not in "GM" and w.number is not None},
+            start=place,
+            end=goal,
+            known=block.known if last else (x, y, z),
+            moves=[replace(move, start=start, end=end)],
+        )
+        place, start = goal, end
+
+
+def _words(block: Block) -> list[int]:
+    """Return the axes that every piece names."""
+    arc = block.moves[0].arc
+    plane = () if arc is None else PLANES[arc.plane][:2]
+    return [i for i, letter in enumerate(AXES) if letter in block.words or i in plane]
+
+
+def _place(block: Block, end: Point, share: float, shift: Sequence[float]) -> Point:
+    """Return a place inside a cut in program coordinates, as it is written [mm]."""
+    if block.moves[0].arc is None:
+        exact = [a + share * (b - a) for a, b in zip(block.start, block.end, strict=True)]
+    else:
+        exact = [m + s for m, s in zip(end, shift, strict=True)]
+    unit = 25.4 if block.modal.inch else 1.0
+    x, y, z = (round(v / unit, DIGITS) * unit for v in exact)
+    return x, y, z
+
+
+def _centre(move: Move, place: Point, shift: Sequence[float], absolute: bool, unit: float) -> dict[str, float]:
+    """Return the words of an arc's centre [program units]."""
+    assert move.arc is not None
+    found = {}
+    for letter, i, middle in zip(CENTRE[move.arc.plane], PLANES[move.arc.plane], move.arc.centre, strict=False):
+        found[letter] = (middle + shift[i] - (0.0 if absolute else place[i])) / unit
+    return found
+
+
+def _bare(values: dict[str, float]) -> str:
+    return " ".join(f"{letter}{number(value, DIGITS)}" for letter, value in values.items())
+
+
+def _written(block: Block, values: dict[str, float], drop: str) -> str:
+    """Return the text of a block's line with these words; those that it does not have come behind its last one."""
+    text = block.line.text
+    behind = max(word.end for word in block.line.words)
+    added = _bare({letter: value for letter, value in values.items() if letter not in block.words})
+    text = f"{text[:behind]}{' ' if added else ''}{added}{text[behind:]}"
+    for word in sorted(block.words.values(), key=lambda w: w.start, reverse=True):
+        if word.letter in drop:
+            text = text[: word.start] + text[word.end :]
+        elif word.letter in values:
+            text = text[: word.start + 1] + number(values[word.letter], DIGITS) + text[word.end :]
+    return text

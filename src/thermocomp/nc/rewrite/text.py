@@ -1,0 +1,113 @@
+"""Writing a shift into the words of a line; whatever is not shifted stays as it is, byte for byte."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from thermocomp.nc.interpreter.block import Block
+from thermocomp.nc.parser.line import Line, Word
+
+#: characters of a line that every control reads: LinuxCNC takes what is behind the 252nd for the next line
+LONGEST = 240
+
+_COMMENTS = re.compile(r"\([^()]*\)|;.*")
+
+#: letter -> what is added to its value, in the program's units
+Shifts = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Digits:
+    """How many decimals a written length has.
+
+    Parameters
+    ----------
+    mm, inch : int
+        What a correction is rounded to: all of it is in these decimals, so that no word is rounded twice.
+    """
+
+    mm: int = 4
+    inch: int = 6
+
+    def of(self, inch: bool) -> int:
+        """Return the decimals in the unit in force."""
+        return self.inch if inch else self.mm
+
+
+#: LinuxCNC reads any number of decimals; a Fanuc with its least increment of 1 um (IS-B) no more than these
+DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
+
+
+def number(value: float, digits: int) -> str:
+    """Return a number with a decimal point always, and without zeros that say nothing."""
+    text = f"{value:.{digits}f}".rstrip("0")
+    if text.endswith("."):
+        text += "0"
+    return text.removeprefix("-") if text.strip("-0.") == "" else text
+
+
+def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: int) -> str:
+    """Return the text of a block's line with shifted words.
+
+    Parameters
+    ----------
+    block : Block
+    shifts : mapping of str to float
+        By letter of a word that stands on the line; a word with a shift of 0 is left alone.
+    added : mapping of str to float
+        Words that are not on the line and come behind its last one, in this order.
+    digits : int
+        Decimals of shifts and added words.
+
+    Returns
+    -------
+    str
+    """
+    line = block.line
+    text = line.text
+    if added:
+        insert = "".join(f" {letter}{number(value, digits)}" for letter, value in added.items())
+        behind = _end(line)
+        text = text[:behind] + insert + text[behind:]
+    changed = [(block.words[letter], shift) for letter, shift in shifts.items() if shift]
+    changed.sort(key=_start, reverse=True)
+    for word, shift in changed:
+        text = text[: word.start + 1] + written(word, block.values[word.letter], shift, digits) + text[word.end :]
+    return text
+
+
+def parted(text: str) -> tuple[str, ...]:
+    """Return a line, the comments of one that is too long on a line before it, where controls show them anyway."""
+    comments = _COMMENTS.findall(text)
+    if len(text) <= LONGEST or not comments:
+        return (text,)
+    code = _COMMENTS.sub("", text)
+    ending = code[len(code.rstrip()) :].lstrip(" \t")
+    return " ".join(c.rstrip() for c in comments) + ending, code.rstrip() + ending
+
+
+def _start(change: tuple[Word, float]) -> int:
+    return change[0].start
+
+
+def _end(line: Line) -> int:
+    """Return the column behind the last word of a line."""
+    return max(word.end for word in line.words)
+
+
+def written(word: Word, value: float, shift: float, digits: int) -> str:
+    """Return the text of a shifted value.
+
+    Parameters
+    ----------
+    word : Word
+    value, shift : float
+        In the program's units.
+    digits : int
+        Decimals at least; a word that has more keeps them.
+    """
+    if word.number is None:
+        return f"[{word.value.strip()}{'+' if shift > 0 else ''}{number(shift, digits)}]"
+    point = word.value.find(".")
+    decimals = 0 if point < 0 else sum(map(str.isdigit, word.value[point:]))
+    return number(value + shift, max(digits, decimals))

@@ -1,0 +1,347 @@
+"""The drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
+
+Time passes in pieces as short as a move; the models are stepped on a coarser clock: at least every `Drift.step`
+seconds, when the spindle speed changes, and again soon after that, since part of a deviation may follow the speed at
+once. While the inputs are constant the families of `thermocomp.core` do not mind how a time is divided.
+"""
+
+import copy
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.jobstate import JobState
+from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
+from thermocomp.nc.thermal.start import Start, left
+from thermocomp.nc.thermal.stations import AXES, Station, checked
+
+#: a speed that lasts no longer counts with its share of the mean; what follows a speed at once does so after this [s]
+SOON = 0.5
+#: a pause with a forecast is divided into so many steps at most
+MOST_STEPS = 5000
+
+
+class Outside(NamedTuple):
+    """An input that was beyond the range a model was trained in, the margin of its support included."""
+
+    name: str
+    unit: str
+    low: float  #: trained range [unit]
+    high: float
+    farthest: float  #: the value farthest from it [unit]
+    seconds: float  #: how long it was outside [s]
+
+
+class Drift:
+    """How far the tool point has drifted, at any moment of a program and anywhere.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+        Per axis one, or several along one axis: between them the deviation is linear, beyond them that of the
+        outermost (P-04).
+    start : Start
+        From `thermocomp.nc.thermal.start`.
+    others : mapping of str to Signal, optional
+        Inputs that the program does not tell.
+    zero : {'start', 'cold', 'last'}
+        From where the drift counts. ``start``: work offsets and tools were set at the start of the program; ``cold``:
+        on the cold machine, the deviation is what the models say; ``last``: as in the job that was carried over.
+    step : float
+        The models are stepped at least this often [s].
+
+    Attributes
+    ----------
+    time : float
+        Since the start of the program, up to the last step of the models [s].
+    assumed : tuple of str
+        What the start has made of one measurement for several stations.
+    beyond : dict of str to float
+        Per axis, how far the positions asked for were beyond its outermost station, at most [mm].
+
+    Raises
+    ------
+    InputError
+        The stations do not fit together, a model wants an input that nobody gives, or there is no last job.
+    """
+
+    def __init__(
+        self,
+        stations: Sequence[Station],
+        start: Start,
+        others: Inputs | None = None,
+        *,
+        zero: Literal["start", "cold", "last"] = "start",
+        step: float = 5.0,
+    ) -> None:
+        if not 0 < step < math.inf:
+            raise InputError(f"drift: step {step} s must be positive and finite")
+        if zero == "last" and start.zeros is None:
+            raise InputError("drift: it cannot count from the zero of the last job: no state of one is carried over")
+        if checked(stations) != list(stations) or len(start.states) != len(stations):
+            raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
+        self.stations = tuple(stations)
+        self.step = step
+        self.assumed = start.assumed
+        self.beyond: dict[str, float] = {}
+        self._others = dict(others or {})
+        self._wiring = [Wiring(s.model, self._others) for s in stations]
+        self._varies = any(w.varies for w in self._wiring)
+        self._states = list(start.states)
+        self._outside: dict[tuple[int, int], tuple[float, float]] = {}
+        self._doubts = list(start.doubts or (0.0,) * len(stations))
+        self._doubtful = {k for k, doubt in enumerate(self._doubts) if doubt}
+        self._pending = self._speed = self._counted = self._turns = 0.0
+        self._due = step
+        self._zeros = [0.0] * len(stations)
+        self._ladders = _ladders(self.stations)
+        self.time = -start.pause
+        self._publish()
+        if start.pause:
+            self.advance(start.pause, 0.0)
+            self._flush()
+            self.time = 0.0
+        # an error of the model at the moment that counts as zero is an error at all later ones
+        if zero == "start":
+            self._zeros, self._zero_known = [float(s.deviation) for s in self._states], start.known
+        elif zero == "last" and start.zeros is not None:
+            self._zeros, self._zero_known = list(start.zeros), start.zero_known
+        else:
+            self._zero_known = True
+        self._publish()
+
+    # -- time passes -------------------------------------------------------------------------------------------------
+
+    def advance(self, dt: float, speed: float) -> None:
+        """Let time pass with the spindle at a speed.
+
+        Parameters
+        ----------
+        dt : float
+            [s]
+        speed : float
+            [1/min]; the sense of rotation does not matter.
+
+        Raises
+        ------
+        InputError
+            A number is not finite, or `dt` is negative.
+        """
+        speed = abs(speed)
+        if not (0.0 <= dt < math.inf and speed < math.inf):
+            raise InputError(f"drift: {dt} s at {speed} 1/min: want finite numbers, and a time that is not negative")
+        if speed != self._speed:
+            self._change(speed)
+        self._pending += dt
+        if self._pending >= self._due:
+            self._flush()
+
+    def _change(self, speed: float) -> None:
+        if self._pending >= SOON:
+            self._flush()
+        else:
+            self._turns += (self._pending - self._counted) * self._speed
+            self._counted = self._pending
+        self._speed = speed
+        self._due = min(SOON, self.step)
+
+    def _flush(self) -> None:
+        """Step the models through the time that has passed since their last step."""
+        total, speed = self._pending, self._speed
+        if self._counted:
+            speed = (self._turns + (total - self._counted) * speed) / total
+        steps = min(math.ceil(total / self.step), MOST_STEPS) if self._varies else 1
+        begin = self.time
+        for k in range(1, steps + 1):
+            self._take(begin + total * k / steps, total / steps, speed)
+        self._pending = self._counted = self._turns = 0.0
+        self._due = self.step
+        self._publish()
+
+    def _take(self, time: float, dt: float, speed: float) -> None:
+        self.time = time
+        for k, (station, wiring) in enumerate(zip(self.stations, self._wiring, strict=True)):
+            values = wiring.values(time, speed)
+            self._states[k], deviation = station.model.step(self._states[k], values, dt)
+            out = self._states[k].outside
+            if out.any():
+                self._note(k, values, dt)
+            said = abs(float(deviation) - self._zeros[k])
+            if not station.model.remembers:
+                self._doubts[k] = said if out.any() else 0.0
+            elif k in self._doubtful or out.any():
+                # once the memory has been driven by inputs that were cut, it stays in doubt
+                self._doubtful.add(k)
+                self._doubts[k] = max(self._doubts[k], said)
+
+    def _note(self, k: int, values: FloatArray, dt: float) -> None:
+        state, model = self._states[k], self.stations[k].model
+        for i in np.flatnonzero(state.outside).tolist():
+            low, high = _trained(model.inputs[i].low, model.inputs[i].high, float(state.reference[i]))
+            farthest, seconds = self._outside.get((k, i), (0.5 * (low + high), 0.0))
+            value = float(values[i])
+            if _excess(value, low, high) > _excess(farthest, low, high):
+                farthest = value
+            self._outside[k, i] = farthest, seconds + dt
+
+    # -- where the tool point is -------------------------------------------------------------------------------------
+
+    def deviation(self, point: Point) -> Point:
+        """Return by how much the tool point deviates now, actual minus commanded, at a place.
+
+        Parameters
+        ----------
+        point : tuple of float
+            Machine coordinates [mm].
+
+        Returns
+        -------
+        tuple of float
+            X, Y, Z, counted from the stated zero; 0 for an axis without a model [um].
+        """
+        if not self._ladders:
+            return self._everywhere
+        found = list(self._everywhere)
+        for ladder in self._ladders:
+            position = point[ladder.along]
+            found[ladder.axis] = ladder.at(position)
+            past = max(ladder.positions[0] - position, position - ladder.positions[-1])
+            if past > self.beyond.get(AXES[ladder.axis], 0.0):
+                self.beyond[AXES[ladder.axis]] = past
+        return (found[0], found[1], found[2])
+
+    def field(self) -> Callable[[Point], Point]:
+        """Return what `deviation` gives now, as a function of the place that time does not change any more."""
+        everywhere = self._everywhere
+        if not self._ladders:
+            return lambda _: everywhere
+        frozen = copy.copy(self)
+        frozen._ladders = tuple(copy.copy(ladder) for ladder in self._ladders)
+        frozen.beyond = {}  # asked for anywhere, not only where the program goes
+        return frozen.deviation
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Deviation now, per station, counted from the stated zero [um]."""
+        return tuple(float(s.deviation) - z for s, z in zip(self._states, self._zeros, strict=True))
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that have a model."""
+        return tuple(a for a in AXES if any(s.axis == a for s in self.stations))
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """The axes whose models say anything: an input has an influence on them, or they are not 0 at rest."""
+        return tuple(
+            a for a in AXES if any(s.axis == a and (s.model.sensors or s.model.intercept) for s in self.stations)
+        )
+
+    @property
+    def by_position(self) -> bool:
+        """True if the deviation varies with the place."""
+        return bool(self._ladders)
+
+    def _publish(self) -> None:
+        """Make ready what `deviation` gives until the next step."""
+        values = self.values
+        places = [0.0, 0.0, 0.0]
+        for station, value in zip(self.stations, values, strict=True):
+            places[AXES.index(station.axis)] = value
+        self._everywhere: Point = (places[0], places[1], places[2])
+        for ladder in self._ladders:
+            ladder.values = values[ladder.stations]
+
+    # -- how far to trust it -----------------------------------------------------------------------------------------
+
+    @property
+    def outside(self) -> tuple[Outside, ...]:
+        """Inputs that have left the trained range of a model so far; per input the model it left the farthest."""
+        found: dict[str, Outside] = {}
+        for (k, i), (farthest, seconds) in self._outside.items():
+            state, channel = self._states[k], self.stations[k].model.inputs[i]
+            low, high = _trained(channel.low, channel.high, float(state.reference[i]))
+            mine = Outside(channel.name, channel.unit, low, high, farthest, seconds)
+            other = found.get(channel.name)
+            if other is None or _excess(farthest, low, high) > _excess(other.farthest, other.low, other.high):
+                found[channel.name] = mine
+        return tuple(found.values())
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Forecasts that do not cover the program so far, and for how long they were held beyond their points [s]."""
+        used = {i.name for s in self.stations for i in s.model.inputs}
+        return {n: h for n, s in self._others.items() if n in used and (h := s.held(self.time)) > 0}
+
+    def uncertainty(self) -> tuple[float, float, float]:
+        """Return how wrong the models may be.
+
+        Per axis, of its stations the greatest of: the greatest error on cycles the method had not seen, twice if the
+        zero itself is a prediction; and, since an input has left the trained range, all that the model says on top.
+
+        Returns
+        -------
+        tuple of float
+            X, Y, Z; nan where a model was never judged, 0 for an axis without a model [um].
+        """
+        worst = [0.0, 0.0, 0.0]
+        for station, doubt in zip(self.stations, self._doubts, strict=True):
+            k, honest = AXES.index(station.axis), station.model.honest_error
+            error = math.nan if honest is None else honest.max_abs * (1 if self._zero_known else 2) + doubt
+            if not error <= worst[k]:  # nan stays nan
+                worst[k] = error if not math.isnan(worst[k]) else math.nan
+        return (worst[0], worst[1], worst[2])
+
+    # -- the next job ------------------------------------------------------------------------------------------------
+
+    def state(self) -> JobState:
+        """Return what the next job can start from; the models are stepped up to now."""
+        if self._pending:
+            self._flush()
+        return left(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
+
+
+class _Ladder:
+    """The stations of one axis along another one."""
+
+    __slots__ = ("along", "axis", "positions", "stations", "values")
+
+    def __init__(self, axis: int, along: int, positions: tuple[float, ...], stations: slice) -> None:
+        self.axis, self.along, self.positions, self.stations = axis, along, positions, stations
+        self.values: tuple[float, ...] = ()
+
+    def at(self, position: float) -> float:
+        """Return the deviation at a position, linear between stations, that of the outermost beyond them [um]."""
+        positions, values = self.positions, self.values
+        k = bisect_right(positions, position)
+        if k == 0:
+            return values[0]
+        if k == len(positions):
+            return values[-1]
+        share = (position - positions[k - 1]) / (positions[k] - positions[k - 1])
+        return (1.0 - share) * values[k - 1] + share * values[k]
+
+
+def _ladders(stations: Sequence[Station]) -> tuple[_Ladder, ...]:
+    found, first = [], 0
+    for axis, group in groupby(stations, key=lambda s: s.axis):
+        mine = list(group)
+        if mine[0].along is not None:
+            places = slice(first, first + len(mine))
+            found.append(_Ladder(AXES.index(axis), AXES.index(mine[0].along), tuple(s.at for s in mine), places))
+        first += len(mine)
+    return tuple(found)
+
+
+def _trained(low: float, high: float, reference: float) -> tuple[float, float]:
+    return reference + low, reference + high
+
+
+def _excess(value: float, low: float, high: float) -> float:
+    return max(low - value, value - high)

@@ -1,0 +1,338 @@
+"""The state the machine is in when the program starts: cold, left by the last job, or measured (E-P5)."""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from typing import NamedTuple
+
+import numpy as np
+
+from thermocomp.core.autoregressive import Ticking
+from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.jobstate import JobState, StationState
+from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.units import measured as with_unit
+from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
+from thermocomp.nc.thermal.stations import Station
+
+#: a speed that explains a measured deviation is looked for between so many
+_TRIED = 129
+#: how well it explains it [um]
+_CLOSE = 1e-9
+#: an autoregressive model has settled after that [s]
+_LONG = 2 * 86400.0
+
+
+class Start(NamedTuple):
+    """State of the models when the program starts, or so long before it as the spindle stands still."""
+
+    states: tuple[State, ...]  #: per station
+    known: bool  #: the state is no prediction: the machine is cold or measured
+    pause: float = 0.0  #: time the spindle stands still before the program [s]
+    zeros: tuple[float, ...] | None = None  #: deviation that counted as zero in the last job, per station [um]
+    zero_known: bool = False  #: that one was no prediction
+    doubts: tuple[float, ...] | None = None  #: what the last job widened the bound by, per station [um]
+    assumed: tuple[str, ...] = ()  #: what was made of one measurement for several stations
+
+
+def cold(stations: Sequence[Station], others: Inputs) -> Start:
+    """Return the state of a machine at rest: the spindle has not turned for long.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+    others : mapping of str to Signal
+        Inputs that the program does not tell.
+
+    Returns
+    -------
+    Start
+
+    Raises
+    ------
+    InputError
+        A model wants an input that nobody gives.
+    """
+    return Start(tuple(_resting(s.model, Wiring(s.model, others), 0.0) for s in stations), known=True)
+
+
+def carried(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> Start:
+    """Return the state that the last job has left, and a pause in which the spindle stood still.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+    left : JobState
+    pause : float
+        From the end of the last job to the start of this one [s].
+
+    Returns
+    -------
+    Start
+
+    Raises
+    ------
+    InputError
+        The state is not that of these models, or the pause is negative.
+    """
+    if not 0 <= pause < math.inf:
+        raise InputError(f"pause since the last job: {pause} s must be finite and not negative")
+    by_name = {s.station: s for s in left.stations}
+    if set(by_name) != {str(s) for s in stations}:
+        raise InputError(
+            f"the last job left the state of {', '.join(by_name)}; this one has models of "
+            f"{', '.join(map(str, stations))}: use the models of the last job, or start cold or measured"
+        )
+    mine = [by_name[str(s)] for s in stations]
+    return Start(
+        tuple(_restored(station.model, state) for station, state in zip(stations, mine, strict=True)),
+        known=False,
+        pause=pause,
+        zeros=tuple(s.zero for s in mine),
+        zero_known=left.zero_known,
+        doubts=tuple(s.doubt for s in mine),
+    )
+
+
+def measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> Start:
+    """Return a state in which the models say what has been measured, the spindle standing still.
+
+    An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
+    that constant spindle speed, the least one in the trained range, at which the deviation is the measured one as soon
+    as the spindle stops. One measurement fixes all stations of an axis: each gets the state of the one speed at which
+    the mean over them, or that of the one station that was measured, is the measured deviation.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+    deviations : mapping of str to float
+        By axis, or by target: that of one station of an axis or of each; counted from the cold machine [um].
+    others : mapping of str to Signal
+        Inputs that the program does not tell.
+
+    Returns
+    -------
+    Start
+
+    Raises
+    ------
+    InputError
+        A deviation is missing, belongs to no station or to one that has another already; a model has no memory, or no
+        speed in its trained range leaves the measured deviation.
+    """
+    by_axis = {a: [s for s in stations if s.axis == a] for a in dict.fromkeys(s.axis for s in stations)}
+    known = [n for a, mine in by_axis.items() for n in (a, *(_names(s)[0] for s in mine if len(mine) > 1))]
+    told = {str(s): next((n for n in _names(s) if n in deviations), "") for s in stations}
+    for name in deviations:
+        if name not in by_axis and name not in told.values():
+            raise unknown("measured axis or target", name, known)
+    states, assumed = dict[str, State](), []
+    for axis, mine in by_axis.items():
+        named = [s for s in mine if told[str(s)]]
+        if axis in deviations:
+            if named:
+                raise InputError(f"measured start: {axis} and {told[str(named[0])]} are given; take one of them away")
+            parts = [(mine, mine, deviations[axis])]
+        elif len(named) == 1:
+            parts = [(mine, named, deviations[told[str(named[0])]])]
+        else:
+            parts = [([s], [s], deviations[name]) for s in mine if (name := told[str(s)])]
+        if len(named) not in (1, len(mine)) and axis not in deviations:
+            missing = next(s for s in mine if not told[str(s)])
+            what, name = (missing, _names(missing)[0]) if named else (axis, axis)
+            raise InputError(f"measured start: that of {what} is missing; give {name}=VALUEum too")
+        for group, seen, deviation in parts:
+            found, speed = _explaining(group, seen, others, deviation)
+            states |= {str(s): state for s, state in zip(group, found, strict=True)}
+            if len(group) > 1:
+                what = f"the mean of its {len(mine)} models" if seen is group else told[str(seen[0])]
+                assumed.append(
+                    f"{axis} was measured once: all its models begin as {speed:.0f} 1/min, held for long, leaves "
+                    f"them: there {what} is {deviation:g} um"
+                )
+    return Start(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
+
+
+def deviations(texts: Sequence[str]) -> dict[str, float]:
+    """Read what the user has measured.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Such as ``Z=12um``, ``z_at_200=0.012mm``.
+
+    Returns
+    -------
+    dict of str to float
+        By axis (upper case) or target [um].
+
+    Raises
+    ------
+    InputError
+        Not of that form, or named twice.
+    """
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, value = (part.strip() for part in text.partition("="))
+        name = name.upper() if len(name) == 1 else name
+        number = with_unit(value, "displacement")
+        if not name or number is None:
+            raise InputError(f"measured {text!r}: want an axis or target, and a value with its unit, such as Z=12um")
+        if name in found:
+            raise InputError(f"measured {text!r}: {name} was given before")
+        found[name] = number
+    return found
+
+
+def left(
+    stations: Sequence[Station],
+    states: Sequence[State],
+    zeros: Sequence[float],
+    doubts: Sequence[float],
+    *,
+    zero_known: bool,
+) -> JobState:
+    """Return what the next job can start from.
+
+    Parameters
+    ----------
+    stations : sequence of Station
+    states : sequence of State
+        Of their models.
+    zeros, doubts : sequence of float
+        Per station, see `StationState` [um].
+    zero_known : bool
+        The zeros are no predictions.
+
+    Returns
+    -------
+    JobState
+    """
+    kept = []
+    for station, state, zero, doubt in zip(stations, states, zeros, doubts, strict=True):
+        memory = np.empty(0) if state.memory is None else state.memory
+        kept.append(
+            StationState(
+                str(station),
+                station.model.target,
+                identity(station.model),
+                tuple(state.reference.tolist()),
+                tuple(memory.tolist()),
+                float(state.deviation),
+                zero,
+                doubt,
+            )
+        )
+    return JobState(tuple(kept), zero_known)
+
+
+def identity(model: ErrorModel) -> str:
+    """Return a hash of the numbers a model is made of; where it comes from and how it was judged do not matter."""
+    numbers = {k: v for k, v in asdict(model).items() if k not in ("provenance", "honest_error")}
+    return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
+
+
+def _names(station: Station) -> list[str]:
+    """Return how a measured deviation of a station may be named, the best first; its axis is another name."""
+    target = station.model.target
+    return [n for n in (target.removesuffix("_um"), target) if n != station.axis]
+
+
+def _resting(model: ErrorModel, wiring: Wiring, speed: float) -> State:
+    """Return the state of a machine that has settled at a constant speed."""
+    return model.step(model.init(), wiring.values(0.0, speed), 0.0)[0]
+
+
+def _restored(model: ErrorModel, saved: StationState) -> State:
+    if saved.model != identity(model):
+        raise InputError(
+            f"the last job left a state of another model of {saved.target}: it was fitted or altered since; start cold "
+            "or measured, or use the model of that job"
+        )
+    inputs = np.array(saved.reference)
+    shape = inputs.shape
+    if shape == (len(model.inputs),):
+        begun = model.step(model.init(inputs), inputs, 0.0)[0]
+        assert begun.memory is not None
+        shape = begun.memory.shape
+        if len(saved.memory) == shape[0]:
+            return begun._replace(memory=np.array(saved.memory), deviation=np.array(saved.deviation))
+    raise InputError(f"the state that the last job left of {saved.station} is not complete; start cold or measured")
+
+
+def _explaining(
+    stations: Sequence[Station], seen: Sequence[Station], others: Inputs, deviation: float
+) -> tuple[list[State], float]:
+    """Return states of the stations of an axis, the spindle standing still, and the speed [1/min] that leaves them.
+
+    The mean over those that were seen is the measured deviation [um].
+    """
+    what = seen[0].model.target if len(seen) == 1 else f"{seen[0].axis} (the mean of {len(seen)} models)"
+    if not math.isfinite(deviation):
+        raise InputError(f"measured deviation of {what}: {deviation} um is not a finite number")
+    for model in (s.model for s in stations):
+        if not model.remembers:
+            raise InputError(
+                f"model of {model.target} has no memory: what it says follows from the inputs of the moment alone, it "
+                "cannot start from a measured deviation; start cold"
+            )
+    wirings = {str(s): Wiring(s.model, others) for s in stations}
+    if len(stations) == 1 and isinstance(stations[0].model, Ticking):
+        return [_begun(stations[0].model, wirings[str(stations[0])], deviation)], math.nan
+    for model in (s.model for s in stations):
+        if not any(i.quantity == SPEED for i in model.inputs):
+            raise InputError(
+                f"model of {model.target} is not driven by the spindle speed: no speed explains a measured deviation; "
+                "start cold or carry the state of the last job over"
+            )
+
+    def stopped(station: Station, speed: float) -> State:
+        return _stopped(station.model, wirings[str(station)], speed)
+
+    def too_much(speed: float) -> float:
+        return sum(float(stopped(s, speed).deviation) for s in seen) / len(seen) - deviation
+
+    speeds = [i for s in stations for i in s.model.inputs if i.quantity == SPEED]
+    low = max(*(i.reference + i.low for i in speeds), 0.0)
+    high = min(i.reference + i.high for i in speeds)
+    tried = np.linspace(low, max(low, high), _TRIED).tolist()
+    excess = [too_much(n) for n in tried]
+    for k, found in enumerate(excess):
+        exact = abs(found) <= _CLOSE
+        if exact or (k and (found > 0) != (excess[k - 1] > 0)):
+            speed = tried[k] if exact else _bisected(too_much, tried[k - 1], tried[k])
+            return [stopped(s, speed) for s in stations], speed
+    reach = [e + deviation for e in excess]
+    raise InputError(
+        f"measured deviation of {what}: {deviation:g} um; no speed from {low:g} to {high:g} 1/min leaves it: "
+        f"the model goes from {min(reach):.3g} to {max(reach):.3g} um; check sign and zero of the measurement"
+    )
+
+
+def _stopped(model: ErrorModel, wiring: Wiring, speed: float) -> State:
+    """Return the state of a machine that has settled at a constant speed, as soon as the spindle stops."""
+    if isinstance(model, Ticking):
+        reference, inputs = model.init().reference, wiring.values(0.0, speed)
+        begun = model.begin_at(0.0, inputs, np.where(np.isnan(reference), inputs, reference))
+        _, settled = model.step(begun, inputs, _LONG)
+        return _begun(model, wiring, float(settled))
+    return model.step(_resting(model, wiring, speed), wiring.values(0.0, 0.0), 0.0)[0]
+
+
+def _begun(model: Ticking, wiring: Wiring, deviation: float) -> State:
+    """Return the state of an autoregressive model that is told its past."""
+    still, reference = wiring.values(0.0, 0.0), model.init().reference
+    return model.begin_at(deviation, still, np.where(np.isnan(reference), still, reference))
+
+
+def _bisected(too_much: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function with another sign at either end is zero, as closely as numbers can."""
+    rising = too_much(low) <= 0
+    while low < (middle := 0.5 * (low + high)) < high:
+        if (too_much(middle) <= 0) == rising:
+            low = middle
+        else:
+            high = middle
+    return min(low, high, key=lambda n: abs(too_much(n)))

@@ -1,0 +1,205 @@
+"""The online step over all readings of a test at once: what a replay is judged by.
+
+The same gate, models and limits as `thermocomp.runtime.compensator`, without the cost of one call per reading; a test
+holds the two together. The readings come when they were taken: none is stale, and the clock is their time.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.correction import Correction, Deviation, Limits
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.zero import Gathered, begin, centre, first_rows
+from thermocomp.runtime import compensator
+from thermocomp.runtime.limits import limited
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class Run(NamedTuple):
+    """What a model says in a test, and what a compensator with it does."""
+
+    deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, nothing is limited
+    compensated: FloatArray  #: (n_rows,), minus the correction in force: what is taken off the deviation
+    outside: BoolArray  #: (n_rows,), an input of the model alone was outside the trained range
+    rejected: BoolArray  #: (n_rows,), complete readings that the gate turned away
+    why: str  #: the first of them; empty if there is none
+
+
+def run(
+    model: ErrorModel,
+    limits: Limits | None,
+    time: FloatArray,
+    values: FloatArray,
+    *,
+    reference: Sequence[float] | FloatArray | None = None,
+    resting: BoolArray | None = None,
+    anew: int | None = None,
+) -> Run:
+    """Run a model, and a compensator with it, through a test.
+
+    Parameters
+    ----------
+    model : ErrorModel
+        Of any unit; refused or not: it is being judged.
+    limits : Limits or None
+        None: the correction follows the model at once, as for a model that predicts another unit than that of limits.
+    time : ndarray of shape (n_rows,)
+        Rising [s].
+    values : ndarray of shape (n_rows, n_inputs)
+        In the order of the model's inputs; nan where a value is missing.
+    reference : array-like of shape (n_inputs,), optional
+        What counts as zero; see `ErrorModel.init`.
+    resting : ndarray of bool of shape (n_rows,), optional
+        The spindle is known to stand; nowhere if not given.
+    anew : int, optional
+        Row from which deviations count anew: from there it is the model minus what it says there, on average over the
+        rows that a zero is taken of, and the correction begins at zero again.
+
+    Returns
+    -------
+    Run
+    """
+    stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
+    complete = np.asarray(np.isfinite(values).all(axis=1))
+    gate = _gated(model, time, values, stands, model.init(reference).reference)
+    zero, rested = begun(model, time, values, stands, complete, reference)
+    alone, outside = _said(model, time, rested, complete, zero)
+    same = np.array_equal(gate.passed, complete)
+    gated = alone if same else _said(model, time, *_of_gate(values, gate))[0]
+    known = gate.known
+    if anew is not None:
+        alone, _ = _counted(alone, model, time, complete, stands, anew)
+        gated, known = _counted(gated, model, time, gate.passed, stands, anew)
+    return Run(alone, _moved(gated, gate.passed, time, limits, known), outside, complete & ~gate.passed, gate.why)
+
+
+def begun(
+    model: ErrorModel,
+    time: FloatArray,
+    values: FloatArray,
+    resting: BoolArray,
+    usable: BoolArray,
+    reference: Sequence[float] | FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Find what counts as zero for a model in a test.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    time : ndarray of shape (n_rows,)
+        [s]
+    values : ndarray of shape (n_rows, n_inputs)
+    resting, usable : ndarray of bool of shape (n_rows,)
+    reference : array-like of shape (n_inputs,), optional
+        What is known of it; see `ErrorModel.init`.
+
+    Returns
+    -------
+    zero : ndarray of shape (n_inputs,)
+        nan where it is not known, for there is no reading.
+    values : ndarray of shape (n_rows, n_inputs)
+        With the readings of the zero taken as their mean.
+    """
+    return begin(model.zeroing, model.init(reference).reference, time, values, resting, usable)
+
+
+class _Gate(NamedTuple):
+    passed: BoolArray  #: (n_rows,)
+    zero: FloatArray  #: (n_inputs,)
+    known: int  #: the row in which it is known, and the correction begins to move
+    why: str  #: the first complete reading that did not pass
+    window: list[int]  #: rows of the zero
+
+
+def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Return the readings with those of the zero taken as their mean, which of them pass, and the zero."""
+    rested = values.copy()
+    if gate.window:
+        rested[gate.window] = centre(values[gate.window])
+    return rested, gate.passed, gate.zero
+
+
+def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
+    """Return the readings that pass the gate of the online step."""
+    complete = np.asarray(np.isfinite(values).all(axis=1))
+    passed, why, known, window = complete.copy(), "", 0, list[int]()
+    if np.isnan(zero).any():  # the first readings that pass decide what counts as zero
+        gathered, known = Gathered(), len(time)
+        for row in np.flatnonzero(complete).tolist():
+            found = compensator.implausible(model, values[row].tolist(), zero.tolist())
+            if found:
+                passed[row], why = False, why or found
+                continue
+            if gathered.belongs(model.zeroing, float(time[row]), bool(stands[row])):
+                gathered = gathered.add(float(time[row]), values[row], bool(stands[row]))
+                window.append(row)
+                if not gathered.complete(model.zeroing):
+                    continue
+            known = row
+            break
+        if gathered.times:
+            zero = np.where(np.isnan(zero), centre(gathered.values), zero)
+    later = slice(min(known + 1, len(time)) if known else 0, None)
+    bounds = [compensator.plausible(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
+    low, high = np.array(bounds).reshape(-1, 2).T
+    with np.errstate(invalid="ignore"):
+        passed[later] &= ((values[later] >= low) & (values[later] <= high)).all(axis=1)
+    turned = np.flatnonzero(complete & ~passed)
+    if turned.size and not why:
+        why = compensator.implausible(model, values[turned[0]].tolist(), zero.tolist())
+    return _Gate(passed, zero, known, why, window)
+
+
+def _counted(
+    deviation: FloatArray, model: ErrorModel, time: FloatArray, used: BoolArray, stands: BoolArray, anew: int
+) -> tuple[FloatArray, int]:
+    """Return deviations minus those where they count anew, and the row from which the correction moves again."""
+    own = anew + np.flatnonzero(used[anew:])
+    count, known = first_rows(model.zeroing, time[own], stands[own])
+    shift = float(deviation[own[:count]].mean()) if count else 0.0
+    return deviation - shift, int(own[known]) if known < len(own) else len(time)
+
+
+def _said(
+    model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return deviation and whether an input was outside, per row; a reading that is not used holds the last one."""
+    rows = np.flatnonzero(used)
+    deviation, outside = np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_)
+    beyond: BoolArray
+    if not rows.size:
+        return deviation, outside
+    state = model.init()._replace(reference=zero)
+    if model.remembers or model.support.policy == "hold":
+        said, beyond = np.empty(len(rows)), np.empty(len(rows), dtype=np.bool_)
+        last = float(time[rows[0]])
+        for k, row in enumerate(rows.tolist()):
+            state, said[k] = model.step(state, values[row], float(time[row]) - last)
+            beyond[k], last = bool(state.outside.any()), float(time[row])
+    else:  # each reading stands alone: all in one step
+        state, each = model.step(state, values[rows], 0.0)
+        said, beyond = np.broadcast_to(each, rows.shape), np.asarray(state.outside.any(axis=-1))
+    before = np.cumsum(used) - 1  # the last reading that was used, per row
+    known = before >= 0
+    deviation[known], outside[known] = said[before[known]], beyond[before[known]]
+    return deviation, outside
+
+
+def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: Limits | None, known: int) -> FloatArray:
+    """Return minus the correction in force after each reading; it stays zero until the row `known`."""
+    if limits is None:
+        return np.where(np.arange(len(time)) < known, 0.0, deviation)
+    found, offset = np.zeros(len(time)), 0.0
+    travels = np.minimum(np.diff(time, prepend=time[:1]), limits.reading_age).tolist()
+    for k in range(known, len(time)):
+        if passed[k] and math.isfinite(deviation[k]):
+            wanted = Correction.opposing(Deviation(float(deviation[k])))
+            offset = limited(wanted.offset, offset, travels[k], limits)
+        found[k] = 0.0 - offset
+    return found

@@ -1,0 +1,84 @@
+"""Random programs, and all those of the linuxcnc package: revised rightly, judged by its interpreter, or refused."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from nc_interpreter import PROGRAMS, needs_programs
+from nc_law import Growing, Steady, Still, Trial, revise
+from random_programs import programs
+
+from thermocomp.adapters.linuxcnc import rs274
+from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.rewrite import header
+
+pytestmark = pytest.mark.usefixtures("interpreter")
+
+
+def tried(path: Path, folder: Path, drift: Steady, way: str, every: float | None = None) -> Trial | InputError:
+    """Return a revised program, or why it was refused."""
+    try:
+        return revise(path, folder, drift, way, every=every)
+    except InputError as error:
+        return error
+
+
+@given(programs, st.sampled_from(["coordinates", "offset"]), st.sampled_from([None, 5.0]))
+@example("G21 G90\nF100 S1000 M3\nG1 X0\nG17 G90 G81 X1 Z-1 R0.2\nG98 X2\nG80\nM2\n", "coordinates", None)
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+def test_a_random_program_keeps_the_law_or_is_refused(
+    tmp_path_factory: pytest.TempPathFactory, text: str, way: str, every: float | None
+) -> None:
+    folder = tmp_path_factory.mktemp("law")
+    path = folder / "program.ngc"
+    path.write_text(text)
+    trial = tried(path, folder, Growing(), way, every)
+    if isinstance(trial, Trial):
+        trial.proved()
+    elif isinstance(trial, ProgramError):
+        assert "please report" not in trial.reason  # it has not passed its own check
+    else:
+        assert "is no thermal drift" in str(trial)  # a program of hours, a drift of 0.1 um/s
+
+
+@needs_programs
+@pytest.mark.parametrize("way", ["coordinates", "offset"])
+def test_the_programs_of_linuxcnc_as_they_are(way: str, tmp_path: Path) -> None:
+    """As text, without unrolling; see test_expanded_law for those with loops and subprograms."""
+    counts: Counter[str] = Counter()
+    for path in sorted(PROGRAMS.rglob("*.ngc")):
+        try:
+            for _ in rs274.read(path):
+                pass
+        except ProgramError:
+            counts["refused by the interpreter"] += 1
+            continue
+        trial = tried(path, tmp_path, Growing(rate=(0.01, -0.01, 0.02)), way)
+        if isinstance(trial, Trial):
+            trial.proved()
+            counts["revised"] += 1
+        else:
+            assert isinstance(trial, ProgramError)
+            assert trial.line >= 1
+            assert "please report" not in trial.reason
+            counts["refused"] += 1
+    print(f"{way}: {dict(counts)} of {counts.total()}")
+    assert counts["revised"] >= 15
+
+
+@needs_programs
+def test_without_drift_the_programs_stay_as_they_are(tmp_path: Path) -> None:
+    marks = "".join(header.blank("\n")).encode()
+    compared = 0
+    for path in sorted(PROGRAMS.glob("*.ngc")):
+        try:
+            trial = revise(path, tmp_path, Still(), "coordinates")
+        except ProgramError:
+            continue
+        assert trial.revised.read_bytes().replace(b"\r\n", b"\n").replace(marks, b"") == path.read_bytes().replace(
+            b"\r\n", b"\n"
+        )
+        compared += 1
+    assert compared >= 15

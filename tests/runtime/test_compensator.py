@@ -1,0 +1,322 @@
+"""The online step: a dead, stale or absurd reading never moves an axis."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import RULES, HonestError, Input
+from thermocomp.core.reading import Reading
+from thermocomp.core.zero import Zeroing
+from thermocomp.runtime import compensator
+from thermocomp.runtime.limits import limited
+
+OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
+
+
+def model(target: str = "z", unit: str = "um") -> LinearDynamic:
+    return LinearDynamic(
+        target=target,
+        unit=unit,
+        inputs=(
+            Input("t", "temperature", "degC", 20.0, True, -50.0, 50.0),
+            Input("n", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0),
+        ),
+        signals=((0,), (1,)),
+        direct=(2.0, 0.0),
+        lag_signals=(1,),
+        time_constants=(600.0,),
+        lagged=(0.01,),
+    )
+
+
+def reading(time: float, t: float, n: float = 0.0) -> Reading:
+    return Reading(time, {"t": t, "n": n})
+
+
+def warmed() -> compensator.OnlineState:
+    state = compensator.start([model()])
+    for k in range(10):
+        state, result = compensator.step([model()], OPEN, state, reading(10.0 * k, 20.0 + k, 3000.0), 10.0 * k)
+        assert not result.rejected
+    return state
+
+
+def test_open_limits_give_minus_the_replayed_deviation() -> None:
+    """What is judged in a replay is what runs live, to the last bit."""
+    frozen, rng = model(), np.random.default_rng(3)
+    state, replayed = compensator.start([frozen]), frozen.init()
+    last = 0.0
+    for k in range(50):
+        time, t, n = 10.0 * k + rng.uniform(0, 5), 20 + rng.normal(), rng.uniform(0, 5000)
+        state, result = compensator.step([frozen], OPEN, state, reading(time, t, n), time)
+        replayed, deviation = frozen.step(replayed, np.array([t, n]), time - last if k else 0.0)
+        last = time
+        if k:
+            assert result.corrections["z"].offset == -float(deviation)
+
+
+bad_number = st.sampled_from([math.nan, math.inf, -math.inf, 1e30, -273.15, 850.0])
+
+
+@given(
+    value=bad_number,
+    channel=st.sampled_from(["t", "n", "time", "missing", "stale", "past", "same", "future", "text", "truth"]),
+)
+def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) -> None:
+    state = warmed()
+    good = {"t": 25.0, "n": 1000.0}
+    time, now = 100.0, 100.0
+    if channel == "missing":
+        del good["t"]
+    elif channel == "stale":
+        now = time + 2e9
+    elif channel == "future":
+        time = now + 60.0
+    elif channel in ("text", "truth"):
+        good["t"] = "25.0" if channel == "text" else True  # type: ignore[assignment]
+    elif channel == "past":
+        time = 5.0
+    elif channel == "same":
+        time = state.time or 0.0
+    elif channel == "time":
+        time = value if not math.isfinite(value) else math.nan
+    else:
+        good[channel] = value if channel == "t" or not math.isfinite(value) else 1e9
+    after, result = compensator.step([model()], OPEN, state, Reading(time, good), now)
+    assert result.rejected
+    assert after._replace(clock=state.clock) == state
+    assert result.corrections["z"] == state.corrections[0]
+
+
+def test_the_reason_names_the_channel() -> None:
+    _, result = compensator.step([model()], OPEN, compensator.start([model()]), reading(0.0, math.nan), 0.0)
+    assert result.rejected == "t = nan degC is not plausible"
+
+
+@example(target=67.0, current=1.3340758758793854, dt=7.0, magnitude=66.20264931370188, rate=10.0, dead_band=0.0)
+@given(
+    target=st.floats(),
+    current=st.floats(-50, 50),
+    dt=st.floats(),
+    magnitude=st.floats(1, 100),
+    rate=st.floats(0.01, 10),
+    dead_band=st.floats(0, 5),
+)
+def test_limits_hold_for_any_number(
+    target: float, current: float, dt: float, magnitude: float, rate: float, dead_band: float
+) -> None:
+    limits = Limits(magnitude, rate, dead_band)
+    current = max(-magnitude, min(magnitude, current))
+    new = limited(target, current, dt, limits)
+    assert math.isfinite(new)
+    assert abs(new) <= magnitude
+    if not (math.isfinite(target) and math.isfinite(dt) and dt > 0):
+        assert new == current
+    else:
+        assert abs(new - current) <= rate * dt * (1 + 1e-9) + 1e-9
+        assert new == current or abs(max(-magnitude, min(magnitude, target)) - current) > dead_band
+
+
+def test_rate_limit_is_reached_over_time() -> None:
+    limits = Limits(magnitude=100.0, rate=0.1, reading_age=60.0)
+    state = compensator.start([model()])
+    state, _ = compensator.step([model()], limits, state, reading(0.0, 20.0), 0.0)
+    for k in range(1, 8):
+        state, result = compensator.step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
+        assert result.corrections["z"].offset == pytest.approx(-min(4.0, 1.0 * k))
+
+
+@pytest.mark.parametrize("value", [0.0, 85.0, 119.9])
+def test_a_sensor_that_fails_within_what_sensors_can_say(value: float) -> None:
+    """Trained from -5 to 15 degC about a zero of 31 degC: what is a span further away is a broken sensor."""
+    frozen = model()
+    narrow = replace(frozen, inputs=(replace(frozen.inputs[0], reference=31.0, low=-5.0, high=15.0), frozen.inputs[1]))
+    cold = compensator.start([narrow])
+    _, result = compensator.step([narrow], OPEN, cold, reading(0.0, value), 0.0)
+    assert "t = " in result.rejected  # it would have become the zero
+    state, _ = compensator.step([narrow], OPEN, cold, reading(0.0, 26.0), 0.0)
+    state, before = compensator.step([narrow], OPEN, state, reading(10.0, 30.0), 10.0)
+    after, result = compensator.step([narrow], OPEN, state, reading(20.0, value), 20.0)
+    assert result.rejected.endswith("is not plausible")
+    assert result.corrections == before.corrections
+    assert after.models is state.models
+
+
+def test_a_refused_model_does_not_start() -> None:
+    refused = HonestError("p", 1.0, 1.0, 1.0, 1.0, 1.0, {}, "refused", "worse than none", rules=RULES)
+    with pytest.raises(InputError, match="was refused and will not run: worse than none"):
+        compensator.start([replace(model(), honest_error=refused)])
+    assert compensator.start([replace(model(), honest_error=replace(refused, verdict="accepted"))])
+
+
+@pytest.mark.parametrize("silent", [True, False])
+def test_an_outage_does_not_end_in_a_jump(silent: bool) -> None:
+    """Half an hour without a usable reading: the rate limit saves no travel up."""
+    limits = Limits(magnitude=1000.0, rate=0.05, reading_age=60.0)
+    state = compensator.start([model()])
+    for k in range(3):
+        state, _ = compensator.step([model()], limits, state, reading(10.0 * k, 20.0), 10.0 * k)
+    if not silent:
+        for k in range(3, 180):
+            state, result = compensator.step([model()], limits, state, reading(10.0 * k, math.nan), 10.0 * k)
+            assert result.rejected
+    _, result = compensator.step([model()], limits, state, reading(1800.0, 60.0), 1800.0)
+    assert not result.rejected
+    travelled = abs(result.corrections["z"].offset)
+    assert 0 < travelled <= limits.rate * (limits.reading_age if silent else 10.0) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("rejected", [True, False])
+def test_a_clock_that_goes_back_saves_no_travel_up(rejected: bool) -> None:
+    """0.1 um/s for 0.2 s is 0.02 um, whatever the clock did in between; it used to be 6.0 um."""
+    limits = Limits(magnitude=1000.0, rate=0.1, reading_age=60.0)
+    state = compensator.start([model()])
+    for k in range(3):
+        t = 40.0 if k else 20.0
+        state, before = compensator.step([model()], limits, state, reading(100.0 + 0.1 * k, t), 100.0 + 0.1 * k)
+    state, _ = compensator.step([model()], limits, state, reading(100.25, math.nan if rejected else 40.0), 40.0)
+    after, result = compensator.step([model()], limits, state, reading(100.4, 60.0), 100.4)
+    assert not result.rejected
+    moved = abs(result.corrections["z"].offset - before.corrections["z"].offset)
+    assert moved == pytest.approx(0.1 * 0.2)
+    assert after.clock == 100.4
+
+
+@given(st.lists(st.tuples(st.floats(-100.0, 100.0), st.booleans()), min_size=2, max_size=30))
+def test_all_travel_fits_into_the_time_that_went_by(steps: list[tuple[float, bool]]) -> None:
+    """Whatever the clock does: the way is at most the rate times how far the clock ever got."""
+    limits = Limits(magnitude=1000.0, rate=0.1, reading_age=60.0)
+    state, _ = compensator.step([model()], limits, compensator.start([model()]), reading(1000.0, 20.0), 1000.0)
+    way, now, offset = 0.0, 1000.0, 0.0
+    for k, (jump, dead) in enumerate(steps):
+        now += jump
+        state, result = compensator.step([model()], limits, state, reading(now, math.nan if dead else 20.0 + k), now)
+        way += abs(result.corrections["z"].offset - offset)
+        offset = result.corrections["z"].offset
+    assert state.clock is not None
+    assert way <= limits.rate * (state.clock - 1000.0) * (1 + 1e-9) + 1e-9
+
+
+def three_sensors(quantity: str = "temperature", unit: str = "degC") -> LinearDynamic:
+    inputs = [Input(f"t{k}", "temperature", "degC", 20.0 + k, True, -1.0, 4.0) for k in range(3)]
+    return replace(
+        model(), inputs=(*inputs, Input("q", quantity, unit, 0.0, False, 0.0, 5.0)), signals=((0,), (1,), (2,), (3,)),
+        direct=(1.0, 1.0, 1.0, 1.0), lag_signals=(), time_constants=(), lagged=()
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("off", [-24.9, -12.0, 12.0, 24.9])
+def test_one_sensor_that_is_off_at_the_start_is_no_zero(off: float) -> None:
+    """It would have been the zero: the machine compensated from 25 degC beside it for the rest of the day."""
+    models = [three_sensors("dimensionless", "1")]
+    begin = {"t0": 14.0, "t1": 15.2, "t2": 16.1 + off, "q": 1.0}
+    state, result = compensator.step(models, OPEN, compensator.start(models), Reading(0.0, begin), 0.0)
+    assert result.rejected.startswith(f"t2 = {16.1 + off:g} degC is not plausible as a start")
+    assert math.isnan(state.models[0].reference[2])
+    good = begin | {"t2": 16.1}  # a workshop 6 degC colder than that of the training is one
+    state, result = compensator.step(models, OPEN, state, Reading(1.0, good), 1.0)
+    assert not result.rejected
+    assert state.models[0].reference.tolist() == [14.0, 15.2, 16.1, 0.0]
+
+
+def test_a_machine_far_from_all_that_was_trained_does_not_start() -> None:
+    models = [three_sensors("dimensionless", "1")]
+    hot = Reading(0.0, {"t0": 40.0, "t1": 41.0, "t2": 42.0, "q": 1.0})
+    _, result = compensator.step(models, OPEN, compensator.start(models), hot, 0.0)
+    assert result.rejected.endswith("the machine is +20.0 degC from the zero of its training")
+
+
+@pytest.mark.parametrize(("quantity", "unit"), [("displacement", "um"), ("dimensionless", "1"), ("feed", "mm/min")])
+def test_what_nature_sets_no_bounds_to_has_those_of_the_training(quantity: str, unit: str) -> None:
+    models = [three_sensors(quantity, unit)]
+    begin = {"t0": 20.0, "t1": 21.0, "t2": 22.0}
+    state = compensator.start(models)
+    for time, value in enumerate([1e300, 1.0, -1e300, 1e300, math.inf]):
+        now = float(time)
+        state, result = compensator.step(models, OPEN, state, Reading(now, begin | {"q": value}), now)
+        assert bool(result.rejected) == (value != 1.0)
+        assert result.rejected in ("", f"q = {value} {unit} is not plausible")
+    _, result = compensator.step(models, OPEN, state, Reading(9.0, begin | {"q": 20.0}), 9.0)
+    assert not result.rejected  # outside the trained range, but of its size: the model's support says what to do
+
+
+AVERAGING = Zeroing(300.0, 10.0, "n")
+
+
+def live(
+    models: list[LinearDynamic], rows: list[tuple[float, float, float]]
+) -> list[tuple[compensator.OnlineState, float]]:
+    """Return the state and the correction after each reading (time, t, n)."""
+    state, found = compensator.start(models), []
+    for time, t, n in rows:
+        state, result = compensator.step(models, OPEN, state, reading(time, t, n), time)
+        found.append((state, result.corrections["z"].offset))
+    return found
+
+
+def test_the_zero_is_the_mean_of_the_first_minutes_at_rest() -> None:
+    """The correction is zero until it is known; then it is as if it had been known from the first reading on."""
+    averaging, rng = replace(model(), zeroing=AVERAGING), np.random.default_rng(5)
+    temperatures = 20 + 0.4 * rng.normal(size=40)
+    rows = [(15.0 * k, float(t), 0.0) for k, t in enumerate(temperatures)]
+    found = live([averaging], rows)
+    assert [offset for _, offset in found[:20]] == [0.0] * 20
+    zero = float(found[20][0].models[0].reference[0])
+    assert zero == pytest.approx(temperatures[:21].mean(), abs=0.1)
+    assert abs(zero - 20) < 0.25 < abs(temperatures - 20).max()
+    state, last = averaging.init([zero, 0.0]), 0.0
+    for k, (time, t, n) in enumerate(rows):
+        # the readings of the zero say their mean: the machine rests in it
+        state, deviation = averaging.step(state, np.array([zero if k <= 20 else t, n]), time - last)
+        last = time
+        if k >= 20:
+            assert found[k][1] == -float(deviation)
+    assert all(not s.gathered[0].times for s, _ in found[20:])
+
+
+def test_the_zero_ends_where_the_spindle_starts() -> None:
+    rows = [(15.0 * k, 20.0 + 0.1 * (k % 2), 0.0) for k in range(4)] + [(15.0 * k, 30.0, 3000.0) for k in range(4, 9)]
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    assert [offset for _, offset in found[:4]] == [0.0] * 4
+    assert found[4][0].models[0].reference[0] == pytest.approx(20.05)
+    assert found[4][1] == pytest.approx(-2 * 9.95 - 0.01 * 3000 * -math.expm1(-15 / 600))
+
+
+def test_a_spindle_that_turns_from_the_first_reading_keeps_the_zero_short() -> None:
+    """Ten seconds, not five minutes: the machine warms up meanwhile."""
+    for n, speed in ((3000.0, "n"), (0.0, "")):  # it turns; or nothing says that it stands
+        zeroing = Zeroing(300.0, 10.0, speed)
+        found = live([replace(model(), zeroing=zeroing)], [(2.0 * k, 20.0 + 0.02 * k, n) for k in range(20)])
+        assert found[5][0].models[0].reference[0] == pytest.approx(20.05)
+        assert found[4][1] == 0.0
+    once_a_minute = live([replace(model(), zeroing=AVERAGING)], [(60.0 * k, 20.0 + k, 3000.0) for k in range(3)])
+    assert once_a_minute[1][0].models[0].reference[0] == 20.0
+    assert once_a_minute[0][1] == 0.0 > once_a_minute[1][1]
+
+
+def test_an_outlier_and_a_dead_reading_are_not_in_the_zero() -> None:
+    rows = [(15.0 * k, 20.0 + 0.01 * (k % 3), 0.0) for k in range(21)]
+    rows[3], rows[7] = (45.0, 27.0, 0.0), (105.0, math.nan, 0.0)  # 7 degC off is no machine that does not start
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    assert found[-1][0].models[0].reference[0] == pytest.approx(20.01, abs=0.002)
+
+
+def test_outside_inputs_are_told() -> None:
+    state = compensator.start([model()])
+    state, _ = compensator.step([model()], OPEN, state, reading(0.0, 20.0), 0.0)
+    _, result = compensator.step([model()], OPEN, state, reading(1.0, 140.0), 1.0)
+    assert result.outside == ("t",)
+
+
+def test_start_refuses_what_it_cannot_correct() -> None:
+    with pytest.raises(InputError, match="two models for the same target"):
+        compensator.start([model(), model()])
+    with pytest.raises(InputError, match="predicts urad"):
+        compensator.start([model(unit="urad")])
