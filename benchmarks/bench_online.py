@@ -1,7 +1,7 @@
-"""One live sample: the online step and the frozen model beside their estimator and a scikit-learn pipeline.
+"""One live sample: the compensator and the frozen model beside their estimator and a scikit-learn pipeline.
 
 Run with ``python benchmarks/bench_online.py``. All sides are timed in turn in one run, on the same readings; frozen
-model and estimator must say the same to 1e-12 relative. Goal: the median online step takes at most 50 us.
+model and estimator must say the same to 1e-12 relative. Goal: the median step of the compensator takes at most 50 us.
 """
 
 import sys
@@ -19,7 +19,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.model import Input
 from thermocomp.core.reading import Reading
 from thermocomp.models.dynamic import DynamicRidge
-from thermocomp.runtime import compensator
+from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]
 
@@ -76,11 +76,12 @@ def main() -> int:
     print(f"frozen model against its estimator, {N_ROWS} rows: largest relative difference {worst:.1e} (goal 1e-12)")
 
     readings = [Reading(30.0 * k, dict(zip(names, row.tolist(), strict=True))) for k, row in enumerate(X)]
-    limits, live, last = Limits(), compensator.start([model]), model.init()
+    compensator, last = Compensator.of([model], Limits()), model.init()
+    live = compensator.start()
 
-    def online_step(k: int) -> None:
+    def compensator_step(k: int) -> None:
         nonlocal live
-        live, _ = compensator.step([model], limits, live, readings[k], readings[k].time)
+        live, _ = compensator.step(live, readings[k], readings[k].time)
 
     def model_step(k: int) -> None:
         nonlocal last
@@ -88,7 +89,7 @@ def main() -> int:
 
     pipeline = make_pipeline(StandardScaler(), Ridge()).fit(X, y)
     rows = [
-        ("online step: gate, model, limits", percentiles(online_step, 3000)),
+        ("compensator: gate, model, limits", percentiles(compensator_step, 3000)),
         (f"frozen model alone ({len(names)} inputs, {len(estimator.coef_)} features)", percentiles(model_step, 3000)),
         ("scikit-learn pipeline, one row, no dynamics", percentiles(lambda k: pipeline.predict(X[k : k + 1]), 1500)),
     ]

@@ -1,4 +1,4 @@
-"""Compare, fit, assess: trained on what may be seen, replayed through the online step, judged on the rest."""
+"""Compare, fit, assess: trained on what may be seen, replayed through the compensator, judged on the rest."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.runtime import compensator
+from thermocomp.runtime.compensator import Compensator
 
 METHOD_NAMES = sorted(METHODS)
 
@@ -141,16 +141,17 @@ def test_skipped_rows_make_no_difference(policy: str, recording: Recording, samp
     assert beyond[block].any()
 
 
-def test_replay_is_what_the_online_step_commands(samples: Samples) -> None:
+def test_replay_is_what_the_compensator_commands(samples: Samples) -> None:
     model = train("dynamic", samples, 0, np.ones(len(samples), np.bool_)).model
     rows = np.arange(len(samples)) < 120
     predicted, _ = replay(model, samples, rows)
     limits = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
-    state = compensator.start([model])
+    compensator = Compensator.of([model], limits)
+    state = compensator.start()
     names = [c.name for c in samples.inputs]
     for k in range(120):
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k], strict=True)))
-        state, result = compensator.step([model], limits, state, reading, reading.time)
+        state, result = compensator.step(state, reading, reading.time)
         if k:
             assert result.corrections["z_um"].offset == -predicted[k]
 
@@ -160,10 +161,11 @@ def test_judged_is_what_would_run(recording: Recording, samples: Samples) -> Non
     everything = np.ones(len(samples), np.bool_)
     model = train("dynamic", samples, 0, everything).model
     limits = Limits(magnitude=8.0, rate=0.002, dead_band=0.5)
-    state, names, commanded = compensator.start([model]), [c.name for c in samples.inputs], []
+    compensator = Compensator.of([model], limits)
+    state, names, commanded = compensator.start(), [c.name for c in samples.inputs], []
     for k in range(len(samples)):
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k].tolist(), strict=True)))
-        state, result = compensator.step([model], limits, state, reading, reading.time)
+        state, result = compensator.step(state, reading, reading.time)
         commanded.append(-result.corrections["z_um"].offset)
     everywhere = splits.Split("all", ~everything, everything)
     a = judge("dynamic", model, samples, everywhere, robustness=False, limits=limits)

@@ -24,8 +24,7 @@ from thermocomp.files import modelfile
 from thermocomp.models.covering import cover
 from thermocomp.models.training import train
 from thermocomp.recording.samples import stack
-from thermocomp.runtime.compensator import TOGETHER, start
-from thermocomp.runtime.compensator import step as online_step
+from thermocomp.runtime.compensator import TOGETHER, Compensator
 
 FloatArray = NDArray[np.float64]
 
@@ -236,9 +235,10 @@ def test_size_in_the_file_is_limited() -> None:
 def test_the_online_step_says_it() -> None:
     m = model("clip")
     limits = Limits(magnitude=50.0, rate=1.0, dead_band=0.0, reading_age=60.0)
-    state = start([m])
+    compensator = Compensator.of([m], limits)
+    state = compensator.start()
     readings = [({"a": 2.0, "b": 4.0, "s": 1000.0}, ()), ({"a": 2.0, "b": 4.0, "s": 2000.0}, (TOGETHER,))]
     for k, (values, told) in enumerate(readings):
-        state, result = online_step([m], limits, state, Reading(float(k), values), float(k))
+        state, result = compensator.step(state, Reading(float(k), values), float(k))
         assert not result.rejected
         assert result.outside == told

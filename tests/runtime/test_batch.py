@@ -1,4 +1,4 @@
-"""A whole test at once is the online step, reading by reading."""
+"""A whole test at once is the compensator, reading by reading."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,8 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import FIRST_READING, Zeroing
-from thermocomp.runtime import batch, compensator
+from thermocomp.runtime import batch
+from thermocomp.runtime.compensator import Compensator
 
 INPUTS = (
     Input("t", "temperature", "degC", 20.0, True, -2.0, 15.0),
@@ -79,11 +80,12 @@ def test_it_is_the_online_step(
     table = np.array([[t, n] for _, t, n in rows]).reshape(-1, 2)
     stands = np.array([bool(zeroing.speed) and zeroing.stands(n) for _, n in table.tolist()], dtype=np.bool_)
     found = batch.run(model, limits, time, table, reference=reference, resting=stands)
-    state = compensator.start([model])._replace(models=(model.init(reference),))
+    running = Compensator.of([model], limits)
+    state = running.start()._replace(models=(model.init(reference),))
     first = ""
     for k, row in enumerate(table):
         reading = Reading(float(time[k]), dict(zip("tn", row.tolist(), strict=True)))
-        state, result = compensator.step([model], limits, state, reading, reading.time)
+        state, result = running.step(state, reading, reading.time)
         # models with a memory are stepped the same way; the others all rows at once, so their sums may round otherwise
         expected = pytest.approx(-result.corrections["z"].offset, rel=1e-13, abs=0 if model.remembers else 1e-13)
         assert found.compensated[k] == expected

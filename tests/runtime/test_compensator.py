@@ -1,4 +1,4 @@
-"""The online step: a dead, stale or absurd reading never moves an axis."""
+"""The compensator: a dead, stale or absurd reading never moves an axis."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import RULES, HonestError, Input
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
-from thermocomp.runtime import compensator
+from thermocomp.runtime.compensator import Compensated, Compensator, CompensatorState
 from thermocomp.runtime.limits import limited
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
@@ -36,14 +36,24 @@ def model(target: str = "z", unit: str = "um") -> LinearDynamic:
     )
 
 
+def start(models: list[LinearDynamic]) -> CompensatorState:
+    return Compensator.of(models).start()
+
+
+def step(
+    models: list[LinearDynamic], limits: Limits, state: CompensatorState, now_read: Reading, now: float
+) -> tuple[CompensatorState, Compensated]:
+    return Compensator.of(models, limits).step(state, now_read, now)
+
+
 def reading(time: float, t: float, n: float = 0.0) -> Reading:
     return Reading(time, {"t": t, "n": n})
 
 
-def warmed() -> compensator.OnlineState:
-    state = compensator.start([model()])
+def warmed() -> CompensatorState:
+    state = start([model()])
     for k in range(10):
-        state, result = compensator.step([model()], OPEN, state, reading(10.0 * k, 20.0 + k, 3000.0), 10.0 * k)
+        state, result = step([model()], OPEN, state, reading(10.0 * k, 20.0 + k, 3000.0), 10.0 * k)
         assert not result.rejected
     return state
 
@@ -51,11 +61,11 @@ def warmed() -> compensator.OnlineState:
 def test_open_limits_give_minus_the_replayed_deviation() -> None:
     """What is judged in a replay is what runs live, to the last bit."""
     frozen, rng = model(), np.random.default_rng(3)
-    state, replayed = compensator.start([frozen]), frozen.init()
+    state, replayed = start([frozen]), frozen.init()
     last = 0.0
     for k in range(50):
         time, t, n = 10.0 * k + rng.uniform(0, 5), 20 + rng.normal(), rng.uniform(0, 5000)
-        state, result = compensator.step([frozen], OPEN, state, reading(time, t, n), time)
+        state, result = step([frozen], OPEN, state, reading(time, t, n), time)
         replayed, deviation = frozen.step(replayed, np.array([t, n]), time - last if k else 0.0)
         last = time
         if k:
@@ -89,14 +99,14 @@ def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) ->
         time = value if not math.isfinite(value) else math.nan
     else:
         good[channel] = value if channel == "t" or not math.isfinite(value) else 1e9
-    after, result = compensator.step([model()], OPEN, state, Reading(time, good), now)
+    after, result = step([model()], OPEN, state, Reading(time, good), now)
     assert result.rejected
     assert after._replace(clock=state.clock) == state
-    assert result.corrections["z"] == state.corrections[0]
+    assert result.corrections["z"] == state.corrections["z"]
 
 
 def test_the_reason_names_the_channel() -> None:
-    _, result = compensator.step([model()], OPEN, compensator.start([model()]), reading(0.0, math.nan), 0.0)
+    _, result = step([model()], OPEN, start([model()]), reading(0.0, math.nan), 0.0)
     assert result.rejected == "t = nan degC is not plausible"
 
 
@@ -126,10 +136,10 @@ def test_limits_hold_for_any_number(
 
 def test_rate_limit_is_reached_over_time() -> None:
     limits = Limits(magnitude=100.0, rate=0.1, reading_age=60.0)
-    state = compensator.start([model()])
-    state, _ = compensator.step([model()], limits, state, reading(0.0, 20.0), 0.0)
+    state = start([model()])
+    state, _ = step([model()], limits, state, reading(0.0, 20.0), 0.0)
     for k in range(1, 8):
-        state, result = compensator.step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
+        state, result = step([model()], limits, state, reading(10.0 * k, 22.0), 10.0 * k)
         assert result.corrections["z"].offset == pytest.approx(-min(4.0, 1.0 * k))
 
 
@@ -138,12 +148,12 @@ def test_a_sensor_that_fails_within_what_sensors_can_say(value: float) -> None:
     """Trained from -5 to 15 degC about a zero of 31 degC: what is a span further away is a broken sensor."""
     frozen = model()
     narrow = replace(frozen, inputs=(replace(frozen.inputs[0], reference=31.0, low=-5.0, high=15.0), frozen.inputs[1]))
-    cold = compensator.start([narrow])
-    _, result = compensator.step([narrow], OPEN, cold, reading(0.0, value), 0.0)
+    cold = start([narrow])
+    _, result = step([narrow], OPEN, cold, reading(0.0, value), 0.0)
     assert "t = " in result.rejected  # it would have become the zero
-    state, _ = compensator.step([narrow], OPEN, cold, reading(0.0, 26.0), 0.0)
-    state, before = compensator.step([narrow], OPEN, state, reading(10.0, 30.0), 10.0)
-    after, result = compensator.step([narrow], OPEN, state, reading(20.0, value), 20.0)
+    state, _ = step([narrow], OPEN, cold, reading(0.0, 26.0), 0.0)
+    state, before = step([narrow], OPEN, state, reading(10.0, 30.0), 10.0)
+    after, result = step([narrow], OPEN, state, reading(20.0, value), 20.0)
     assert result.rejected.endswith("is not plausible")
     assert result.corrections == before.corrections
     assert after.models is state.models
@@ -152,22 +162,22 @@ def test_a_sensor_that_fails_within_what_sensors_can_say(value: float) -> None:
 def test_a_refused_model_does_not_start() -> None:
     refused = HonestError("p", 1.0, 1.0, 1.0, 1.0, 1.0, {}, "refused", "worse than none", rules=RULES)
     with pytest.raises(InputError, match="was refused and will not run: worse than none"):
-        compensator.start([replace(model(), honest_error=refused)])
-    assert compensator.start([replace(model(), honest_error=replace(refused, verdict="accepted"))])
+        start([replace(model(), honest_error=refused)])
+    assert start([replace(model(), honest_error=replace(refused, verdict="accepted"))])
 
 
 @pytest.mark.parametrize("silent", [True, False])
 def test_an_outage_does_not_end_in_a_jump(silent: bool) -> None:
     """Half an hour without a usable reading: the rate limit saves no travel up."""
     limits = Limits(magnitude=1000.0, rate=0.05, reading_age=60.0)
-    state = compensator.start([model()])
+    state = start([model()])
     for k in range(3):
-        state, _ = compensator.step([model()], limits, state, reading(10.0 * k, 20.0), 10.0 * k)
+        state, _ = step([model()], limits, state, reading(10.0 * k, 20.0), 10.0 * k)
     if not silent:
         for k in range(3, 180):
-            state, result = compensator.step([model()], limits, state, reading(10.0 * k, math.nan), 10.0 * k)
+            state, result = step([model()], limits, state, reading(10.0 * k, math.nan), 10.0 * k)
             assert result.rejected
-    _, result = compensator.step([model()], limits, state, reading(1800.0, 60.0), 1800.0)
+    _, result = step([model()], limits, state, reading(1800.0, 60.0), 1800.0)
     assert not result.rejected
     travelled = abs(result.corrections["z"].offset)
     assert 0 < travelled <= limits.rate * (limits.reading_age if silent else 10.0) * (1 + 1e-12)
@@ -177,12 +187,12 @@ def test_an_outage_does_not_end_in_a_jump(silent: bool) -> None:
 def test_a_clock_that_goes_back_saves_no_travel_up(rejected: bool) -> None:
     """0.1 um/s for 0.2 s is 0.02 um, whatever the clock did in between; it used to be 6.0 um."""
     limits = Limits(magnitude=1000.0, rate=0.1, reading_age=60.0)
-    state = compensator.start([model()])
+    state = start([model()])
     for k in range(3):
         t = 40.0 if k else 20.0
-        state, before = compensator.step([model()], limits, state, reading(100.0 + 0.1 * k, t), 100.0 + 0.1 * k)
-    state, _ = compensator.step([model()], limits, state, reading(100.25, math.nan if rejected else 40.0), 40.0)
-    after, result = compensator.step([model()], limits, state, reading(100.4, 60.0), 100.4)
+        state, before = step([model()], limits, state, reading(100.0 + 0.1 * k, t), 100.0 + 0.1 * k)
+    state, _ = step([model()], limits, state, reading(100.25, math.nan if rejected else 40.0), 40.0)
+    after, result = step([model()], limits, state, reading(100.4, 60.0), 100.4)
     assert not result.rejected
     moved = abs(result.corrections["z"].offset - before.corrections["z"].offset)
     assert moved == pytest.approx(0.1 * 0.2)
@@ -193,11 +203,11 @@ def test_a_clock_that_goes_back_saves_no_travel_up(rejected: bool) -> None:
 def test_all_travel_fits_into_the_time_that_went_by(steps: list[tuple[float, bool]]) -> None:
     """Whatever the clock does: the way is at most the rate times how far the clock ever got."""
     limits = Limits(magnitude=1000.0, rate=0.1, reading_age=60.0)
-    state, _ = compensator.step([model()], limits, compensator.start([model()]), reading(1000.0, 20.0), 1000.0)
+    state, _ = step([model()], limits, start([model()]), reading(1000.0, 20.0), 1000.0)
     way, now, offset = 0.0, 1000.0, 0.0
     for k, (jump, dead) in enumerate(steps):
         now += jump
-        state, result = compensator.step([model()], limits, state, reading(now, math.nan if dead else 20.0 + k), now)
+        state, result = step([model()], limits, state, reading(now, math.nan if dead else 20.0 + k), now)
         way += abs(result.corrections["z"].offset - offset)
         offset = result.corrections["z"].offset
     assert state.clock is not None
@@ -217,11 +227,11 @@ def test_one_sensor_that_is_off_at_the_start_is_no_zero(off: float) -> None:
     """It would have been the zero: the machine compensated from 25 degC beside it for the rest of the day."""
     models = [three_sensors("dimensionless", "1")]
     begin = {"t0": 14.0, "t1": 15.2, "t2": 16.1 + off, "q": 1.0}
-    state, result = compensator.step(models, OPEN, compensator.start(models), Reading(0.0, begin), 0.0)
+    state, result = step(models, OPEN, start(models), Reading(0.0, begin), 0.0)
     assert result.rejected.startswith(f"t2 = {16.1 + off:g} degC is not plausible as a start")
     assert math.isnan(state.models[0].reference[2])
     good = begin | {"t2": 16.1}  # a workshop 6 degC colder than that of the training is one
-    state, result = compensator.step(models, OPEN, state, Reading(1.0, good), 1.0)
+    state, result = step(models, OPEN, state, Reading(1.0, good), 1.0)
     assert not result.rejected
     assert state.models[0].reference.tolist() == [14.0, 15.2, 16.1, 0.0]
 
@@ -229,7 +239,7 @@ def test_one_sensor_that_is_off_at_the_start_is_no_zero(off: float) -> None:
 def test_a_machine_far_from_all_that_was_trained_does_not_start() -> None:
     models = [three_sensors("dimensionless", "1")]
     hot = Reading(0.0, {"t0": 40.0, "t1": 41.0, "t2": 42.0, "q": 1.0})
-    _, result = compensator.step(models, OPEN, compensator.start(models), hot, 0.0)
+    _, result = step(models, OPEN, start(models), hot, 0.0)
     assert result.rejected.endswith("the machine is +20.0 degC from the zero of its training")
 
 
@@ -237,26 +247,24 @@ def test_a_machine_far_from_all_that_was_trained_does_not_start() -> None:
 def test_what_nature_sets_no_bounds_to_has_those_of_the_training(quantity: str, unit: str) -> None:
     models = [three_sensors(quantity, unit)]
     begin = {"t0": 20.0, "t1": 21.0, "t2": 22.0}
-    state = compensator.start(models)
+    state = start(models)
     for time, value in enumerate([1e300, 1.0, -1e300, 1e300, math.inf]):
         now = float(time)
-        state, result = compensator.step(models, OPEN, state, Reading(now, begin | {"q": value}), now)
+        state, result = step(models, OPEN, state, Reading(now, begin | {"q": value}), now)
         assert bool(result.rejected) == (value != 1.0)
         assert result.rejected in ("", f"q = {value} {unit} is not plausible")
-    _, result = compensator.step(models, OPEN, state, Reading(9.0, begin | {"q": 20.0}), 9.0)
+    _, result = step(models, OPEN, state, Reading(9.0, begin | {"q": 20.0}), 9.0)
     assert not result.rejected  # outside the trained range, but of its size: the model's support says what to do
 
 
 AVERAGING = Zeroing(300.0, 10.0, "n")
 
 
-def live(
-    models: list[LinearDynamic], rows: list[tuple[float, float, float]]
-) -> list[tuple[compensator.OnlineState, float]]:
+def live(models: list[LinearDynamic], rows: list[tuple[float, float, float]]) -> list[tuple[CompensatorState, float]]:
     """Return the state and the correction after each reading (time, t, n)."""
-    state, found = compensator.start(models), []
+    state, found = start(models), []
     for time, t, n in rows:
-        state, result = compensator.step(models, OPEN, state, reading(time, t, n), time)
+        state, result = step(models, OPEN, state, reading(time, t, n), time)
         found.append((state, result.corrections["z"].offset))
     return found
 
@@ -309,14 +317,14 @@ def test_an_outlier_and_a_dead_reading_are_not_in_the_zero() -> None:
 
 
 def test_outside_inputs_are_told() -> None:
-    state = compensator.start([model()])
-    state, _ = compensator.step([model()], OPEN, state, reading(0.0, 20.0), 0.0)
-    _, result = compensator.step([model()], OPEN, state, reading(1.0, 140.0), 1.0)
+    state = start([model()])
+    state, _ = step([model()], OPEN, state, reading(0.0, 20.0), 0.0)
+    _, result = step([model()], OPEN, state, reading(1.0, 140.0), 1.0)
     assert result.outside == ("t",)
 
 
 def test_start_refuses_what_it_cannot_correct() -> None:
     with pytest.raises(InputError, match="two models for the same target"):
-        compensator.start([model(), model()])
+        start([model(), model()])
     with pytest.raises(InputError, match="predicts urad"):
-        compensator.start([model(unit="urad")])
+        start([model(unit="urad")])

@@ -135,7 +135,7 @@ class Compensator:
     dead_band: float = Limits.dead_band
 
     def limits(self) -> Limits:
-        """Return them as the online step takes them."""
+        """Return them as the compensator takes them."""
         return Limits(self.magnitude, self.rate, self.dead_band)
 
 

@@ -1,6 +1,6 @@
-"""The online step over all readings of a test at once: what a replay is judged by.
+"""The compensator over all readings of a test at once: what a replay is judged by.
 
-The same gate, models and limits as `thermocomp.runtime.compensator`, without the cost of one call per reading; a test
+The same gate, models and limits as `Compensator.step`, without the cost of one call per reading; a test
 holds the two together. The readings come when they were taken: none is stale, and the clock is their time.
 """
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Gathered, begin, centre, first_rows
-from thermocomp.runtime import compensator
+from thermocomp.runtime.gate import implausible, plausible
 from thermocomp.runtime.limits import limited
 
 FloatArray = NDArray[np.float64]
@@ -126,13 +126,13 @@ def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, Fl
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
-    """Return the readings that pass the gate of the online step."""
+    """Return the readings that pass the gate of the compensator."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
     passed, why, known, window = complete.copy(), "", 0, list[int]()
     if np.isnan(zero).any():  # the first readings that pass decide what counts as zero
         gathered, known = Gathered(), len(time)
         for row in np.flatnonzero(complete).tolist():
-            found = compensator.implausible(model, values[row].tolist(), zero.tolist())
+            found = implausible(model, values[row].tolist(), zero.tolist())
             if found:
                 passed[row], why = False, why or found
                 continue
@@ -146,13 +146,13 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
         if gathered.times:
             zero = np.where(np.isnan(zero), centre(gathered.values), zero)
     later = slice(min(known + 1, len(time)) if known else 0, None)
-    bounds = [compensator.plausible(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
+    bounds = [plausible(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
     low, high = np.array(bounds).reshape(-1, 2).T
     with np.errstate(invalid="ignore"):
         passed[later] &= ((values[later] >= low) & (values[later] <= high)).all(axis=1)
     turned = np.flatnonzero(complete & ~passed)
     if turned.size and not why:
-        why = compensator.implausible(model, values[turned[0]].tolist(), zero.tolist())
+        why = implausible(model, values[turned[0]].tolist(), zero.tolist())
     return _Gate(passed, zero, known, why, window)
 
 

@@ -1,243 +1,259 @@
-"""The online step: one reading in, one correction per target out. State in, state out.
+"""The compensator: one reading in, one correction per axis or target out. State in, state out.
 
-The way of a reading: gate (complete? finite? plausible? fresh? later than the last?) -> minus the reference state and
-`ErrorModel.step` per component -> minus sign -> limits -> `Correction`. What the gate turns away changes nothing: every
-correction stays where it was. The first readings after a start are averaged: they are what temperatures count from, and
-the corrections stay zero until it is known, as long as the spindle stands (`ErrorModel.zeroing`).
+The way of a reading: gate (complete? finite? plausible? fresh? later than the last?) -> minus the zero and
+`ErrorModel.step` per model -> offset and slope per axis -> minus sign -> limits -> `Correction`. What the gate turns
+away changes nothing: every correction stays where it was. The first readings after a start are averaged: they are what
+temperatures count from, and the corrections stay zero until it is known, as long as the spindle stands
+(`ErrorModel.zeroing`).
 """
 
 import math
-import sys
-from collections.abc import Mapping, Sequence
-from numbers import Real
-from statistics import median
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, FloatArray, Input, State
+from thermocomp.core.machine import Machine
+from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Gathered, centre
-from thermocomp.runtime.limits import limited
-
-#: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
-PLAUSIBLE: dict[str, tuple[float, float]] = {
-    "temperature": (-40.0, 150.0),  # degC
-    "spindle_speed": (-500_000.0, 500_000.0),  # 1/min
-    "position": (-100_000.0, 100_000.0),  # mm
-}
-
-#: any number at all; finite, so that an infinity is none
-ANY = (-sys.float_info.max, sys.float_info.max)
-#: how far the zero of a day may lie from the zero of the training [degC]
-DAY = 15.0
-#: least room beyond the trained range of a temperature [degC]
-MIN_SPAN = 10.0
-#: room beyond the trained range of what nature sets no bounds to (a displacement, a number), in widths of that range
-WIDE = 10.0
-#: how far ahead of the clock a reading may be stamped [s]
-CLOCK_SKEW = 1.0
-
-
-class OnlineState(NamedTuple):
-    """All that the online step remembers."""
-
-    models: tuple[State, ...]  #: one per model
-    corrections: tuple[Correction, ...]  #: in force, one per model
-    time: float | None  #: of the last reading that passed the gate [s]
-    clock: float | None  #: the latest at which the step was taken, whatever the gate said [s]
-    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
-
-
-class OnlineResult(NamedTuple):
-    """What the online step says of one reading."""
-
-    corrections: dict[str, Correction]  #: in force after this reading, by target
-    rejected: str  #: why the gate turned the reading away; empty if it passed
-    outside: tuple[str, ...]  #: inputs outside the trained range of a model
-
-
-def start(models: Sequence[ErrorModel]) -> OnlineState:
-    """Return the state of a compensator that has seen no reading: all corrections are zero.
-
-    Raises
-    ------
-    InputError
-        Two models predict the same target, a model does not predict micrometres, or the do-no-harm gate refused it.
-    """
-    targets = [m.target for m in models]
-    if len(set(targets)) != len(targets):
-        raise InputError(f"two models for the same target among {', '.join(targets)}")
-    for m in models:
-        if m.unit != "um":
-            raise InputError(f"model of {m.target} predicts {m.unit}; the online step corrects um")
-        m.check_may_run()
-    none = tuple(Correction(0.0) for _ in models)
-    return OnlineState(tuple(m.init() for m in models), none, None, None, tuple(Gathered() for _ in models))
-
-
-def gate(models: Sequence[ErrorModel], reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
-    """Say why a reading must not be used; the empty string if it may.
-
-    A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
-    first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within `DAY`
-    of the zero of the training, and each of them as near to the others as it was then, give or take `MIN_SPAN` or its
-    trained span. What nature sets no bounds to, a displacement or a bare number, has its trained range, widened by
-    `WIDE` times its width.
-
-    Parameters
-    ----------
-    models : sequence of ErrorModel
-        Their inputs have to be in the reading.
-    reading : Reading
-    state : OnlineState
-        Before the reading.
-    now : float
-        The clock of the reading's source, now [s].
-    limits : Limits
-
-    Returns
-    -------
-    str
-    """
-    untimely = _untimely(reading, state, now, limits)
-    if untimely:
-        return untimely
-    for model, memory in zip(models, state.models, strict=True):
-        why = implausible(model, [reading.values.get(i.name) for i in model.inputs], memory.reference.tolist())
-        if why:
-            return why
-    return ""
-
-
-def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
-    """Say which value of a reading must not be used and why; the empty string if all may.
-
-    Parameters
-    ----------
-    model : ErrorModel
-    values : sequence of shape (n_inputs,)
-        As a source gave them; None is a value that is missing.
-    reference : sequence of float of shape (n_inputs,)
-        What counts as zero; nan where it is not known yet.
-
-    Returns
-    -------
-    str
-    """
-    undecided = []
-    for channel, value, zero in zip(model.inputs, values, reference, strict=True):
-        if value is None:
-            return f"{channel.name} is missing"
-        low, high = plausible(channel, zero)
-        # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
-        if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
-            return f"{channel.name} = {value} {channel.unit} is not plausible"
-        if math.isnan(zero) and channel.quantity == "temperature":
-            undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
-    return _no_start(undecided) if undecided else ""
-
-
-def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
-    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
-    middle = median(offset for _, offset in offsets)
-    for channel, offset in offsets:
-        start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
-        if abs(middle) > DAY:
-            return f"{start}: the machine is {middle:+.1f} degC from the zero of its training"
-        if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
-            return f"{start}: {offset - middle:+.1f} degC off the others, counted from the zero of its training"
-    return ""
-
-
-def _untimely(reading: Reading, state: OnlineState, now: float, limits: Limits) -> str:
-    if not (_is_number(reading.time) and _is_number(now)):
-        return f"time {reading.time} or clock {now} is not a number"
-    if reading.time > now + CLOCK_SKEW:
-        return f"reading is {reading.time - now:.1f} s ahead of the clock"
-    if now - reading.time > limits.reading_age:
-        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
-    if state.time is not None and reading.time <= state.time:
-        return f"reading of {reading.time:g} s is not later than the last one of {state.time:g} s"
-    return ""
-
+from thermocomp.runtime.gate import implausible, untimely
+from thermocomp.runtime.limits import limited_line
+from thermocomp.volumetric.model import VolumetricModel
+from thermocomp.volumetric.straight import best_line, best_lines
 
 #: what is said to be outside where each input is inside its own range, but all together are unlike the training
 TOGETHER = "inputs together"
 
 
-def plausible(channel: Input, zero: float) -> tuple[float, float]:
-    """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
+class CompensatorState(NamedTuple):
+    """All that a compensator remembers between two readings."""
 
-    `zero` is what counts as zero now; nan while it is not known.
-    """
-    low, high = PLAUSIBLE.get(channel.quantity, ANY)
-    if channel.quantity == "temperature" and not math.isnan(zero):
-        span = max(channel.high - channel.low, MIN_SPAN)
-        low, high = max(low, zero + channel.low - span), min(high, zero + channel.high + span)
-    elif channel.quantity not in PLAUSIBLE:
-        around = channel.reference if math.isnan(zero) else zero
-        room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
-        low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
-    return low, high
+    models: tuple[State, ...]  #: one per model
+    corrections: dict[str, Correction]  #: in force, by target or axis
+    time: float | None  #: of the last reading that passed the gate [s]
+    clock: float | None  #: the latest at which a step was taken, whatever the gate said [s]
+    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
 
 
-def _is_number(value: object) -> bool:
-    return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)
+class Compensated(NamedTuple):
+    """What a compensator says of one reading."""
+
+    corrections: dict[str, Correction]  #: in force after this reading, by target or axis
+    rejected: str  #: why the gate turned the reading away; empty if it passed
+    outside: tuple[str, ...]  #: inputs outside the trained range of a model
 
 
-def step(
-    models: Sequence[ErrorModel], limits: Limits, state: OnlineState, reading: Reading, now: float
-) -> tuple[OnlineState, OnlineResult]:
-    """Take one reading in and give the corrections that are in force after it.
+class Line(NamedTuple):
+    """What some models together say of one target or axis, in the form that controllers take."""
+
+    models: slice  #: which they are, of the compensator's models
+    travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
+    deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
+
+
+@dataclass(frozen=True, eq=False)
+class Compensator:
+    """Models, and what their corrections may never do. It remembers nothing: what it does is `CompensatorState`.
+
+    Made by `of` or `of_machine`.
 
     Parameters
     ----------
-    models : sequence of ErrorModel
+    models : tuple of ErrorModel
+        Models of time, stepped one by one, each from a zero of its own.
+    lines : dict of str to Line
+        By target or axis.
     limits : Limits
-    state : OnlineState
-        From `start` or the previous `step`.
-    reading : Reading
-    now : float
-        The clock of the reading's source, now [s].
 
-    Returns
-    -------
-    state : OnlineState
-    result : OnlineResult
+    Raises
+    ------
+    InputError
+        The do-no-harm gate refused a model, or it is unproven and nobody takes it.
     """
-    rejected = gate(models, reading, state, now, limits)
-    if rejected:
-        waiting = state._replace(clock=_later(state.clock, now)) if math.isfinite(now) else state
-        return waiting, _result(models, state.corrections, rejected, ())
-    dt = 0.0 if state.time is None else reading.time - state.time
-    # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
-    travel = 0.0 if state.clock is None else min(now - state.clock, limits.reading_age)
-    states, corrections, begins, outside = [], [], [], []
-    for k, (model, current) in enumerate(zip(models, state.corrections, strict=True)):
-        memory = state.models[k]
-        values = np.array([reading.values[i.name] for i in model.inputs])
-        gathered, known = state.gathered[k], True
-        if memory.memory is None and np.isnan(memory.reference).any():
-            resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
-            memory, gathered, known, values = _zeroed(model, memory, gathered, (reading.time, values, resting))
-        begins.append(gathered)
-        if known:
-            after, deviation = model.step(memory, values, dt)
-            wanted = Correction.opposing(Deviation(float(deviation)))
-            states.append(after)
-            corrections.append(Correction(limited(wanted.offset, current.offset, travel, limits)))
-            if after.outside.any():
-                outside += [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-            elif not model.distance(after, values) <= 1.0:
-                outside.append(TOGETHER)
-        else:
-            states.append(memory)
-            corrections.append(current)
-    new = OnlineState(tuple(states), tuple(corrections), reading.time, _later(state.clock, now), tuple(begins))
-    return new, _result(models, new.corrections, "", tuple(dict.fromkeys(outside)))
+
+    models: tuple[ErrorModel, ...]
+    lines: dict[str, Line]
+    limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        for m in self.models:
+            m.check_may_run()
+
+    @classmethod
+    def of(cls, sources: Sequence[ErrorModel | PositionModel], limits: Limits = Limits()) -> "Compensator":
+        """Return the compensator of some targets.
+
+        Parameters
+        ----------
+        sources : sequence of ErrorModel or PositionModel
+            One per target [um]. Of a `PositionModel` the thermal part alone: its profile is a table in the controller;
+            where it is no straight line, the best one over the travel.
+        limits : Limits
+
+        Raises
+        ------
+        InputError
+            Two models have the same target, one does not predict micrometres, or may not run.
+        """
+        targets = [m.target for m in sources]
+        if len(set(targets)) != len(targets):
+            raise InputError(f"two models for the same target among {', '.join(targets)}")
+        models: list[ErrorModel] = []
+        lines: dict[str, Line] = {}
+        for source in sources:
+            if source.unit != "um":
+                raise InputError(f"model of {source.target} predicts {source.unit}; a compensator corrects um")
+            begin = len(models)
+            if isinstance(source, PositionModel):
+                models += source.models
+                lines[source.target] = Line(slice(begin, len(models)), source.travel, _straight(source))
+            else:
+                models.append(source)
+                lines[source.target] = Line(slice(begin, len(models)), (0.0, 0.0), _constant)
+        return cls(tuple(models), lines, limits)
+
+    @classmethod
+    def of_machine(
+        cls, machine: Machine, at: ArrayLike, tool: ArrayLike | None = None, limits: Limits = Limits()
+    ) -> "Compensator":
+        """Return the compensator of a machine's axes: the best straight line of each through one point.
+
+        Parameters
+        ----------
+        machine : Machine
+            With its components.
+        at : array-like of shape (3,)
+            Where the other axes stand while one moves [mm].
+        tool : array-like of shape (3,), optional
+            From the gauge point to the tip [mm]; the machine's own if not given.
+        limits : Limits
+
+        Raises
+        ------
+        InputError
+            A position is not finite, or a model may not run.
+        """
+        model = VolumetricModel(machine)
+        best_lines(model.field(np.zeros(len(model.stack.models))), at, tool)  # says what is wrong with them now
+
+        def along(axis: str) -> Callable[[Sequence[float]], Deviation]:
+            return lambda said: best_lines(model.field(np.asarray(said)), at, tool, axes=axis)[axis]
+
+        every = slice(0, len(model.stack.models))
+        axes = [machine.axis(name) for name in "XYZ" if name in machine.structure.axes]
+        return cls(model.stack.models, {a.name: Line(every, a.travel, along(a.name)) for a in axes}, limits)
+
+    def start(self) -> CompensatorState:
+        """Return the state of a compensator that has seen no reading: all corrections are zero."""
+        none = {target: Correction(0.0) for target in self.lines}
+        return CompensatorState(
+            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models)
+        )
+
+    def gate(self, state: CompensatorState, reading: Reading, now: float) -> str:
+        """Say why a reading must not be used; the empty string if it may.
+
+        A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
+        first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within
+        `DAY` of the zero of the training, and each of them as near to the others as it was then, give or take
+        `MIN_SPAN` or its trained span. What nature sets no bounds to, a displacement or a bare number, has its trained
+        range, widened by `WIDE` times its width. The constants are those of `thermocomp.runtime.gate`.
+
+        Parameters
+        ----------
+        state : CompensatorState
+            Before the reading.
+        reading : Reading
+            The inputs of all models have to be in it.
+        now : float
+            The clock of the reading's source, now [s].
+
+        Returns
+        -------
+        str
+        """
+        why = untimely(reading, state.time, now, self.limits)
+        for model, memory in zip(self.models, state.models, strict=True):
+            if why:
+                break
+            values = [reading.values.get(i.name) for i in model.inputs]
+            why = implausible(model, values, memory.reference.tolist())
+        return why
+
+    def step(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Compensated]:
+        """Take one reading in and give the corrections that are in force after it.
+
+        Parameters
+        ----------
+        state : CompensatorState
+            From `start` or the previous `step`.
+        reading : Reading
+        now : float
+            The clock of the reading's source, now [s].
+
+        Returns
+        -------
+        state : CompensatorState
+        said : Compensated
+        """
+        if rejected := self.gate(state, reading, now):
+            waiting = state._replace(clock=_later(state.clock, now)) if math.isfinite(now) else state
+            return waiting, Compensated(state.corrections, rejected, ())
+        dt = 0.0 if state.time is None else reading.time - state.time
+        # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
+        travel = 0.0 if state.clock is None else min(now - state.clock, self.limits.reading_age)
+        states, begins, said, outside = list(state.models), list(state.gathered), list[float](), list[str]()
+        for k, model in enumerate(self.models):
+            memory, known = state.models[k], True
+            values = np.array([reading.values[i.name] for i in model.inputs])
+            if memory.memory is None and np.isnan(memory.reference).any():
+                resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
+                gathering = _zeroed(model, memory, begins[k], (reading.time, values, resting))
+                memory, begins[k], known, values = gathering
+            said.append(math.nan)
+            if known:
+                memory, deviation = model.step(memory, values, dt)
+                said[k] = float(deviation)
+                outside += _beyond(model, memory, values)
+            states[k] = memory
+        corrections = dict(state.corrections)
+        for target, line in self.lines.items():
+            told = said[line.models]
+            if all(map(math.isfinite, told)):
+                wanted = Correction.opposing(line.deviation(told))
+                corrections[target] = limited_line(wanted, corrections[target], line.travel, travel, self.limits)
+        new = CompensatorState(tuple(states), corrections, reading.time, _later(state.clock, now), tuple(begins))
+        return new, Compensated(corrections, "", tuple(dict.fromkeys(outside)))
+
+
+def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
+    """Return the inputs that are outside the trained range."""
+    if after.outside.any():
+        return [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
+    return [] if model.distance(after, values) <= 1.0 else [TOGETHER]
+
+
+def _constant(said: Sequence[float]) -> Deviation:
+    return Deviation(said[0])
+
+
+def _straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
+    """Return what makes the best straight line over the travel of the powers in a model."""
+    low, high = source.travel
+    positions, zero = np.linspace(low, high, 41), source.reference_position
+    lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
+    offsets, slopes = [line.offset for line in lines], [line.slope for line in lines]
+
+    def deviation(said: Sequence[float]) -> Deviation:
+        return Deviation(float(np.dot(offsets, said)), float(np.dot(slopes, said)), zero)
+
+    return deviation
 
 
 def _zeroed(
@@ -265,10 +281,3 @@ def _zeroed(
 def _later(clock: float | None, now: float) -> float:
     """Return the clock, which never goes back: time that was travelled in must not be there to travel in again."""
     return now if clock is None else max(clock, now)
-
-
-def _result(
-    models: Sequence[ErrorModel], corrections: Sequence[Correction], rejected: str, outside: tuple[str, ...]
-) -> OnlineResult:
-    by_target: Mapping[str, Correction] = {m.target: c for m, c in zip(models, corrections, strict=True)}
-    return OnlineResult(dict(by_target), rejected, outside)

@@ -2,7 +2,7 @@
 
 import math
 
-from thermocomp.core.correction import Limits
+from thermocomp.core.correction import Correction, Limits
 
 
 def limited(target: float, current: float, dt: float, limits: Limits) -> float:
@@ -33,3 +33,35 @@ def limited(target: float, current: float, dt: float, limits: Limits) -> float:
     if abs(target - current) <= reach:
         return target  # exactly: current + (target - current) may round past the magnitude
     return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))
+
+
+def limited_line(
+    target: Correction, current: Correction, travel: tuple[float, float], dt: float, limits: Limits
+) -> Correction:
+    """Move a correction with a slope towards its target as far as the limits allow at both ends of the travel.
+
+    Between the ends it is a straight line, so they hold everywhere on the axis.
+
+    Parameters
+    ----------
+    target : Correction
+        Where the models want it.
+    current : Correction
+        Where it is.
+    travel : tuple of float
+        Ends of the travel [mm].
+    dt : float
+        Time it has had to move [s].
+    limits : Limits
+
+    Returns
+    -------
+    Correction
+        With the reference position of `target`.
+    """
+    low, high = travel
+    if low == high or target.slope == current.slope == 0.0:
+        return Correction(limited(target.offset, current.offset, dt, limits), 0.0, target.reference_position)
+    at_low, at_high = (limited(target.at(p), current.at(p), dt, limits) for p in travel)
+    slope = (at_high - at_low) / (high - low)  # um/mm
+    return Correction(at_low + slope * (target.reference_position - low), 1e3 * slope, target.reference_position)

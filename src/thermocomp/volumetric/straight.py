@@ -103,6 +103,7 @@ def straight_lines(
     place = finite("at", at)
     axes = [(k, machine.axis(name)) for k, name in enumerate("XYZ") if name in machine.structure.axes]
 
+    deviations = best_lines(field, place, tool, stations=stations, exact=exact)
     sides = [np.array([p]) for p in place]
     found: list[tuple[int, str, Deviation, Size]] = []
     corrections: dict[str, Correction] = {}
@@ -110,7 +111,7 @@ def straight_lines(
         sides[k] = np.linspace(*axis.travel, grid)
         points = np.tile(place, (stations, 1))
         points[:, k] = np.linspace(*axis.travel, stations)
-        deviation = _best(points[:, k], field.error(points, tool, exact=exact)[:, k], axis.reference_position)
+        deviation = deviations[axis.name]
         corrections[axis.name] = Correction.opposing(deviation)
         along = left_by(field, points, {axis.name: corrections[axis.name]}, tool, exact=exact)
         found.append((k, axis.name, deviation, Size.of(along[:, k])))
@@ -125,8 +126,63 @@ def straight_lines(
     )
 
 
-def _best(positions: FloatArray, errors: FloatArray, reference: float) -> Deviation:
-    """Return the line of least squares through errors [um] at positions [mm]."""
+def best_lines(
+    field: ErrorField,
+    at: ArrayLike,
+    tool: ArrayLike | None = None,
+    *,
+    axes: str = "XYZ",
+    stations: int = 41,
+    exact: bool = False,
+) -> dict[str, Deviation]:
+    """Lay the best straight line through the error of some axes, as `straight_lines`, without what they leave.
+
+    Parameters
+    ----------
+    field : ErrorField
+    at : array-like of shape (3,)
+        Where the other axes stand while one moves [mm].
+    tool : array-like of shape (3,), optional
+        From the gauge point to the tip [mm]; the machine's own if not given.
+    axes : str
+        Which axes; those that the machine has not are left out.
+    stations : int
+        Positions per axis, evenly over its travel, both ends included; at least 2.
+    exact : bool
+        By homogeneous transforms instead of to first order in the angles.
+
+    Returns
+    -------
+    dict of str to Deviation
+        By axis [um, um/m].
+    """
+    machine, place = field.kinematics.machine, finite("at", at)
+    found: dict[str, Deviation] = {}
+    for name in axes:
+        if name in machine.structure.axes:
+            axis, k = machine.axis(name), "XYZ".index(name)
+            points = np.tile(place, (stations, 1))
+            points[:, k] = np.linspace(*axis.travel, stations)
+            found[name] = best_line(points[:, k], field.error(points, tool, exact=exact)[:, k], axis.reference_position)
+    return found
+
+
+def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> Deviation:
+    """Return the straight line of least squares through errors.
+
+    Parameters
+    ----------
+    positions : ndarray of shape (n,)
+        [mm]
+    errors : ndarray of shape (n,)
+        [um]
+    reference : float
+        Where the offset of the line holds [mm].
+
+    Returns
+    -------
+    Deviation
+    """
     middle, mean = positions.mean(), errors.mean()
     way = 1e-3 * (positions - middle)
     slope = float(way @ (errors - mean) / (way @ way))

@@ -1,0 +1,120 @@
+"""The gate: what of a reading says that a sensor, a clock or a wire is broken, and not that the machine is warm.
+
+It comes first, because numbers that are not numbers are treacherous further down: in Python ``max(-m, min(m, nan))`` is
+``m``, so a dead sensor would command the full correction.
+"""
+
+import math
+import sys
+from collections.abc import Sequence
+from numbers import Real
+from statistics import median
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.reading import Reading
+
+#: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news
+PLAUSIBLE: dict[str, tuple[float, float]] = {
+    "temperature": (-40.0, 150.0),  # degC
+    "spindle_speed": (-500_000.0, 500_000.0),  # 1/min
+    "position": (-100_000.0, 100_000.0),  # mm
+}
+
+#: any number at all; finite, so that an infinity is none
+ANY = (-sys.float_info.max, sys.float_info.max)
+#: how far the zero of a day may lie from the zero of the training [degC]
+DAY = 15.0
+#: least room beyond the trained range of a temperature [degC]
+MIN_SPAN = 10.0
+#: room beyond the trained range of what nature sets no bounds to (a displacement, a number), in widths of that range
+WIDE = 10.0
+#: how far ahead of the clock a reading may be stamped [s]
+CLOCK_SKEW = 1.0
+
+
+def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
+    """Say which value of a reading must not be used and why; the empty string if all may.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    values : sequence of shape (n_inputs,)
+        As a source gave them; None is a value that is missing.
+    reference : sequence of float of shape (n_inputs,)
+        What counts as zero; nan where it is not known yet.
+
+    Returns
+    -------
+    str
+    """
+    undecided = []
+    for channel, value, zero in zip(model.inputs, values, reference, strict=True):
+        if value is None:
+            return f"{channel.name} is missing"
+        low, high = plausible(channel, zero)
+        # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
+        if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
+            return f"{channel.name} = {value} {channel.unit} is not plausible"
+        if math.isnan(zero) and channel.quantity == "temperature":
+            undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
+    return _no_start(undecided) if undecided else ""
+
+
+def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
+    """Say why temperatures, given from the zero of the training, cannot be those of a machine that starts."""
+    middle = median(offset for _, offset in offsets)
+    for channel, offset in offsets:
+        start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
+        if abs(middle) > DAY:
+            return f"{start}: the machine is {middle:+.1f} degC from the zero of its training"
+        if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
+            return f"{start}: {offset - middle:+.1f} degC off the others, counted from the zero of its training"
+    return ""
+
+
+def untimely(reading: Reading, last: float | None, now: float, limits: Limits) -> str:
+    """Say why a reading comes at a wrong time; the empty string if it does not.
+
+    Parameters
+    ----------
+    reading : Reading
+    last : float or None
+        Time of the last reading that was used [s].
+    now : float
+        The clock of the reading's source, now [s].
+    limits : Limits
+
+    Returns
+    -------
+    str
+    """
+    if not (_is_number(reading.time) and _is_number(now)):
+        return f"time {reading.time} or clock {now} is not a number"
+    if reading.time > now + CLOCK_SKEW:
+        return f"reading is {reading.time - now:.1f} s ahead of the clock"
+    if now - reading.time > limits.reading_age:
+        return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
+    if last is not None and reading.time <= last:
+        return f"reading of {reading.time:g} s is not later than the last one of {last:g} s"
+    return ""
+
+
+def plausible(channel: Input, zero: float) -> tuple[float, float]:
+    """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
+
+    `zero` is what counts as zero now; nan while it is not known.
+    """
+    low, high = PLAUSIBLE.get(channel.quantity, ANY)
+    if channel.quantity == "temperature" and not math.isnan(zero):
+        span = max(channel.high - channel.low, MIN_SPAN)
+        low, high = max(low, zero + channel.low - span), min(high, zero + channel.high + span)
+    elif channel.quantity not in PLAUSIBLE:
+        around = channel.reference if math.isnan(zero) else zero
+        room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
+        low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
+    return low, high
+
+
+def _is_number(value: object) -> bool:
+    return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)
