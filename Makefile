@@ -49,11 +49,11 @@ $(VENV)/.study: pyproject.toml
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,fem]' --group dev
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group dev
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(BENCH) --editable '.[study,fem]' --group bench
+	scripts/make_venv.sh $(PYTHON) $(BENCH) --editable '.[study]' --group bench
 	@touch $@
 
 $(VENV)/.docs: pyproject.toml

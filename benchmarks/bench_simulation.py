@@ -67,8 +67,9 @@ def steps() -> tuple[float, float]:
 
 def full_model(n_steps: int = 360) -> tuple[float, float, float]:
     """Return microseconds a step of both models, and the largest difference of z as a share of its drift."""
-    from thermocomp.simulation.fem import machines
-    from thermocomp.simulation.fem.transient import Stepper
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
+    from finite_elements import machines
+    from finite_elements.transient import Stepper
     from thermocomp.simulation.statespace import ReducedModel
 
     full, small = machines.centre(), ReducedModel.load("centre")

@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
+from reviseruns import PLATE
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.pipeline import make_pipeline
+from smallmachine import small_machine
 
 import thermocomp as tc
-from reviseruns import PLATE
-from smallmachine import small_machine
 from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
 from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare as own_compare

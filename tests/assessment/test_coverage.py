@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import coverage, splits, study
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import crowded_machine, small_machine
+
 from thermocomp.assessment import pareto, splits
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare

@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-
 from profilemachine import day, planted, profiles
+
 from thermocomp.assessment.position import n_pieces, study, study_all
 from thermocomp.assessment.splits import by_rows, leave_one_cycle_out, leave_one_file_out
 from thermocomp.core.exceptions import FitError, InputError

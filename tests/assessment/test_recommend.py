@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.recommend import GROUPS, PAIRS, inner_splits

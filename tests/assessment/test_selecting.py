@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
 from smallmachine import crowded_machine
+
 from thermocomp.assessment import selecting, splits
 from thermocomp.assessment.choice import Choice, Settings, Table, written
 from thermocomp.core.exceptions import FitError, InputError

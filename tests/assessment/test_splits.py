@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits, study
 from thermocomp.core.exceptions import InputError
 from thermocomp.recording.cycles import Cycle

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment.replay import run as replayed
 from thermocomp.cli.app import run
 from thermocomp.core.model import HonestError

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.cli.app import run
 from thermocomp.cli.checked import stretches
 

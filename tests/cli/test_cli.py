@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.cli.app import app, run
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import MissingExtraError

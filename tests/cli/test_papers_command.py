@@ -7,8 +7,8 @@ from typing import get_args
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.cli import papers
 from thermocomp.cli.app import run
 from thermocomp.files import recordings

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
 from profilemachine import profiles
+
 from thermocomp.cli import positiontables
 from thermocomp.cli.app import run
 from thermocomp.files import positionfile

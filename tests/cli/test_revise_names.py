@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags
 from reviseruns import PLATE, judged, revise, table, without_header, write_models
+
 from thermocomp.nc.rewrite.header import MARK, WIDTH, blank, filled, wrapped
 
 ENDINGS = ["\n", "\r", "\r\n", "\x0b", "\x0c", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029"]

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags
 from reviseruns import HONEST, revise, write_models
 

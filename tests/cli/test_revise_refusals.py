@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
 from driftmodels import lags
 from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
+
 from thermocomp.core.model import ErrorModel
 
 # -- refusals --------------------------------------------------------------------------------------------------------

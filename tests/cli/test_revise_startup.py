@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-
 from reviseruns import revise, said
 
 interpreter = pytest.mark.usefixtures("interpreter")

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.figure import Figure
-
 from driftmodels import lags
+from matplotlib.figure import Figure
 from reviseruns import PLATE, judged, revise, said, write_models
+
 from thermocomp.cli import reviserun
 from thermocomp.nc.rewrite.header import MARK
 from thermocomp.nc.rewrite.revise import Revision

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
 from smallmill import DRIFT, SLOPE, SQUARENESS, write_mill
+
 from thermocomp.cli.app import run
 
 HEAT = small_machine().table["t1_C"].to_numpy()

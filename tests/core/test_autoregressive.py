@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import twin_arx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import twin_arx
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet, Ticking, slowest
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.model import ErrorModel, Input

@@ -1,20 +1,17 @@
 """Machine, axes, channels, corrections and limits refuse nonsense where they are made."""
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pytest
+from volumetricmachine import line
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError, SettingError, UnitError
 from thermocomp.core.machine import Axis, Channel, Machine, Source
-from thermocomp.core.ports import CorrectionSink, TemperatureSource
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile, SplineProfile
-from thermocomp.core.reading import Reading
 from thermocomp.core.structure import Structure
-from volumetricmachine import line
 
 
 def test_machine_carries_its_reference_temperature() -> None:
@@ -171,27 +168,3 @@ def test_a_correction_is_of_finite_numbers(key: str, bad: float) -> None:
 def test_limits_must_limit(bad: dict[str, float]) -> None:
     with pytest.raises(InputError):
         Limits(**bad)
-
-
-class Replaying:
-    """A source that plays readings back, and a sink that keeps what it is given."""
-
-    def __init__(self, readings: list[Reading]) -> None:
-        self.kept = readings
-        self.applied: list[Mapping[str, Correction]] = []
-
-    def readings(self) -> Iterator[Reading]:
-        yield from self.kept
-
-    def apply(self, corrections: Mapping[str, Correction]) -> None:
-        self.applied.append(corrections)
-
-
-def test_ports_are_filled_by_shape_not_by_inheritance() -> None:
-    both = Replaying([Reading(0.0, {"t": 20.0})])
-    assert isinstance(both, TemperatureSource)
-    assert isinstance(both, CorrectionSink)
-    assert not isinstance(Limits(), TemperatureSource)
-    for reading in both.readings():
-        both.apply({"z": Correction(-reading.values["t"])})
-    assert both.applied == [{"z": Correction(-20.0)}]

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from volumetricmachine import line
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.profile import PolynomialProfile
-from volumetricmachine import line
 
 PROFILE = PolynomialProfile(
     exponents=((1, 0, 0), (0, 1, 0)),

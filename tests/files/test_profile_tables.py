@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
 from profilemachine import profiles
+
 from thermocomp.core.exceptions import InputError, RecordingError, ThermocompError, UnitError
 from thermocomp.files.mapping import ColumnMap, Mapping
 from thermocomp.files.profiles import ProfileOptions, from_recording, read, read_places

@@ -69,3 +69,15 @@ def judged(model: ErrorModel, max_abs: float, verdict: Literal["accepted", "refu
 def strict(model: ErrorModel) -> ErrorModel:
     """Return the model without a margin beyond its trained range."""
     return replace(model, support=Support(margin=0.0))
+
+
+def growing(target: str, per_degree: float, unit: str = "um") -> Polynomial:
+    """So much a degree of one temperature, counted from the first reading."""
+    return Polynomial(
+        target=target,
+        unit=unit,
+        inputs=(Input("t", "temperature", "degC", 20.0, True, -50.0, 50.0),),
+        variables=(Variable.single("t", 0),),
+        terms=((0,),),
+        coefficients=(per_degree,),
+    )

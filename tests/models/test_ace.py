@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import twin_ace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-import twin_ace
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input, Support
 from thermocomp.datasets.virtual import record

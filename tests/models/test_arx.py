@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
+from twin_arx import SYSTEMS, clock, series
 
 from thermocomp.core.autoregressive import slowest
 from thermocomp.core.exceptions import FitError, InputError
@@ -20,7 +21,6 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.numerics.leastsquares import table, triangle
 from thermocomp.models.selection import orders
 from thermocomp.recording.samples import Samples
-from twin_arx import SYSTEMS, clock, series
 
 FloatArray = NDArray[np.float64]
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import twin_backprop as twin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import twin_backprop as twin
 from thermocomp.core.network import Perceptron
 from thermocomp.models.kernels import backprop
 from thermocomp.models.numerics.backprop import learning_rates, train_net

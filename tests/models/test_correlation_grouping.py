@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
+import twin_grouping as twin
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-import twin_grouping as twin
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import twin_arx
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from twin_arx import SYSTEMS, clock, series
 
-import twin_arx
 from thermocomp.core.autoregressive import slowest
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel
@@ -18,7 +19,6 @@ from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.clocked import Clocked
 from thermocomp.models.numerics import freerun, ticks
-from twin_arx import SYSTEMS, clock, series
 
 FloatArray = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
 from profilemachine import along_y
+
 from thermocomp.core.profile import SplineProfile
 from thermocomp.models.geometric import fit_profile
 from thermocomp.simulation.geometry import PROFILES, cold_profile

@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import twin_grouping as twin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import twin_grouping as twin
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import Triangle, lstsq, table, triangle

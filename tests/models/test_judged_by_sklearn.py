@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from sklearn import config_context
 from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.core.model import Support

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import twin_ace
 from numpy.typing import NDArray
 
-import twin_ace
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
 

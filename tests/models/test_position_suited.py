@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.typing import NDArray
-
 from profilemachine import EQ6, along_y, profiles, states
+
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.machine import Channel
 from thermocomp.models.position import PositionOptions, fit_position

@@ -8,8 +8,8 @@ import pytest
 from sklearn import config_context
 from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import parametrize_with_checks
-
 from smallmachine import crowded_machine
+
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.partial_f import PartialF

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import twin_subsets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-import twin_subsets
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.files import modelfile
 from thermocomp.models.selection import subsetsearch

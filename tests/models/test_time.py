@@ -15,8 +15,8 @@ from sklearn.exceptions import FitFailedWarning
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, TimeSeriesSplit, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, StandardScaler
-
 from smallmachine import small_machine
+
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.assessment.robustness import stress
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import recordings as files

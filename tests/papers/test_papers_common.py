@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.models.dynamic import DynamicRidge

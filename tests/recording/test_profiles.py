@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from profilemachine import along_y, profiles
+
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.recording.profiles import Profiles
 

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import compare
 from thermocomp.recording.cycles import Cycle

@@ -7,8 +7,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-
 from smallmachine import small_machine
+
 from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.quality import check

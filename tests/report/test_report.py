@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rich.console import Console
-
 from smallmachine import small_machine
+
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.results import Comparison

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from smallmill import write_mill
+
 from thermocomp.assessment.volumetric import Volumetric, study
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
@@ -127,6 +127,7 @@ def test_the_largest_error_is_looked_for_at_the_corners_too() -> None:
 def read_only_slope() -> tuple[Machine, Recording]:
     from smallmachine import small_machine
     from smallmill import warmed
+
     from thermocomp.core.position import PositionModel
 
     slope = PositionModel(

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from driftmodels import growing
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -13,11 +14,8 @@ from volumetricmachine import random_machine
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Source
-from thermocomp.core.model import Input
-from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
-from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import limited_line
@@ -29,18 +27,6 @@ FloatArray = NDArray[np.float64]
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
 
 
-def grows(target: str, unit: str, per_degree: float) -> Polynomial:
-    warm = Input("t", "temperature", "degC", 20.0, True, -50.0, 50.0)
-    return Polynomial(
-        target=target,
-        unit=unit,
-        inputs=(warm,),
-        variables=(Variable.single("t", 0),),
-        terms=((0,),),
-        coefficients=(per_degree,),
-    )
-
-
 def along_x(*slopes: float, offset: float | None = None) -> PositionModel:
     units = ("um/m", "um/m^2")
     return PositionModel(
@@ -49,8 +35,8 @@ def along_x(*slopes: float, offset: float | None = None) -> PositionModel:
         axis="X",
         travel=(-200.0, 600.0),
         reference_position=100.0,
-        offset=None if offset is None else grows("EXX", "um", offset),
-        slopes=tuple(grows("EXX", unit, k) for unit, k in zip(units, slopes, strict=False)),
+        offset=None if offset is None else growing("EXX", offset),
+        slopes=tuple(growing("EXX", k, unit) for unit, k in zip(units, slopes, strict=False)),
     )
 
 
@@ -78,7 +64,7 @@ def test_a_bend_is_taken_as_its_best_line() -> None:
 def test_a_machine_is_corrected_by_the_lines_of_its_axes(seed: int) -> None:
     rng = np.random.default_rng(seed)
     bare = random_machine("XYZ", rng)
-    components: dict[str, Source] = {"EXX": along_x(6.0, offset=1.0), "EBY": grows("EBY", "urad", 5.0), "EYZ": 3.0}
+    components: dict[str, Source] = {"EXX": along_x(6.0, offset=1.0), "EBY": growing("EBY", 5.0, "urad"), "EYZ": 3.0}
     machine = replace(bare, components=components)
     found = correction_at(Compensator.of_machine(machine, (50.0, 0.0, 10.0), limits=OPEN), 20.0, 24.0)
     field = VolumetricModel(machine).replay(np.array([0.0, 10.0]), {"t": np.array([20.0, 24.0])})[1]
@@ -129,6 +115,6 @@ def test_the_limits_hold_from_end_to_end(wanted: Correction, now: Correction, dt
 
 def test_what_is_no_length_is_refused() -> None:
     with pytest.raises(InputError, match="corrects um"):
-        Compensator.of([grows("EBX", "urad", 1.0)])
+        Compensator.of([growing("EBX", 1.0, "urad")])
     with pytest.raises(InputError, match="two models for the same target"):
-        Compensator.of([grows("z", "um", 1.0), grows("z", "um", 2.0)])
+        Compensator.of([growing("z", 1.0), growing("z", 2.0)])

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fakemachine import FakeMachine
 from numpy.typing import NDArray
 
-from fakemachine import FakeMachine
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation import experiments
 from thermocomp.simulation.climate import STILL

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from scipy.spatial.transform import Rotation
+from volumetricmachine import FloatArray, machines, random_machine, random_values
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.machine import Machine
 from thermocomp.volumetric import exact
 from thermocomp.volumetric.kinematics import Kinematics
-from volumetricmachine import FloatArray, machines, random_machine, random_values
 
 CODES = [c.code for c in COMPONENTS]
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from volumetricmachine import STRUCTURES, by_hand, line, random_machine, random_values, temperature
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError, ReadingError
@@ -18,7 +19,6 @@ from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import straight_lines
-from volumetricmachine import STRUCTURES, by_hand, line, random_machine, random_values, temperature
 
 #: C-22, Eq. (6), for y in mm and d in mm (E-C6): 1000 times as much in um
 CHEN = PolynomialProfile(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given
+from volumetricmachine import FloatArray, by_hand, machines, random_values
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError
@@ -10,7 +11,6 @@ from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
 from thermocomp.volumetric import exact
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
-from volumetricmachine import FloatArray, by_hand, machines, random_values
 
 POINT = np.array([100.0, 200.0, 300.0])
 

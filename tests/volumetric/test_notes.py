@@ -3,13 +3,13 @@
 from itertools import pairwise
 
 import pytest
+from volumetricmachine import line
 
 from thermocomp.core.machine import Axis, Machine, Source, Vector
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
 from thermocomp.volumetric.notes import counted_twice, held, notes, untilted
-from volumetricmachine import line
 
 
 def mill(components: dict[str, Source], code: str = "w X' b Z Y (C1) t", side: str = "tool") -> Machine:

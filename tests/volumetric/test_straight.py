@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from volumetricmachine import by_hand
 
 from thermocomp.core.machine import Source
 from thermocomp.core.position import PositionModel
@@ -9,7 +10,6 @@ from thermocomp.core.profile import PolynomialProfile
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import straight_lines
-from volumetricmachine import by_hand
 
 
 def along(axis: str, component: str, *coefficients: float) -> PositionModel:

@@ -1,5 +1,6 @@
 """Additive family: one curve per variable, their sum through one more curve; no memory."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -8,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Constant, Node, Sum, Table
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Variable
 
@@ -68,6 +70,10 @@ class Curve:
         """Greatest minus least value."""
         return max(self.y) - min(self.y)
 
+    def expression(self, of: Node, name: str) -> Table:
+        """Return it as a part of an expression."""
+        return Table(of, self.x, self.y, self.kind, name)
+
     def __call__(self, variable: FloatArray) -> FloatArray:
         """Return the values at `variable`, element by element: the same alone as in a batch, to the last bit."""
         breaks, value, slope, left = self._pieces
@@ -127,6 +133,14 @@ class Additive(ErrorModel):
             total = self.response(total)
         return memory, total + self.intercept
 
+    def _expression(self, change: Sequence[Node]) -> Node:
+        curves = zip(self.variables, self.curves, strict=True)
+        parts = [c.expression(v.expression(change), f"phi{k}") for k, (v, c) in enumerate(curves, start=1)]
+        total: Node = Sum(tuple(parts))
+        if self.response is not None:
+            total = self.response.expression(total, "theta^-1")
+        return Sum((Constant(self.intercept), total)) if self.intercept else total
+
     @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the inputs that have an influence on the deviation."""
@@ -139,13 +153,6 @@ class Additive(ErrorModel):
     def coefficients_by_name(self) -> dict[str, float]:
         """Return the span (greatest minus least value) of each curve, before the response."""
         return {name: c.span for name, c in zip(self._names(), self.curves, strict=True)}
-
-    def formula(self) -> str:
-        """Return the model as one line of text, such as ``theta^-1(phi1(T1) + phi2(T2))``."""
-        text = " + ".join(self._names()) or "0"
-        if self.response is not None:
-            text = f"theta^-1({text})"
-        return f"{self.intercept:.6g} + {text}" if self.intercept else text
 
     def _names(self) -> list[str]:
         return [f"phi{k}({v.name})" for k, v in enumerate(self.variables, start=1)]

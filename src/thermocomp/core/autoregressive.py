@@ -18,6 +18,7 @@ going on with its `State`, or by `begin_at`.
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, weighted
 from thermocomp.core.model import ErrorModel, FloatArray, State, check_finite
 from thermocomp.core.network import Affine, Perceptron
 
@@ -187,8 +189,11 @@ class Ticking(ErrorModel):
             f"{x.name}(t-{i})" if i else f"{x.name}(t)" for i in range(m + 1) for x in self.inputs
         ]
 
-    def _every(self) -> str:
-        return f"; t in steps of {self.interval:g} s"
+    def _regressors(self, change: Sequence[Node]) -> list[Node]:
+        """Return what `_tick` takes as parts of an expression."""
+        k, m = self.orders
+        own: list[Node] = [Past(i) for i in range(1, k + 1)]
+        return own + [Mean(x, i) for i in range(m + 1) for x in change]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,9 +264,8 @@ class Autoregressive(Ticking):
         """Return a_i as ``dz(t-i)`` and b_i as ``input(t-i)``; the time is counted in intervals."""
         return {n: c for n, c in zip(self._regressor_names(), self._weights.tolist(), strict=True) if c != 0}
 
-    def formula(self) -> str:
-        """Return the model as one line of text."""
-        return super().formula() + self._every()
+    def _expression(self, change: Sequence[Node]) -> Node:
+        return Recurrence(weighted(self._weights.tolist(), self._regressors(change), self.intercept), self.interval)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -342,9 +346,8 @@ class AutoregressiveNet(Ticking):
         found |= {f"w(h{j}, out)": w for j, w in enumerate(net.output_weights[0], start=1)}
         return found | {"th(out)": net.output_thresholds[0]}
 
-    def formula(self) -> str:
-        """Return the model as one line of text."""
-        shape = "-".join(map(str, self.net.shape))
-        kind = self.net.hidden if self.net.hidden == self.net.output else f"{self.net.hidden}-{self.net.output}"
-        constant = f"{self.intercept:.6g} + " if self.intercept else ""
-        return f"{constant}{kind} net {shape} of {', '.join(self._regressor_names())}{self._every()}"
+    def _expression(self, change: Sequence[Node]) -> Node:
+        name = f"{self.net.kind} of {', '.join(self._regressor_names())}"
+        net = self.net.expression(self._regressors(change), self.input_scaling, self.output_scaling)
+        tick: Node = Named(name, net)
+        return Recurrence(Sum((Constant(self.intercept), tick)) if self.intercept else tick, self.interval)

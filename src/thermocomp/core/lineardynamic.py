@@ -1,5 +1,6 @@
 """LinearDynamic family: a bank of first-order lags and a linear read-out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Lag, Node, weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -83,6 +85,11 @@ class LinearDynamic(ErrorModel):
         signals = self._table.evaluate(change)
         memory = lagbank.advance(memory, signals[..., follows], dt, tau)
         return memory, signals @ direct + memory @ lagged + self.intercept
+
+    def _expression(self, change: Sequence[Node]) -> Node:
+        signals = self._table.expressions(change)
+        lags = [Lag(signals[k], tau) for k, tau in zip(self.lag_signals, self.time_constants, strict=True)]
+        return weighted((*self.direct, *self.lagged), (*signals, *lags), self.intercept)
 
     @property
     def sensors(self) -> tuple[str, ...]:

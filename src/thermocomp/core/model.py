@@ -5,7 +5,7 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.expression import Clip, Node, printed
+from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.fingerprints import Prints
 from thermocomp.core.instants import seconds
 from thermocomp.core.joint import JointSupport
@@ -280,6 +282,10 @@ class ErrorModel(ABC):
         """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
 
     @abstractmethod
+    def _expression(self, change: Sequence[Node]) -> Node:
+        """Return what `_advance` gives, made of the clipped changes of the inputs."""
+
+    @abstractmethod
     def coefficients_by_name(self) -> dict[str, float]:
         """Return the coefficient of each term of `formula`."""
 
@@ -485,12 +491,14 @@ class ErrorModel(ABC):
         span = np.array([i.high - i.low for i in self.inputs]) * self.support.fade_over
         return np.where(span > 0, span, np.finfo(np.float64).tiny)
 
+    def expression(self) -> Node:
+        """Return what the model computes as a tree: what `step` gives with the support policy ``clip``."""
+        bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
+        return self._expression([Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
+
     def formula(self) -> str:
         """Return the model as one line of text."""
-        text = f"{self.intercept:.6g}" if self.intercept else ""
-        for name, coefficient in self.coefficients_by_name().items():
-            text += f" {'-' if coefficient < 0 else '+'} {abs(coefficient):.6g} {name}"
-        return text.removeprefix(" + ").strip() or "0"
+        return printed(self.expression())
 
     @property
     def accepted(self) -> bool:

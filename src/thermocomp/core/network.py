@@ -1,6 +1,6 @@
 """Network family: a net with one hidden layer; no memory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scaled, weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 
 Activation = Literal["sigmoid", "tanh", "identity"]
@@ -23,6 +24,16 @@ _FUNCTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "tanh": np.tanh,
     "identity": lambda net: net,
 }
+
+
+def _activated(function: Activation, net: Node) -> Node:
+    match function:
+        case "sigmoid":
+            return Sigmoid(net)
+        case "tanh":  # 2 sigmoid(2 net) - 1
+            return Sum((scaled(2.0, Sigmoid(scaled(2.0, net))), Constant(-1.0)))
+        case "identity":
+            return net
 
 
 @dataclass(frozen=True)
@@ -137,6 +148,24 @@ class Perceptron:
         return n_inputs, len(self.hidden_thresholds), len(self.output_thresholds)
 
     @property
+    def kind(self) -> str:
+        """Functions and shape, such as ``sigmoid net 9-20-1``."""
+        functions = self.hidden if self.hidden == self.output else f"{self.hidden}-{self.output}"
+        return f"{functions} net {'-'.join(map(str, self.shape))}"
+
+    def expression(self, inputs: Sequence[Node], input_scaling: "Affine", output_scaling: "Affine") -> Node:
+        """Return the first output, with the scalings around it, as a part of an expression."""
+        (gain, *_), (offset, *_) = output_scaling.gain, output_scaling.offset
+        scale = zip(input_scaling.gain, inputs, input_scaling.offset, strict=True)
+        given = [Sum((scaled(g, x), Constant(o))) for g, x, o in scale]
+        layer = [
+            _activated(self.hidden, weighted(weights, given, threshold))
+            for weights, threshold in zip(self.hidden_weights, self.hidden_thresholds, strict=True)
+        ]
+        out = _activated(self.output, weighted(self.output_weights[0], layer, self.output_thresholds[0]))
+        return Sum((scaled(gain, out), Constant(offset)))
+
+    @property
     def n_parameters(self) -> int:
         """Number of weights and thresholds: 263 for Chen's 9-20-3 (C-26), 57 for his 5-8-1 (C-27)."""
         n_inputs, n_hidden, n_outputs = self.shape
@@ -216,6 +245,14 @@ class Network(ErrorModel):
         scaled = self.net.evaluate(self.input_scaling(change))
         return memory, self.output_scaling(scaled)[..., 0] + self.intercept
 
+    def _expression(self, change: Sequence[Node]) -> Node:
+        names = [x.name for x in self.inputs]
+        listed = f"{names[0]} .. {names[-1]}" if len(names) > 3 else ", ".join(names) or "nothing"
+        net = Named(
+            f"{self.net.kind} of {listed}", self.net.expression(change, self.input_scaling, self.output_scaling)
+        )
+        return Sum((Constant(self.intercept), net)) if self.intercept else net
+
     @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the inputs that have an influence on the deviation: a weight that is not zero on the way out."""
@@ -233,11 +270,3 @@ class Network(ErrorModel):
             found[f"th(h{j})"] = threshold
         found |= {f"w(h{j}, out)": w for j, w in enumerate(net.output_weights[0], start=1)}
         return found | {"th(out)": net.output_thresholds[0]}
-
-    def formula(self) -> str:
-        """Return the model as one line of text, such as ``sigmoid net 9-20-1 of T1 .. T9``."""
-        kind = self.net.hidden if self.net.hidden == self.net.output else f"{self.net.hidden}-{self.net.output}"
-        names = [x.name for x in self.inputs]
-        listed = f"{names[0]} .. {names[-1]}" if len(names) > 3 else ", ".join(names) or "nothing"
-        text = f"{kind} net {'-'.join(map(str, self.net.shape))} of {listed}"
-        return f"{self.intercept:.6g} + {text}" if self.intercept else text

@@ -1,5 +1,6 @@
 """Polynomial family: squares, products, differences; no memory."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -7,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Node, weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -54,6 +56,9 @@ class Polynomial(ErrorModel):
 
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         return memory, self._table.evaluate(change) @ self._coefficients + self.intercept
+
+    def _expression(self, change: Sequence[Node]) -> Node:
+        return weighted(self.coefficients, self._table.expressions(change), self.intercept)
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -1,25 +1,60 @@
-"""The two interfaces the shop floor fills."""
+"""The two sides of a compensator that the shop floor fills: where readings come from, where corrections go.
 
-from collections.abc import Iterator, Mapping
-from typing import Protocol, runtime_checkable
+Both are asynchronous and can be lost at any time: who uses them connects, looks at the status, and connects anew.
+"""
+
+from collections.abc import AsyncIterator, Mapping
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.reading import Reading
 
 
+class Status(NamedTuple):
+    """How a connection is."""
+
+    state: Literal["closed", "connecting", "connected", "failed"]
+    reason: str = ""  #: why it failed
+    since: float | None = None  #: on the clock of the readings [s]
+
+
 @runtime_checkable
-class TemperatureSource(Protocol):
+class Source(Protocol):
     """Where readings come from."""
 
-    def readings(self) -> Iterator[Reading]:
-        """Yield readings, oldest first, until the source ends."""
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        ...
+
+    def readings(self) -> AsyncIterator[Reading]:
+        """Return readings as they come, oldest first, until the source ends or fails."""
+        ...
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        ...
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing."""
         ...
 
 
 @runtime_checkable
-class CorrectionSink(Protocol):
+class Sink(Protocol):
     """Where corrections go."""
 
-    def apply(self, corrections: Mapping[str, Correction]) -> None:
-        """Hand one correction per axis (or channel) to the controller."""
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        ...
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        """Hand one correction per axis or target to the controller, or raise `ThermocompError` with the reason."""
+        ...
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        ...
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing. What was applied stays in force."""
         ...

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Difference, Named, Node, Power, Product, Sum, scaled
 
 FloatArray = NDArray[np.float64]
 Term = tuple[int, ...]
@@ -45,6 +46,15 @@ class Variable:
             if name not in names:
                 raise InputError(f"difference {plus}-{minus}: no input is named {name!r}; there are {', '.join(names)}")
         return cls(f"{plus}-{minus}", ((names.index(plus), 1.0), (names.index(minus), -1.0)))
+
+    def expression(self, change: Sequence[Node]) -> Node:
+        """Return it as a part of an expression."""
+        match self.weights:
+            case ((index, 1.0),):
+                return change[index]
+            case ((plus, 1.0), (minus, -1.0)):
+                return Named(self.name, Difference(change[plus], change[minus]))
+        return Named(self.name, Sum(tuple(scaled(w, change[i]) for i, w in self.weights)))
 
     def written(self) -> str:
         """Return the name, in brackets where a product needs them."""
@@ -127,9 +137,22 @@ class TermTable:
         """Return the terms as text, such as ``T2*(T6-T7)``."""
         return tuple("*".join(self.variables[i].written() for i in t) for t in self.terms)
 
+    def expressions(self, change: Sequence[Node]) -> tuple[Node, ...]:
+        """Return the terms as parts of an expression."""
+        made = [v.expression(change) for v in self.variables]
+        return tuple(_multiplied([made[i] for i in t]) for t in self.terms)
+
     def inputs_of(self, term: int) -> set[int]:
         """Return the indices of the inputs that a term needs."""
         return {i for v in self.terms[term] for i, _ in self.variables[v].weights}
+
+
+def _multiplied(factors: Sequence[Node]) -> Node:
+    if len(factors) == 1:
+        return factors[0]
+    if all(f == factors[0] for f in factors):
+        return Power(factors[0], len(factors))
+    return Product(tuple(factors))
 
 
 def second_order_terms(n_variables: int) -> tuple[Term, ...]:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from thermocomp.core.exceptions import FitError
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.expression import Node
 from thermocomp.core.model import ErrorModel, Input, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
 
@@ -135,6 +136,9 @@ class EstimatorModel(ErrorModel):
     def coefficients_by_name(self) -> dict[str, float]:
         """Return nothing: there are no coefficients."""
         return {}
+
+    def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - none is made
+        raise InputError(f"{self.estimator.name} is no expression: it cannot be exported")
 
     def formula(self) -> str:
         """Return what it is, as one line of text."""

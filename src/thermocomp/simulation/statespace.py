@@ -38,7 +38,7 @@ class Operators:
 class ReducedModel:
     """``dz/dt = -(K + sum_j theta_j K_j) z + B u + (A + sum_j theta_j A_j) a``, all K symmetric.
 
-    Made by `thermocomp.simulation.fem` from finite elements; the mass matrix has become the unit matrix.
+    Made by ``tools/finite_elements`` of the repository; the mass matrix has become the unit matrix.
 
     Parameters
     ----------

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
+from finite_elements.materials import material
+from finite_elements.part import Part
+from finite_elements.screw import Screw
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import N_HATS
-from thermocomp.simulation.fem.materials import material
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.screw import Screw
 
 STEEL = material("steel")
 SCREW = Screw(diameter=0.04, length=1.0, nut=(0.2, 0.8), cells=60)

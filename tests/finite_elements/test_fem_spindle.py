@@ -7,12 +7,12 @@ import pytest
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import eigsh, spsolve
 
+from finite_elements.blocks import Blocks
+from finite_elements.materials import data, material
+from finite_elements.part import Part
+from finite_elements.revolution import Revolution
+from finite_elements.spindle import spindle
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.blocks import Blocks
-from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.revolution import Revolution
-from thermocomp.simulation.fem.spindle import spindle
 
 #: heat at 3500 1/min, of the order that the lumped machine has [W]
 HEAT = {"front_bearing": 390.0, "rear_bearing": 155.0, "stator": 230.0, "rotor": 160.0}

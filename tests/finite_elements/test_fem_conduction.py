@@ -9,10 +9,10 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 from skfem import Mesh, MeshLine, MeshQuad, MeshTri
 
+from finite_elements.conduction import MIDDLE, capacity, conduction, contact, edge, faces, together
+from finite_elements.part import Part, Surface
+from finite_elements.space import Space
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.conduction import MIDDLE, capacity, conduction, contact, edge, faces, together
-from thermocomp.simulation.fem.part import Part, Surface
-from thermocomp.simulation.fem.space import Space
 
 FloatArray = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from thermocomp.simulation.fem.bed import Bed
-from thermocomp.simulation.fem.machines import dimensions
-from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.part import Part
+from finite_elements.bed import Bed
+from finite_elements.machines import dimensions
+from finite_elements.materials import data, material
+from finite_elements.part import Part
 
 IRON = material("grey_iron")
 BED = Bed(**dimensions(data("centre.toml")["bed"]), table=-0.65, foot=0.45, shoe=0.25)

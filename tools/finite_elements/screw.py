@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshLine
 
+from finite_elements.conduction import capacity, conduction, faces
+from finite_elements.materials import Material
+from finite_elements.part import Part
+from finite_elements.space import Space
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import N_HATS
-from thermocomp.simulation.fem.conduction import capacity, conduction, faces
-from thermocomp.simulation.fem.materials import Material
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.space import Space
 
 FloatArray = NDArray[np.float64]
 

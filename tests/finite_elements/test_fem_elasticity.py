@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 from skfem import MeshLine, MeshQuad, MeshTri
 
+from finite_elements.conduction import conduction, edge
+from finite_elements.elasticity import Elastic, Tie
+from finite_elements.space import Space
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.conduction import conduction, edge
-from thermocomp.simulation.fem.elasticity import Elastic, Tie
-from thermocomp.simulation.fem.space import Space
 
 FloatArray = NDArray[np.float64]
 

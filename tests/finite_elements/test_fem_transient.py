@@ -10,9 +10,9 @@ from scipy.sparse import csr_matrix
 from scipy.special import j0, j1, y0, y1
 from skfem import MeshLine, MeshQuad
 
-from thermocomp.simulation.fem.conduction import capacity, conduction, edge
-from thermocomp.simulation.fem.space import Space
-from thermocomp.simulation.fem.transient import Stepper
+from finite_elements.conduction import capacity, conduction, edge
+from finite_elements.space import Space
+from finite_elements.transient import Stepper
 
 FloatArray = NDArray[np.float64]
 

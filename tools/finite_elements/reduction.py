@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from finite_elements.assembly import FullModel
+from finite_elements.transient import factorised
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.assembly import FullModel
-from thermocomp.simulation.fem.transient import factorised
 from thermocomp.simulation.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]

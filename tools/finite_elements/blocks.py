@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshQuad
 
+from finite_elements.materials import Material, material
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.materials import Material, material
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.integer[Any]]

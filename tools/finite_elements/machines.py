@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finite_elements.assembly import Assembly, Film, FullModel, Link, lump
+from finite_elements.bed import Bed
+from finite_elements.column import Column
+from finite_elements.materials import data, material
+from finite_elements.reduction import basis, project, reduce
+from finite_elements.screw import Screw
+from finite_elements.spindle import spindle
+from finite_elements.toolholder import toolholder
 from thermocomp.simulation.axes import N_HATS, STATIONS, TEST_POSITION
-from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, Link, lump
-from thermocomp.simulation.fem.bed import Bed
-from thermocomp.simulation.fem.column import Column
-from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.reduction import basis, project, reduce
-from thermocomp.simulation.fem.screw import Screw
-from thermocomp.simulation.fem.spindle import spindle
-from thermocomp.simulation.fem.toolholder import toolholder
 from thermocomp.simulation.statespace import ReducedModel
 
 FloatArray = NDArray[np.float64]
@@ -77,7 +77,7 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
 
 
 def tool(table: dict[str, Any] | None = None) -> FullModel:
-    """Return the full model of the resting tool (see `thermocomp.simulation.fem.toolholder`).
+    """Return the full model of the resting tool (see `finite_elements.toolholder`).
 
     Parameters
     ----------

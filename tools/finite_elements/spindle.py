@@ -1,8 +1,8 @@
 """The spindle: shaft with rotor, bearings, housing, stator and test bar, as bodies of revolution."""
 
-from thermocomp.simulation.fem.materials import data
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.revolution import Revolution, Table
+from finite_elements.materials import data
+from finite_elements.part import Part
+from finite_elements.revolution import Revolution, Table
 
 
 def spindle(table: Table | None = None) -> Part:
@@ -11,6 +11,6 @@ def spindle(table: Table | None = None) -> Part:
     Parameters
     ----------
     table : mapping, optional
-        As ``data/spindle.toml``, which is used without it; see `thermocomp.simulation.fem.revolution.Revolution`.
+        As ``data/spindle.toml``, which is used without it; see `finite_elements.revolution.Revolution`.
     """
     return Revolution(data("spindle.toml") if table is None else table).part("spindle")

@@ -8,13 +8,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from finite_elements.assembly import Assembly, Film, FullModel, lump
+from finite_elements.machines import MODELS, centre, tool
+from finite_elements.materials import material
+from finite_elements.reduction import basis, project, reduce, write
+from finite_elements.screw import Screw
+from finite_elements.transient import Stepper
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, lump
-from thermocomp.simulation.fem.machines import MODELS, centre, tool
-from thermocomp.simulation.fem.materials import material
-from thermocomp.simulation.fem.reduction import basis, project, reduce, write
-from thermocomp.simulation.fem.screw import Screw
-from thermocomp.simulation.fem.transient import Stepper
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.machine import Drive
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
@@ -191,14 +191,14 @@ def test_the_shipped_files_are_small() -> None:
 def test_the_shipped_numbers_are_those_of_the_mesh(name: str) -> None:
     made, shipped = MODELS[name](), ReducedModel.load(name)
     for names in ("theta", "inputs", "places", "observables"):
-        assert getattr(made, names) == getattr(shipped, names), "run python -m thermocomp.simulation.fem"
+        assert getattr(made, names) == getattr(shipped, names), "run python -m finite_elements"
     times = np.array([60.0, 600.0, HOUR, 4 * HOUR, 24 * HOUR, 240 * HOUR])
     for share in (0.0, 0.6):
         theta = (share,) * len(made.theta)
         new, old = (step_answers(m, theta, times) for m in (made, shipped))
         # the basis may differ in directions that hardly count: as much as the reduction itself misses
         scale = np.abs(old).max(axis=(0, 2), keepdims=True)
-        assert float((np.abs(new - old) / scale).max()) < 2e-3, "run python -m thermocomp.simulation.fem"
+        assert float((np.abs(new - old) / scale).max()) < 2e-3, "run python -m finite_elements"
 
 
 def test_it_answers_like_the_full_model_over_a_whole_test(full: FullModel, shipped: ReducedModel) -> None:

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 
-from thermocomp.simulation.fem.materials import data
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.revolution import Revolution
-from thermocomp.simulation.fem.toolholder import toolholder
-from thermocomp.simulation.fem.transient import Stepper
+from finite_elements.materials import data
+from finite_elements.part import Part
+from finite_elements.revolution import Revolution
+from finite_elements.toolholder import toolholder
+from finite_elements.transient import Stepper
 
 FloatArray = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshQuad
 
-from thermocomp.simulation.fem.conduction import capacity, conduction, edge, faces, together
-from thermocomp.simulation.fem.elasticity import Elastic, Tie
-from thermocomp.simulation.fem.materials import Material
-from thermocomp.simulation.fem.part import Part, Surface
-from thermocomp.simulation.fem.space import Space, spot
+from finite_elements.conduction import capacity, conduction, edge, faces, together
+from finite_elements.elasticity import Elastic, Tie
+from finite_elements.materials import Material
+from finite_elements.part import Part, Surface
+from finite_elements.space import Space, spot
 
 FloatArray = NDArray[np.float64]
 

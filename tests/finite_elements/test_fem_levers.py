@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finite_elements import machines
+from finite_elements.assembly import Assembly, FullModel
+from finite_elements.bed import Bed
+from finite_elements.column import Column
+from finite_elements.machines import dimensions
+from finite_elements.materials import data, material
+from finite_elements.part import Part
 from thermocomp.simulation.axes import STATIONS, TEST_POSITION
-from thermocomp.simulation.fem import machines
-from thermocomp.simulation.fem.assembly import Assembly, FullModel
-from thermocomp.simulation.fem.bed import Bed
-from thermocomp.simulation.fem.column import Column
-from thermocomp.simulation.fem.machines import dimensions
-from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.part import Part
 
 FloatArray = NDArray[np.float64]
 #: from a place x, y, z [m] to the displacement there [um]

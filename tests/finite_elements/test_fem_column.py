@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from thermocomp.simulation.fem.column import Column
-from thermocomp.simulation.fem.machines import dimensions
-from thermocomp.simulation.fem.materials import data, material
-from thermocomp.simulation.fem.part import Part
+from finite_elements.column import Column
+from finite_elements.machines import dimensions
+from finite_elements.materials import data, material
+from finite_elements.part import Part
 
 FloatArray = NDArray[np.float64]
 IRON = material("grey_iron")

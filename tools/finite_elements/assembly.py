@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csr_matrix
 
+from finite_elements.part import Part, Surface
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.part import Part, Surface
 from thermocomp.simulation.machine import Air
 
 FloatArray = NDArray[np.float64]

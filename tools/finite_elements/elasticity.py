@@ -15,8 +15,8 @@ from scipy.sparse import bmat, csr_matrix, diags
 from scipy.sparse.linalg import splu
 from skfem import BilinearForm
 
+from finite_elements.space import Facets, Space
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.fem.space import Facets, Space
 
 FloatArray = NDArray[np.float64]
 

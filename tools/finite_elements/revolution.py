@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from thermocomp.simulation.fem.blocks import Blocks, Box
-from thermocomp.simulation.fem.conduction import capacity, conduction, contact, edge, together
-from thermocomp.simulation.fem.elasticity import Elastic, Tie
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.space import Space, Weight
+from finite_elements.blocks import Blocks, Box
+from finite_elements.conduction import capacity, conduction, contact, edge, together
+from finite_elements.elasticity import Elastic, Tie
+from finite_elements.part import Part
+from finite_elements.space import Space, Weight
 
 FloatArray = NDArray[np.float64]
 Table = Mapping[str, Any]
@@ -32,7 +32,7 @@ class Revolution:
     table : mapping
         ``size`` of the largest element [m]; ``height`` of the origin above the floor [m], and whether the axis is
         ``upright``; ``cuts`` where places end within blocks; lists ``block`` (see
-        `thermocomp.simulation.fem.blocks.Blocks`) and ``contact`` (``a``, ``b``, where, ``conductance`` [W/(m2 K)],
+        `finite_elements.blocks.Blocks`) and ``contact`` (``a``, ``b``, where, ``conductance`` [W/(m2 K)],
         ``rotation``: what full speed adds to it, ``stiffness`` along r and z [N/m3]); mappings ``surface``,
         ``patch``, ``support`` and ``observable``.
 

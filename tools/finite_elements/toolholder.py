@@ -1,8 +1,8 @@
 """The resting tool system of Wessel 2004, section IV (W-08): a heated hydraulic chuck on a fixed spindle shaft."""
 
-from thermocomp.simulation.fem.materials import data
-from thermocomp.simulation.fem.part import Part
-from thermocomp.simulation.fem.revolution import Revolution, Table
+from finite_elements.materials import data
+from finite_elements.part import Part
+from finite_elements.revolution import Revolution, Table
 
 
 def toolholder(table: Table | None = None) -> Part:
@@ -15,7 +15,7 @@ def toolholder(table: Table | None = None) -> Part:
     Parameters
     ----------
     table : mapping, optional
-        As ``data/tool.toml``, which is used without it; see `thermocomp.simulation.fem.revolution.Revolution`. Its
+        As ``data/tool.toml``, which is used without it; see `finite_elements.revolution.Revolution`. Its
         ``film`` [W/(m2 K)] belongs to the surfaces of the same names.
     """
     return Revolution(data("tool.toml") if table is None else table).part("tool")

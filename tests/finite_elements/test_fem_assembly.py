@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finite_elements.assembly import Assembly, Film, FullModel, Link, lump
+from finite_elements.machines import centre, tool
+from finite_elements.materials import material
+from finite_elements.screw import Screw
+from finite_elements.transient import factorised
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import STATIONS, TEST_POSITION
-from thermocomp.simulation.fem.assembly import Assembly, Film, FullModel, Link, lump
-from thermocomp.simulation.fem.machines import centre, tool
-from thermocomp.simulation.fem.materials import material
-from thermocomp.simulation.fem.screw import Screw
-from thermocomp.simulation.fem.transient import factorised
 
 FloatArray = NDArray[np.float64]
 RUNNING = {"rotation": 0.8, "flow": 1.0, "feed_x": 0.2, "feed_y": 0.2, "feed_z": 0.2}

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 from skfem import BilinearForm
 
-from thermocomp.simulation.fem.part import Surface
-from thermocomp.simulation.fem.space import Facets, Space, Weight
+from finite_elements.part import Surface
+from finite_elements.space import Facets, Space, Weight
 from thermocomp.simulation.machine import Air
 
 FloatArray = NDArray[np.float64]

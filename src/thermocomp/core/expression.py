@@ -1,0 +1,252 @@
+"""What a frozen model computes, as a small tree: the printed formula and every export walk it, and ask for no family.
+
+The leaves are the inputs minus what counts as zero. A tree is the model within its trained range: inputs are clipped to
+that range, widened by the margin, and what `Support` adds beyond (``hold``, ``fade``) is not in the tree.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from thermocomp.core.exceptions import InputError
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input of the model minus its zero [its unit].
+
+    Parameters
+    ----------
+    index : int
+        Its place in ``ErrorModel.inputs``.
+    name : str
+    """
+
+    index: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A value kept between two bounds."""
+
+    of: "Node"
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Sum:
+    """The sum of its terms; 0 without any."""
+
+    terms: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What is left of the first when the second is taken off."""
+
+    of: "Node"
+    minus: "Node"
+
+
+@dataclass(frozen=True)
+class Product:
+    """The product of its factors; 1 without any."""
+
+    factors: tuple["Node", ...]
+
+
+@dataclass(frozen=True)
+class Power:
+    """A value times itself, so often."""
+
+    of: "Node"
+    exponent: int
+
+
+@dataclass(frozen=True)
+class Sigmoid:
+    """1 / (1 + exp(-value)) (C-25)."""
+
+    of: "Node"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A function of one value, constant beyond its ends; see `thermocomp.core.additive.Curve`.
+
+    Parameters
+    ----------
+    of : Node
+    x, y : tuple of float
+    kind : {'linear', 'step'}
+    name : str
+        Such as ``phi1``.
+    """
+
+    of: "Node"
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    kind: Literal["linear", "step"]
+    name: str
+
+
+@dataclass(frozen=True)
+class Lag:
+    """A first-order lag: tau dx/dt = value - x, the value being constant over a step; at rest in the first reading.
+
+    Parameters
+    ----------
+    of : Node
+    time_constant : float
+        tau [s].
+    """
+
+    of: "Node"
+    time_constant: float
+
+
+@dataclass(frozen=True)
+class Past:
+    """In a `Recurrence`: what it was some ticks ago; 1 is the last tick."""
+
+    ticks: int
+
+
+@dataclass(frozen=True)
+class Mean:
+    """In a `Recurrence`: the mean of a value over the interval that ended some ticks ago; 0 is the one that ends now.
+
+    A reading stands for the time since the reading before it; before the first, the value is 0 but at the very start.
+    """
+
+    of: "Node"
+    ticks: int
+
+
+@dataclass(frozen=True)
+class Recurrence:
+    """A value that is made anew at every tick of a clock of its own; see `thermocomp.core.autoregressive`.
+
+    Between ticks it goes in a straight line towards what the next would be if the inputs went on as since the last.
+
+    Parameters
+    ----------
+    tick : Node
+        With `Past` and `Mean` among its leaves.
+    interval : float
+        From tick to tick [s].
+    """
+
+    tick: "Node"
+    interval: float
+
+
+@dataclass(frozen=True)
+class Named:
+    """A part that has a name of its own in the printed formula, such as ``T6-T7``."""
+
+    name: str
+    of: "Node"
+
+
+Node = (
+    Constant
+    | Input
+    | Clip
+    | Sum
+    | Difference
+    | Product
+    | Power
+    | Sigmoid
+    | Table
+    | Lag
+    | Past
+    | Mean
+    | Recurrence
+    | Named
+)
+
+
+def scaled(factor: float, of: Node) -> Node:
+    """Return a node times a number."""
+    return of if factor == 1.0 else Product((Constant(factor), of))
+
+
+def weighted(weights: Sequence[float], of: Sequence[Node], constant: float = 0.0) -> Node:
+    """Return the sum of nodes times numbers, and of a constant; what is zero is left out."""
+    found: list[Node] = [Constant(constant)] if constant else []
+    found += [Product((Constant(w), x)) for w, x in zip(weights, of, strict=True) if w != 0]
+    return Sum(tuple(found))
+
+
+def printed(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kind of node
+    """Return a tree as one line of text, such as ``1.5 T1 - 0.5 lag(T1, 10 min) + 4e-07 n*n``.
+
+    Parameters
+    ----------
+    node : Node
+
+    Returns
+    -------
+    str
+    """
+    match node:
+        case Constant(value):
+            return f"{value:.6g}"
+        case Input(_, name) | Named(name, _):
+            return name
+        case Clip(of):
+            return printed(of)
+        case Sum(terms):
+            return _sum(terms)
+        case Difference(of, minus):
+            return f"{printed(of)}-{_bracketed(minus)}"
+        case Product((Constant(value), *others)) if others:
+            return f"{value:.6g} {_product(others)}"
+        case Product(factors):
+            return _product(factors)
+        case Power(of, exponent):
+            return "*".join([_bracketed(of)] * exponent)
+        case Sigmoid(of):
+            return f"sigmoid({printed(of)})"
+        case Table(of, name=name):
+            return f"{name}({printed(of)})"
+        case Lag(of, tau):
+            return f"lag({printed(of)}, {tau / 60:.4g} min)"
+        case Past(ticks):
+            return f"dz(t-{ticks})"
+        case Mean(of, ticks):
+            return f"{printed(of)}(t-{ticks})" if ticks else f"{printed(of)}(t)"
+        case Recurrence(tick, interval):
+            return f"{printed(tick)}; t in steps of {interval:g} s"
+    raise InputError(f"{node!r} is no part of an expression")
+
+
+def _sum(terms: Sequence[Node]) -> str:
+    text = ""
+    for term in terms:
+        match term:
+            case Product((Constant(value), *others)) if others and value < 0:
+                text += f" - {printed(Product((Constant(-value), *others)))}"
+            case _:
+                text += f" + {printed(term)}"
+    return text.removeprefix(" + ").strip() or "0"
+
+
+def _product(factors: Sequence[Node]) -> str:
+    return "*".join(map(_bracketed, factors)) or "1"
+
+
+def _bracketed(node: Node) -> str:
+    """Return a part of a product, in brackets if it is a sum."""
+    inner = node.of if isinstance(node, Named | Clip) else node
+    return f"({printed(node)})" if isinstance(inner, Sum | Difference) else printed(node)
