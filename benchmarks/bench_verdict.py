@@ -97,20 +97,23 @@ def continued(kind: str, files: int) -> Callable[[np.random.Generator], Samples]
     return make
 
 
-def real(left: float, cycles: int, harm: float = 0.0) -> Callable[[np.random.Generator], Samples]:
+def real(
+    left: float, cycles: int, *, harm: float = 0.0, keep: bool = False
+) -> Callable[[np.random.Generator], Samples]:
     """Drift of which the sensors tell all but a share; the share differs between cycles. In one, harm may be done [um].
 
-    The sensors say the same but for their noise, as those of a machine nearly do.
+    The sensors say the same but for their noise, as those of a machine nearly do. With `keep` what they cannot tell is
+    nowhere larger than the drift at its largest: the best of models does no harm. Without, it does in 8 % of the
+    recordings of six cycles with half left, and is refused with good reason.
     """
 
     def make(rng: np.random.Generator) -> Samples:
         found = []
         for k in range(cycles):
-            heat, other = smooth(rng), smooth(rng)
-            other -= heat * (other @ heat) / (heat @ heat)
-            share = min(left * np.exp(SPREAD * rng.normal()), 0.95)
             size = rng.uniform(15, 40)  # RMS of the drift [um]
-            told, unknown = heat / rms(heat) * np.sqrt(1 - share**2), other / rms(other) * share
+            told, unknown = parts(rng, left)
+            while keep and np.abs(unknown).max() > np.abs(told + unknown).max():
+                told, unknown = parts(rng, left)
             drift = size * (told + unknown)
             if harm and k == cycles - 1:  # the machine hardly moves, and the sensors say it does
                 drift = 0.02 * size * told
@@ -120,6 +123,14 @@ def real(left: float, cycles: int, harm: float = 0.0) -> Callable[[np.random.Gen
         return stack(found, ["z_um"])
 
     return make
+
+
+def parts(rng: np.random.Generator, left: float) -> tuple[FloatArray, FloatArray]:
+    """Return what the sensors tell of a drift of RMS 1, and the rest, which has nothing to do with it."""
+    heat, other = smooth(rng), smooth(rng)
+    other -= heat * (other @ heat) / (heat @ heat)
+    share = min(left * np.exp(SPREAD * rng.normal()), 0.95)
+    return heat / rms(heat) * np.sqrt(1 - share**2), other / rms(other) * share
 
 
 def smooth(rng: np.random.Generator) -> FloatArray:
@@ -150,7 +161,7 @@ def cases() -> Iterator[Case]:
         yield Case(f"{kind}, split", independent(kind, 1, 6), lambda s: splits.by_rows(s, 0.75, 0.25), FIVE, high=0.07)
     yield Case("harmful in one of six", real(0.5, 6, harm=5.0), splits.leave_one_cycle_out, FIVE, high=0.05)
     for who, methods in (("five methods", FIVE), (f"all {len(ALL)} methods", ALL)):
-        half, fifth = real(0.5, 6), real(0.2, 4)
+        half, fifth = real(0.5, 6, keep=True), real(0.2, 4, keep=True)
         yield Case(f"half left, six cycles, {who}", half, splits.leave_one_cycle_out, methods, low=0.9, best=True)
         yield Case(f"a fifth left, four cycles, {who}", fifth, splits.leave_one_cycle_out, methods, low=0.98, best=True)
 
