@@ -69,24 +69,16 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
 }
 
-html_theme = "alabaster"
+html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
 html_css_files = ["thermocomp.css"]
 html_title = f"thermocomp {release}"
 html_show_sourcelink = False
-html_show_sphinx = False
 html_theme_options = {
-    "description": "From temperature recordings to a validated thermal compensation",
-    "fixed_sidebar": True,
-    "font_family": "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif",
-    "head_font_family": "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif",
-    "code_font_family": "ui-monospace, 'SF Mono', Consolas, 'DejaVu Sans Mono', monospace",
-    "font_size": "16px",
-    "code_font_size": "0.85em",
-    "page_width": "1120px",
-    "sidebar_width": "230px",
-    "sidebar_collapse": True,
-    "show_powered_by": False,
-    "show_relbar_bottom": True,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "show_nav_level": 2,
 }
-html_sidebars = {"**": ["about.html", "searchfield.html", "navigation.html"]}
+html_sidebars = {"index": []}

@@ -26,7 +26,7 @@ from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.recording.quality import check
 from thermocomp.recording.samples import stack
-from thermocomp.runtime import compensator
+from thermocomp.runtime.compensator import Compensator
 
 # %%
 # 1. The test
@@ -176,10 +176,11 @@ workday = record("random")[0]
 names = [channel.name for channel in loaded.inputs]
 values = workday.table[names].to_numpy()
 limits = Limits(magnitude=150.0, rate=0.05)
-state = compensator.start([loaded])
+compensator = Compensator.of([loaded], limits)
+state = compensator.start()
 
 reading = Reading(workday.time[0], dict(zip(names, values[0], strict=True)))
-state, result = compensator.step([loaded], limits, state, reading, now=reading.time)
+state, result = compensator.step(state, reading, now=reading.time)
 print(reading.values["t_front_seat_C"], "degC:", result.corrections["z_um"])
 
 # %%
@@ -193,7 +194,7 @@ for time, row in zip(workday.time[1:], values[1:], strict=True):
     reading = Reading(time, dict(zip(names, row, strict=True)))
     if 7.1 < time / 3600 < 7.6:
         reading = Reading(time, {**reading.values, "t_front_seat_C": float("nan")})
-    state, result = compensator.step([loaded], limits, state, reading, now=time)
+    state, result = compensator.step(state, reading, now=time)
     corrections.append(result.corrections["z_um"].offset)
     if result.rejected:
         turned_away.append(time / 3600)

@@ -1,19 +1,25 @@
-"""The README shows what the commands really print."""
+"""README and docs show what the commands really print."""
 
 import re
-import shlex
 from pathlib import Path
 
 import pytest
 
 from thermocomp.cli.app import app, run
 
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
+README = ROOT / "README.md"
 
 
 def blocks() -> list[list[str]]:
-    """Return the lines of each ```text block."""
+    """Return the lines of each ```text block of the README."""
     return [b.strip("\n").split("\n") for b in re.findall(r"```text\n(.*?)```", README.read_text("utf-8"), re.DOTALL)]
+
+
+def page_blocks(name: str) -> list[list[str]]:
+    """Return the lines of each block of text of a page of the docs."""
+    found = re.findall(r"code-block:: text\n\n((?:(?:   .*)?\n)+)", (ROOT / "docs" / name).read_text("utf-8"))
+    return [[line[3:] for line in block.rstrip("\n").split("\n")] for block in found]
 
 
 def assert_printed(shown: list[str], output: str) -> None:
@@ -30,7 +36,9 @@ def test_the_demo_prints_what_the_readme_shows(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     assert run(["demo", "--output", "demo"]) == 0
-    assert_printed(blocks()[0], capsys.readouterr().out)
+    printed = capsys.readouterr().out
+    assert_printed(blocks()[0], printed)
+    assert_printed(page_blocks("demo.rst")[0], printed)
     assert sorted(p.name for p in Path("demo").iterdir()) == ["model.json", "recording.parquet", "report.html"]
     assert run(["demo", "--output", "demo"]) == 2
     assert "exists already" in capsys.readouterr().err
@@ -46,37 +54,26 @@ def test_python_prints_what_the_readme_shows(
     assert sorted(p.name for p in Path().iterdir()) == ["model.json", "report.html"]
 
 
-def test_the_real_machine_prints_what_the_readme_shows(
+def test_the_real_machine_prints_what_its_page_shows(
     shared_data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     recording = str(shared_data / "fl_thermal" / "recording.csv")
     assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic"]) == 0
-    assert_printed(blocks()[3], capsys.readouterr().out)
+    assert_printed(page_blocks("real_machine.rst")[1], capsys.readouterr().out)
 
 
-@pytest.mark.usefixtures("interpreter")
-def test_the_revision_prints_what_the_readme_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-    shown = README.read_text("utf-8")
-    wanted = r"^    thermocomp ((?:simulate precomp|fit test-1|revise).*?)(?: +#.*)?$"
-    commands = re.findall(wanted, shown, re.MULTILINE)
-    assert len(commands) == 3
-    Path("plate.ngc").write_bytes((README.parent / "docs" / "files" / "plate.ngc").read_bytes())
-    for command in commands:
-        assert run(shlex.split(command)) == 0
-    assert_printed(blocks()[6], capsys.readouterr().out)
-
-
-def test_the_study_prints_what_the_readme_shows(
+def test_the_study_prints_what_its_page_shows(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert run(["papers", "hwang"]) == 0
-    assert_printed(blocks()[4], capsys.readouterr().out)
+    assert_printed(page_blocks("studies.rst")[0], capsys.readouterr().out)
+
+
+def test_the_readme_is_short_and_its_table_is_that_of_the_page() -> None:
+    assert len(README.read_bytes()) <= 8_000
+    assert set(blocks()[2]) <= set(page_blocks("real_machine.rst")[0])
 
 
 def test_commands_of_the_readme_exist() -> None:
@@ -84,4 +81,4 @@ def test_commands_of_the_readme_exist() -> None:
     for name in re.findall(r"^ +thermocomp (\S+)", text, re.MULTILINE):
         assert name in list(app)
     for target in re.findall(r"^ +make (\w+)", text, re.MULTILINE):
-        assert re.search(rf"^{target}:", (README.parent / "Makefile").read_text("utf-8"), re.MULTILINE)
+        assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
