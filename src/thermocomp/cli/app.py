@@ -8,39 +8,42 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp import __version__
-from thermocomp.cli import commands
-from thermocomp.cli.iso230 import iso230
-from thermocomp.cli.papers import papers
-from thermocomp.cli.position import position
-from thermocomp.cli.revise import revise
+from thermocomp.cli import jsonoutput
+from thermocomp.cli.exits import STDIN, STOPPED
 from thermocomp.cli.shown import shown
-from thermocomp.cli.volumetric import volumetric
 from thermocomp.core.exceptions import ThermocompError
 
 app = App(
     name="thermocomp",
     help="Thermal error compensation of machine tools: from temperature recordings to a validated model.",
     version=__version__,
+    version_flags=["--version", "-V"],
     # every command returns its exit code; nothing but `main` leaves the process
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
 
-for command in (
-    commands.demo,
-    commands.simulate,
-    commands.check,
-    commands.select,
-    commands.fit,
-    commands.assess,
-    commands.compare,
-    position,
-    iso230,
-    volumetric,
-    revise,
-    papers,
-):
-    app.command(command)
+#: a file each; it is read when its command is called, so this line of its docstring stands here too (a test compares)
+COMMANDS = {
+    "demo": "Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.",
+    "simulate": "Record an experiment on a virtual machine.",
+    "check": "Tell what recordings hold and what is wrong with them; of more than three files, a line each.",
+    "select": "Choose the few temperature sensors that a model needs.",
+    "fit": "Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.",
+    "assess": "Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.",
+    "compare": "Compare methods on thermal cycles they have not seen, beside no compensation.",
+    "position": "Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.",
+    "iso230": "Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of "
+    "channels.",
+    "volumetric": "Tell the error of the tool's tip at a point and all over the work volume, and what corrections "
+    "leave of it.",
+    "revise": "Correct an NC program by the drift it will cause, before it is run.",
+    "papers": "Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds "
+    "here.",
+}
+for command, summary in COMMANDS.items():
+    app.command(f"thermocomp.cli.{command}:{command}", name=command, help=summary)
+app.register_install_completion_command()
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -56,15 +59,17 @@ def run(arguments: Sequence[str] | None = None) -> int:
     int
         0 done, 1 judged bad, 2 unusable input, 130 stopped by the keyboard.
     """
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    jsonoutput.called_with = given
     try:
-        code = app(None if arguments is None else list(arguments))
+        code = app([str(STDIN) if word == "-" else word for word in given])
     except ThermocompError as e:
         return _unusable(str(e))
     except OSError as e:  # a folder that may not be written to, a full disk
         return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
     except KeyboardInterrupt:
         Console(stderr=True, highlight=False).print("[bold red]stopped:[/] nothing was finished, nothing was written")
-        return commands.STOPPED
+        return STOPPED
     return code if isinstance(code, int) else 0
 
 
@@ -76,6 +81,8 @@ def main() -> None:
 def _unusable(message: str) -> int:
     text = "\n".join(shown(line) for line in message.split("\n"))
     Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
+    if "--json" in jsonoutput.called_with:
+        jsonoutput.print_json({"error": message}, Console())
     return 2
 
 

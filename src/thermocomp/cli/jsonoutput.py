@@ -2,14 +2,20 @@
 
 import json
 import math
+from numbers import Integral, Real
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 
+from thermocomp import __version__
 
-def print_json(content: Any, console: Console) -> None:
-    """Print what a program shall read."""
+#: the command line that is being run
+called_with: list[str] = []
+
+
+def print_json(content: dict[str, Any], console: Console) -> None:
+    """Print what a program shall read, and by which version and settings it was made."""
+    content = {"thermocomp": __version__, "arguments": called_with, **content}
     # JSON has no nan and no infinity: what is not known is null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
     # a name of a file that is no text: what stands for its bytes is written as JSON escapes it
@@ -21,6 +27,6 @@ def _nulled(value: Any) -> Any:
         return {k: _nulled(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_nulled(v) for v in value]
-    if isinstance(value, float | np.floating):
+    if isinstance(value, Real) and not isinstance(value, Integral):
         return float(value) if math.isfinite(value) else None
     return value

@@ -1,5 +1,8 @@
 """Options that several commands share, and what they stand for."""
 
+import shutil
+import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
+from thermocomp.cli.exits import STDIN
 from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -30,6 +34,7 @@ Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
 OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
 OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
 Flag = Annotated[bool, Parameter(negative=())]
+Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Json = Annotated[bool, Parameter(name="--json", negative=())]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
@@ -43,7 +48,7 @@ class Study:
     Parameters
     ----------
     target : list of str
-        Displacement channels to predict.
+        Displacement channels to predict; left out, the command lists them.
     inputs : list of str
         Channels to predict from; all temperatures and the spindle speed if not given.
     mapping : Path
@@ -67,7 +72,7 @@ class Study:
         Processes to share the work among; -1 takes all cores.
     """
 
-    target: Names
+    target: OptionalNames = None
     inputs: OptionalNames = None
     mapping: Path | None = None
     split: str | None = None
@@ -86,6 +91,8 @@ class Study:
 
         if self.jobs == 0:
             raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+        if not self.target:
+            raise InputError(f"name what to predict with --target: {_displacements(tests)}")
         speed = tests[0].speed
         zeroing = Zeroing(
             self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
@@ -150,13 +157,27 @@ class Selector(Settings):  # noqa: D101 - that of Settings, which the help is ma
 
 
 def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]":
-    """Read the recordings named on the command line."""
+    """Read the recordings named on the command line; ``-`` is a CSV file on standard input."""
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
     with needs("study"):
         from thermocomp.files import mapping as mappings
         from thermocomp.files import recordings as reader
-    return reader.read_all(paths, mappings.read_mapping(mapping) if mapping is not None else None)
+    columns = mappings.read_mapping(mapping) if mapping is not None else None
+    if STDIN not in paths:
+        return reader.read_all(paths, columns)
+    if paths.count(STDIN) > 1:
+        raise InputError("-: there is one standard input")
+    with tempfile.TemporaryDirectory(prefix="thermocomp-") as folder:
+        typed = Path(folder, "stdin.csv")
+        with typed.open("wb") as file:
+            shutil.copyfileobj(sys.stdin.buffer, file)
+        return reader.read_all([typed if p == STDIN else p for p in paths], columns)
+
+
+def _displacements(tests: "Sequence[Recording]") -> str:
+    names = dict.fromkeys(c.name for test in tests for c in test.displacements)
+    return ", ".join(names) or "no recording has a displacement"
 
 
 def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:

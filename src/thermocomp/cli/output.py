@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice, written
@@ -24,6 +24,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report.running import told
 from thermocomp.report.summary import cautions, unlike
+from thermocomp.simulation.protocol import Experiment
 
 
 def show_comparison(
@@ -258,6 +259,18 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
             f"{p}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
             f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
         )
+
+
+def show_experiments(experiments: Sequence[Experiment], console: Console, *, as_json: bool) -> None:
+    """Print what can be recorded on the virtual machines."""
+    if as_json:
+        content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
+        print_json({"experiments": content}, console)
+        return
+    table = Table("experiment", Column("tests", justify="right"), "what it is", box=None)
+    for e in experiments:
+        table.add_row(e.name, str(len(e.tests)), escape(e.description))
+    console.print(table)
 
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Table:

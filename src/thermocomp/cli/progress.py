@@ -15,6 +15,7 @@ from rich.progress import (
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
+    TimeRemainingColumn,
 )
 
 from thermocomp.cli.shown import shown
@@ -84,5 +85,11 @@ class _Lines:
 
 
 def _bar(done: ProgressColumn, hidden: bool) -> Progress:
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), done, TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        done,
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
     return Progress(*columns, console=_console, transient=True, disable=hidden or not _console.file.isatty())

@@ -1,0 +1,79 @@
+"""`thermocomp assess`: a model file, judged on recordings."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Compensator,
+    Json,
+    Recordings,
+    read_recordings,
+    tell_trouble,
+)
+from thermocomp.cli.progress import by_steps
+
+_console = Console(highlight=False)
+
+
+def assess(
+    model: Path,
+    recordings: Recordings,
+    /,
+    *,
+    mapping: Path | None = None,
+    harm_margin: float | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
+    json: Json = False,
+) -> int:
+    """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
+
+    Rows that a model has learned from are known again by their fingerprints, whatever file they stand in: they are left
+    out and counted.
+
+    Parameters
+    ----------
+    model : Path
+        Model file from ``thermocomp fit``.
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    mapping : Path
+        TOML file that says what the columns are.
+    harm_margin : float
+        Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
+    json : bool
+        Print results for a machine instead of a table.
+
+    Returns
+    -------
+    int
+        0 no model refused, 1 one was refused here or when it was fitted, or has learned from all there is to judge it
+        on, 2 unusable input.
+    """
+    tests = read_recordings(recordings, mapping)
+    with needs("study"):
+        from thermocomp.assessment import study as studies
+        from thermocomp.assessment.results import Rules
+        from thermocomp.cli import output as out
+        from thermocomp.files import modelfile
+    models = modelfile.read(model)
+    trouble = tell_trouble(tests)
+    with by_steps(len(models), hidden=json) as progress:
+        judged = studies.assess(
+            models,
+            tests,
+            rules=Rules(harm_margin),
+            limits=compensator.limits(),
+            starts=beginning.of(tests, mapping),
+            progress=progress,
+        )
+    out.show_assess(judged, trouble, _console, as_json=json)
+    before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
+    return 1 if "refused" in before | {a.word for a in judged.overall()} else 0

@@ -1,0 +1,61 @@
+"""`thermocomp check`: what recordings hold, and what is wrong with them."""
+
+from pathlib import Path
+
+from rich.console import Console
+
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Flag,
+    Json,
+    OptionalOutput,
+    Recordings,
+    read_recordings,
+    refuse_existing,
+)
+
+_console = Console(highlight=False)
+
+
+def check(
+    recordings: Recordings,
+    /,
+    *,
+    mapping: Path | None = None,
+    output: OptionalOutput = None,
+    overwrite: Flag = False,
+    json: Json = False,
+) -> int:
+    """Tell what recordings hold and what is wrong with them; of more than three files, a line each.
+
+    Parameters
+    ----------
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    mapping : Path
+        TOML file that says what the columns are.
+    output : Path
+        Page to write (.html): every channel drawn, with what was found marked at its rows.
+    overwrite : bool
+        Write over an existing page.
+    json : bool
+        Print results for a machine instead of a table.
+
+    Returns
+    -------
+    int
+        0 nothing wrong, 1 trouble found, 2 unusable input.
+    """
+    if output is not None:
+        refuse_existing([output], overwrite, recordings, ".html")
+    tests = read_recordings(recordings, mapping)
+    with needs("study"):
+        from thermocomp.cli import checked
+        from thermocomp.recording.quality import check as findings_of
+    findings = [findings_of(test) for test in tests]
+    if output is not None:
+        with needs("study"):
+            from thermocomp.report import checks
+        checks.write(tests, findings, output)
+    checked.show_check(tests, findings, output, _console, as_json=json)
+    return 1 if any(f.severity == "trouble" for found in findings for f in found) else 0

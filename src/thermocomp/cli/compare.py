@@ -1,0 +1,91 @@
+"""`thermocomp compare`: methods, judged beside each other."""
+
+from rich.console import Console
+
+from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.exits import STOPPED
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Compensator,
+    Flag,
+    Json,
+    Names,
+    OptionalOutput,
+    Recordings,
+    Study,
+    read_recordings,
+    refuse_existing,
+    tell_trouble,
+)
+from thermocomp.cli.progress import by_steps
+
+DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
+
+_console = Console(highlight=False)
+
+
+def compare(
+    recordings: Recordings,
+    /,
+    *,
+    study: Study = Study(),  # noqa: B008 - frozen
+    models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
+    primary: str | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
+    output: OptionalOutput = None,
+    overwrite: Flag = False,
+    json: Json = False,
+) -> int:
+    """Compare methods on thermal cycles they have not seen, beside no compensation.
+
+    Parameters
+    ----------
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    study : Study
+        What is predicted from what, and on what it is judged.
+    models : list of str
+        Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
+        mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+    primary : str
+        Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
+        number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
+    compensator : Compensator
+        Its limits: what would run is judged, not the models alone.
+    beginning : Beginning
+        How the recordings begin.
+    output : Path
+        Report to write (.html).
+    overwrite : bool
+        Write over an existing report.
+    json : bool
+        Print results for a machine instead of a table.
+
+    Returns
+    -------
+    int
+        0 every target has a model that may run, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
+        (what was judged until then is shown).
+    """
+    tests = read_recordings(recordings, study.mapping)
+    with needs("study"):
+        from thermocomp.assessment import compare as comparing
+        from thermocomp.cli import output as out
+    if output is not None:
+        refuse_existing([output], overwrite, recordings, ".html")
+    trouble = tell_trouble(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
+    judging, rules, limits = study.judging(samples), study.rules(primary), compensator.limits()
+    with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
+        comparison = comparing.compare(
+            samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
+        )
+    if output is not None:
+        with needs("study"):
+            from thermocomp.report import html
+        html.write(comparison, tests, output, samples)
+    out.show_comparison(comparison, output, trouble, _console, as_json=json)
+    if comparison.left:
+        return STOPPED
+    return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1

@@ -1,0 +1,118 @@
+"""`thermocomp fit`: a model with its honest error, in a file."""
+
+from dataclasses import replace
+from typing import Literal
+
+from rich.console import Console
+
+from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Compensator,
+    Flag,
+    Json,
+    OptionalNames,
+    Output,
+    Quiet,
+    Recordings,
+    Study,
+    read_recordings,
+    refuse_existing,
+    tell_trouble,
+)
+from thermocomp.cli.progress import by_steps
+
+Policy = Literal["clip", "hold", "fade"]
+
+_console = Console(highlight=False)
+
+
+def fit(
+    recordings: Recordings,
+    /,
+    *,
+    study: Study = Study(),  # noqa: B008 - frozen
+    model: str = "dynamic",
+    tilt: OptionalNames = None,
+    output: Output,
+    support: Policy = "clip",
+    margin: float = 0.25,
+    accept_unproven: str | None = None,
+    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
+    overwrite: Flag = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.
+
+    The method is first judged on unseen cycles, then fitted to everything. A refused model is written too, with the
+    refusal inside: nothing will run it. An unproven one runs in shadow only.
+
+    Parameters
+    ----------
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    study : Study
+        What is predicted from what, and on what it is judged.
+    model : str
+        A method as in ``thermocomp compare``, all but gp.
+    tilt : list of str
+        Tilts to predict too, each of two probes and their distance, such as A0C=y1_um:y2_um:100mm (turn about X, the
+        probe at the tip first) or B0C=x1_um:x2_um:100mm (about Y).
+    output : Path
+        Model file to write (.json).
+    support : str
+        What the model does outside its trained range: clip its inputs, hold its last value, or fade to zero.
+    margin : float
+        Share of each input's trained span by which its range is widened.
+    accept_unproven : str
+        Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file and said
+        wherever the model is shown. A refused one is never taken.
+    compensator : Compensator
+        Its limits: what would run is judged, not the model alone.
+    beginning : Beginning
+        How the recordings begin.
+    overwrite : bool
+        Write over an existing model file.
+    json : bool
+        Print results for a machine instead of a table.
+
+    Returns
+    -------
+    int
+        0 done, 1 a component was refused, 2 unusable input.
+    """
+    tests = read_recordings(recordings, study.mapping)
+    if tilt:
+        with needs("study"):
+            from thermocomp.recording.tilts import with_tilts
+        tests, names = with_tilts(tests, tilt)
+        study = replace(study, target=[*(study.target or []), *names])
+    with needs("study"):
+        from thermocomp.assessment import study as studies
+        from thermocomp.assessment.compare import n_pieces
+        from thermocomp.cli import output as out
+        from thermocomp.core.model import Support
+        from thermocomp.files import modelfile
+    refuse_existing([output], overwrite, recordings, ".json")
+    trouble = tell_trouble(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
+    judging, how = study.judging(samples), Support(support, margin)
+    with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
+        result = studies.fit(
+            samples,
+            model,
+            judging,
+            rules=study.rules(),
+            support=how,
+            limits=compensator.limits(),
+            recordings=tests,
+            jobs=study.jobs,
+            progress=progress,
+        )
+    result = replace(result, models=tuple(m.taken(accept_unproven or "") for m in result.models))
+    modelfile.write(result.models, output, overwrite=overwrite)
+    if not quiet:
+        out.show_fit(result, output, trouble, _console, as_json=json)
+    return 1 if any(a.word == "refused" for a in result.comparison.overall()) else 0

@@ -1,0 +1,86 @@
+"""`thermocomp select`: the few sensors that a model needs."""
+
+from typing import Literal
+
+from rich.console import Console
+
+from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.extras import needs
+from thermocomp.cli.options import (
+    Flag,
+    Json,
+    OptionalOutput,
+    Recordings,
+    Selector,
+    Study,
+    read_recordings,
+    refuse_existing,
+    tell_trouble,
+)
+from thermocomp.cli.progress import by_steps
+
+SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
+
+_console = Console(highlight=False)
+
+
+def select(
+    recordings: Recordings,
+    /,
+    *,
+    study: Study = Study(),  # noqa: B008 - frozen
+    method: SelectionMethod = "pareto",
+    settings: Selector = Selector(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
+    output: OptionalOutput = None,
+    overwrite: Flag = False,
+    json: Json = False,
+) -> int:
+    """Choose the few temperature sensors that a model needs.
+
+    Parameters
+    ----------
+    recordings : list of Path
+        CSV, XLSX or Parquet files; each is one test.
+    study : Study
+        What is predicted from what, and on what it is judged.
+    method : str
+        How to choose. pareto: error on unseen cycles against the number of sensors; subsets: exact best subset of
+        every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F (stepwise 2017, Chen);
+        ace: by maximal correlation (Wessel).
+    settings : Settings
+        What the methods can be told.
+    beginning : Beginning
+        How the recordings begin.
+    output : Path
+        Page with tables and figures to write (.html).
+    overwrite : bool
+        Write over an existing page.
+    json : bool
+        Print results for a machine instead of tables.
+
+    Returns
+    -------
+    int
+        0 done, 2 unusable input.
+    """
+    settings.check(method)
+    tests = read_recordings(recordings, study.mapping)
+    with needs("study"):
+        from thermocomp.assessment import selecting
+        from thermocomp.assessment.splits import Judging
+        from thermocomp.cli import output as out
+    if output is not None:
+        refuse_existing([output], overwrite, recordings, ".html")
+    trouble = tell_trouble(tests)
+    samples = study.samples(tests, beginning.of(tests, study.mapping))
+    # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
+    judging = study.judging(samples) if method == "pareto" else Judging("", ())
+    with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
+        choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
+    if output is not None:
+        with needs("study"):
+            from thermocomp.report import html
+        html.write_choices(choices, tests, output)
+    out.show_choices(choices, output, trouble, _console, as_json=json)
+    return 0
