@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import splits
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.zero import Zeroing
 from thermocomp.files import mapping as mappings
 from thermocomp.files import recordings as files
 from thermocomp.recording.quality import check
@@ -120,36 +121,70 @@ def starts_of(starts: Starts, recordings: Sequence[Recording]) -> tuple[Start, .
     return each
 
 
-def samples_of(
-    recordings: Sequence[Recording],
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """All that judging begins with.
+
+    Parameters
+    ----------
+    tests : tuple of Recording
+    samples : Samples
+        Their rows, without those in which a channel is in trouble.
+    judging : Judging
+        What is learned from and what is judged.
+    trouble : list of str
+        What is wrong with the recordings.
+    """
+
+    tests: tuple[Recording, ...]
+    samples: Samples
+    judging: Judging
+    trouble: list[str]
+
+
+def prepare(
+    tests: Sequence[Recording],
     targets: str | Sequence[str] | None,
     inputs: str | Sequence[str] | None = None,
     *,
     absolute: bool = False,
     starts: Starts = None,
-) -> Samples:
-    """Stack recordings.
+    zeroing: Zeroing | None = None,
+    split: str | None = None,
+    leave_one: LeaveOne | None = None,
+    judged: bool = True,
+) -> Prepared:
+    """Make of recordings what judging begins with.
 
     Parameters
     ----------
-    recordings : sequence of Recording
+    tests : sequence of Recording
     targets : str or sequence of str, optional
         Displacement channels to predict; all of the first recording without it.
     inputs : str or sequence of str, optional
     absolute : bool
     starts : Start or sequence of Start, optional
         How the recordings begin, see `starts_of`.
+    zeroing : Zeroing, optional
+        Over how long the zero is averaged.
+    split, leave_one : str, optional
+        What is judged, see `judging_of`.
+    judged : bool
+        False: nothing is judged unless one of these says so; a single thermal cycle is enough then.
 
     Returns
     -------
-    Samples
+    Prepared
     """
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
-        named = [c.name for c in recordings[0].displacements]
+        named = [c.name for c in tests[0].displacements]
     chosen = [inputs] if isinstance(inputs, str) else inputs
-    begun = starts_of(starts, recordings)
-    return sound(stack(recordings, named, chosen, rezero=not absolute, starts=begun), recordings)
+    begun, how = starts_of(starts, tests), {} if zeroing is None else {"zeroing": zeroing}
+    samples = sound(stack(tests, named, chosen, rezero=not absolute, starts=begun, **how), tests)
+    wanted = judged or split is not None or leave_one is not None
+    judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
+    return Prepared(tuple(tests), samples, judging, trouble_of(tests))
 
 
 def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
@@ -258,7 +293,8 @@ def training_table(
     InputError
         A channel is missing.
     """
-    samples = samples_of(recordings_of(recordings, mapping), target, inputs, absolute=absolute)
+    tests = recordings_of(recordings, mapping)
+    samples = prepare(tests, target, inputs, absolute=absolute, judged=False).samples
     rows = samples.take(samples.valid & np.isfinite(samples.deviations[:, 0]))
     X = samples.frame()[samples.valid & np.isfinite(samples.deviations[:, 0])].reset_index(drop=True)
     if time:

@@ -5,14 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-from thermocomp.api.inputs import Given, LeaveOne, Starts, judging_of, recordings_of, samples_of, starts_of, trouble_of
+from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of, starts_of, trouble_of
 from thermocomp.api.results import Assessed, Compared, FittedModels, Selected
 from thermocomp.assessment import compare as comparing
 from thermocomp.assessment import do_no_harm, selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.results import Assessment, Rules
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, Support
@@ -126,12 +125,11 @@ def compare(
         A recording, channel or model cannot be used.
     """
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
-    judging = judging_of(samples, split=split, leave_one=leave_one)
+    ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
     found = comparing.compare(
-        samples,
+        ready.samples,
         list(models) if isinstance(models, Iterable) and not _single(models) else [models],
-        judging,
+        ready.judging,
         rules=Rules(harm_margin, primary),
         support=Support(support, margin),
         robustness=robustness,
@@ -141,7 +139,7 @@ def compare(
     )
     if not robustness:
         found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
-    return Compared(found, tuple(tests), tuple(trouble_of(tests)))
+    return Compared(found, ready.tests, tuple(ready.trouble))
 
 
 def _single(models: Any) -> bool:
@@ -197,12 +195,11 @@ def fit(
         A recording, channel or model cannot be used, or the model cannot be frozen.
     """
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
-    judging = judging_of(samples, split=split, leave_one=leave_one)
+    ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
     found = studies.fit(
-        samples,
+        ready.samples,
         model,
-        judging,
+        ready.judging,
         rules=Rules(harm_margin),
         support=Support(support, margin),
         recordings=tests,
@@ -210,7 +207,7 @@ def fit(
         jobs=jobs,
         progress=progress,
     )
-    return FittedModels(found, tuple(tests), tuple(trouble_of(tests)))
+    return FittedModels(found, ready.tests, tuple(ready.trouble))
 
 
 def assess(
@@ -307,8 +304,15 @@ def select(
         raise InputError(f"select: {str(e).partition(') ')[2]}; the settings are {known}") from e
     chosen.check(method)
     tests = recordings_of(recordings, mapping)
-    samples = samples_of(tests, targets, inputs, absolute=absolute, starts=starts)
-    wanted = method == "pareto" or split is not None or leave_one is not None
-    judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
-    found = selecting.select(method, samples, judging, chosen, jobs=jobs, progress=progress)
-    return Selected(found, tuple(trouble_of(tests)))
+    ready = prepare(
+        tests,
+        targets,
+        inputs,
+        absolute=absolute,
+        starts=starts,
+        split=split,
+        leave_one=leave_one,
+        judged=method == "pareto",
+    )
+    found = selecting.select(method, ready.samples, ready.judging, chosen, jobs=jobs, progress=progress)
+    return Selected(found, tuple(ready.trouble))

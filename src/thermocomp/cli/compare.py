@@ -13,9 +13,6 @@ from thermocomp.cli.options import (
     OptionalOutput,
     Recordings,
     Study,
-    read_recordings,
-    refuse_existing,
-    tell_trouble,
 )
 from thermocomp.cli.progress import by_steps
 
@@ -68,15 +65,11 @@ def compare(
         0 every target has a model that may run, 1 a target has none, 2 unusable input, 130 stopped by the keyboard
         (what was judged until then is shown).
     """
-    tests = read_recordings(recordings, study.mapping)
+    ready = study.prepare(recordings, beginning, [output], overwrite, ".html")
     with needs("study"):
         from thermocomp.assessment import compare as comparing
         from thermocomp.cli import output as out
-    if output is not None:
-        refuse_existing([output], overwrite, recordings, ".html")
-    trouble = tell_trouble(tests)
-    samples = study.samples(tests, beginning.of(tests, study.mapping))
-    judging, rules, limits = study.judging(samples), study.rules(primary), compensator.limits()
+    samples, judging, rules, limits = ready.samples, ready.judging, study.rules(primary), compensator.limits()
     with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
         comparison = comparing.compare(
             samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
@@ -84,8 +77,8 @@ def compare(
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
-        html.write(comparison, tests, output, samples)
-    out.show_comparison(comparison, output, trouble, _console, as_json=json)
+        html.write(comparison, ready.tests, output, samples)
+    out.show_comparison(comparison, output, ready.trouble, _console, as_json=json)
     if comparison.left:
         return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1

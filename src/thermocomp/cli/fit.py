@@ -16,9 +16,6 @@ from thermocomp.cli.options import (
     Quiet,
     Recordings,
     Study,
-    read_recordings,
-    refuse_existing,
-    tell_trouble,
 )
 from thermocomp.cli.progress import by_steps
 
@@ -83,36 +80,28 @@ def fit(
     int
         0 done, 1 a component was refused, 2 unusable input.
     """
-    tests = read_recordings(recordings, study.mapping)
-    if tilt:
-        with needs("study"):
-            from thermocomp.recording.tilts import with_tilts
-        tests, names = with_tilts(tests, tilt)
-        study = replace(study, target=[*(study.target or []), *names])
+    ready = study.prepare(recordings, beginning, [output], overwrite, ".json", tilt=tilt)
     with needs("study"):
         from thermocomp.assessment import study as studies
         from thermocomp.assessment.compare import n_pieces
         from thermocomp.cli import output as out
         from thermocomp.core.model import Support
         from thermocomp.files import modelfile
-    refuse_existing([output], overwrite, recordings, ".json")
-    trouble = tell_trouble(tests)
-    samples = study.samples(tests, beginning.of(tests, study.mapping))
-    judging, how = study.judging(samples), Support(support, margin)
+    samples, judging = ready.samples, ready.judging
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
             samples,
             model,
             judging,
             rules=study.rules(),
-            support=how,
+            support=Support(support, margin),
             limits=compensator.limits(),
-            recordings=tests,
+            recordings=ready.tests,
             jobs=study.jobs,
             progress=progress,
         )
     result = replace(result, models=tuple(m.taken(accept_unproven or "") for m in result.models))
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
-        out.show_fit(result, output, trouble, _console, as_json=json)
+        out.show_fit(result, output, ready.trouble, _console, as_json=json)
     return 1 if any(a.word == "refused" for a in result.comparison.overall()) else 0

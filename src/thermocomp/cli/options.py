@@ -20,12 +20,12 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 
 if TYPE_CHECKING:
-    from thermocomp.api.inputs import LeaveOne
+    from thermocomp.api.inputs import LeaveOne, Prepared
     from thermocomp.assessment.results import Rules
     from thermocomp.assessment.splits import Judging
+    from thermocomp.cli.beginning import Beginning
     from thermocomp.recording.recording import Recording
     from thermocomp.recording.samples import Samples
-    from thermocomp.recording.starts import Start
 
 _stderr = Console(stderr=True, highlight=False)
 
@@ -84,26 +84,55 @@ class Study:
     zero_over: float = Zeroing.at_rest
     jobs: int = -1
 
-    def samples(self, tests: "list[Recording]", start: "Start | None" = None) -> "Samples":
-        """Stack the tests, which begin as stated, or as found out."""
-        from thermocomp.recording.samples import stack
-        from thermocomp.recording.sound import sound
+    def prepare(
+        self,
+        paths: list[Path],
+        beginning: "Beginning",
+        outputs: Sequence[Path | None],
+        overwrite: bool,
+        ending: str,
+        *,
+        tilt: list[str] | None = None,
+        judged: bool = True,
+    ) -> "Prepared":
+        """Read recordings, say what is wrong with them, and return all that judging begins with.
 
-        if self.jobs == 0:
-            raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+        Before any work it is made sure that the outputs can be written.
+        """
+        tests = read_recordings(paths, self.mapping)
+        with needs("study"):
+            from thermocomp.api.inputs import prepare
+            from thermocomp.recording.tilts import with_tilts
         if not self.target:
             raise InputError(f"name what to predict with --target: {_displacements(tests)}")
+        tests, names = with_tilts(tests, tilt) if tilt else (tests, [])
+        refuse_existing([path for path in outputs if path is not None], overwrite, paths, ending)
+        if self.jobs == 0:
+            raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
         speed = tests[0].speed
-        zeroing = Zeroing(
-            self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
+        ready = prepare(
+            tests,
+            [*self.target, *names],
+            self.inputs,
+            absolute=self.absolute,
+            starts=beginning.of(tests, self.mapping),
+            zeroing=Zeroing(
+                self.zero_over, min(self.zero_over, Zeroing.otherwise), speed.name if speed is not None else ""
+            ),
+            split=self.split,
+            leave_one=self._left_out(),
+            judged=judged,
         )
-        found = stack(tests, self.target, self.inputs, rezero=not self.absolute, zeroing=zeroing, starts=start)
-        return sound(found, tests)
+        _told(ready.trouble)
+        return ready
 
     def judging(self, samples: "Samples") -> "Judging":
         """Return what is learned from and what is judged."""
         from thermocomp.api.inputs import judging_of
 
+        return judging_of(samples, split=self.split, leave_one=self._left_out())
+
+    def _left_out(self) -> "LeaveOne | None":
         units: dict[LeaveOne, bool] = {
             "cycle": self.leave_one_cycle_out,
             "day": self.leave_one_day_out,
@@ -113,7 +142,7 @@ class Study:
         if (self.split is not None) + len(named) > 1:
             ways = ", ".join(f"--leave-one-{unit}-out" for unit in units)
             raise InputError(f"--split, {ways} exclude each other: choose one")
-        return judging_of(samples, split=self.split, leave_one=named[0] if named else None)
+        return named[0] if named else None
 
     def rules(self, primary: str | None = None) -> "Rules":
         """Return what is stated before judging."""
@@ -221,7 +250,10 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
     """
     from thermocomp.api.inputs import trouble_of
 
-    lines = trouble_of(tests)
+    return _told(trouble_of(tests))
+
+
+def _told(lines: list[str]) -> list[str]:
     for line in lines:
         _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
     return lines

@@ -13,9 +13,6 @@ from thermocomp.cli.options import (
     Recordings,
     Selector,
     Study,
-    read_recordings,
-    refuse_existing,
-    tell_trouble,
 )
 from thermocomp.cli.progress import by_steps
 
@@ -65,22 +62,16 @@ def select(
         0 done, 2 unusable input.
     """
     settings.check(method)
-    tests = read_recordings(recordings, study.mapping)
+    ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")
     with needs("study"):
         from thermocomp.assessment import selecting
-        from thermocomp.assessment.splits import Judging
         from thermocomp.cli import output as out
-    if output is not None:
-        refuse_existing([output], overwrite, recordings, ".html")
-    trouble = tell_trouble(tests)
-    samples = study.samples(tests, beginning.of(tests, study.mapping))
-    # only a budget is judged on unseen blocks; the others can do with a single thermal cycle
-    judging = study.judging(samples) if method == "pareto" else Judging("", ())
+    samples, judging = ready.samples, ready.judging
     with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
         choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
         with needs("study"):
             from thermocomp.report import html
-        html.write_choices(choices, tests, output)
-    out.show_choices(choices, output, trouble, _console, as_json=json)
+        html.write_choices(choices, ready.tests, output)
+    out.show_choices(choices, output, ready.trouble, _console, as_json=json)
     return 0

@@ -1,4 +1,4 @@
-"""Recordings from tables that are in memory already."""
+"""What a table that is in memory already means as a recording."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -14,20 +14,19 @@ from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import unit
 from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
-from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
 
 
-def from_dataframe(
+def parts_of(
     table: pd.DataFrame,
     *,
     time: str | ArrayLike | None = None,
     units: Mapping[str, str] | None = None,
     cycles: str | Sequence[object] | None = None,
     name: str = "table",
-) -> Recording:
-    """Make a recording of a table; see `thermocomp.recording.recording.Recording.from_dataframe`.
+) -> dict[str, Any]:
+    """Return what a recording of a table is made of; see `thermocomp.recording.recording.Recording.from_dataframe`.
 
     Parameters
     ----------
@@ -39,7 +38,8 @@ def from_dataframe(
 
     Returns
     -------
-    Recording
+    dict of str to object
+        Arguments of `Recording`.
     """
     units = dict(units or {})
     columns = [str(c) for c in table.columns]
@@ -77,18 +77,17 @@ def from_dataframe(
         )
     if len(data) < len(channels):
         raise RecordingError(f"{name}: two columns would become the same channel; rename one of them")
-    recording = Recording(
-        name,
-        clock,
-        pd.DataFrame(data),
-        tuple(channels),
-        whole(len(clock)),
-        start=start,
-        aliases=aliases,
-        notes=tuple(notes),
-    )
-    labels = plain[labelled].tolist() if labelled is not None else cycles
-    return recording.with_cycles(_cycles(recording, labels))
+    speed = next((data[c.name] for c in channels if c.quantity == "spindle_speed"), None)
+    return {
+        "name": name,
+        "time": clock,
+        "table": pd.DataFrame(data),
+        "channels": tuple(channels),
+        "cycles": tuple(_cycles(plain[labelled].tolist() if labelled is not None else cycles, clock, speed, name)),
+        "start": start,
+        "aliases": aliases,
+        "notes": tuple(notes),
+    }
 
 
 def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str, str | None]:
@@ -148,12 +147,9 @@ def _numbers(values: Any, what: str) -> FloatArray:
     return np.where(np.isinf(found), np.nan, found)
 
 
-def _cycles(recording: Recording, labels: Sequence[object] | None) -> Sequence[Cycle]:
+def _cycles(labels: Sequence[object] | None, time: FloatArray, speed: FloatArray | None, name: str) -> Sequence[Cycle]:
     if labels is not None:
-        if len(labels) != len(recording):
-            raise InputError(f"{recording.name}: cycles: {len(labels)} labels for {len(recording)} rows")
+        if len(labels) != len(time):
+            raise InputError(f"{name}: cycles: {len(labels)} labels for {len(time)} rows")
         return given_cycles(labels)
-    speed = recording.speed
-    if speed is None:
-        return whole(len(recording))
-    return find_cycles(recording.time, recording.table[speed.name].to_numpy())
+    return whole(len(time)) if speed is None else find_cycles(time, speed)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.recording.cycles import Cycle
+from thermocomp.recording.frames import parts_of
 
 FloatArray = NDArray[np.float64]
 
@@ -115,9 +116,7 @@ class Recording:
         InputError
             A column that was named is not there, or an array has another length.
         """
-        from thermocomp.recording.frames import from_dataframe
-
-        return from_dataframe(table, time=time, units=units, cycles=cycles, name=name)
+        return cls(**parts_of(table, time=time, units=units, cycles=cycles, name=name))
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table with the time since the first row in front, as ``time_s``."""
