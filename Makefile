@@ -20,11 +20,12 @@ demo: $(VENV)/.study
 
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium linuxcnc-uspace
-	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh linuxcnc-uspace
-	$(BIN)/python -m pytest -m long
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m long
+	$(BIN)/python -m pytest -m hours
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check

@@ -319,6 +319,7 @@ block = st.one_of(
 )
 
 
+@pytest.mark.long
 @given(st.lists(block, min_size=5, max_size=40))
 @settings(
     max_examples=8,

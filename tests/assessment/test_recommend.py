@@ -42,6 +42,7 @@ def test_a_choice_sees_nothing_of_the_unit_it_is_judged_on(n: int) -> None:
     assert scored == [(u, v) for u in range(n) for v in range(n) if u != v]  # each once
 
 
+@pytest.mark.long
 def test_the_recommended_method_is_judged_with_its_choosing() -> None:
     samples = of(small_machine(SIX))
     judging = splits.leave_one_cycle_out(samples)

@@ -366,6 +366,7 @@ def test_the_help_names_every_method(capsys: pytest.CaptureFixture[str]) -> None
     assert f"or all: {', '.join(METHODS)}." in said
 
 
+@pytest.mark.long
 def test_a_method_that_cannot_be_frozen_is_not_fitted(
     drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

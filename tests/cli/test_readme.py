@@ -30,6 +30,7 @@ def assert_printed(shown: list[str], output: str) -> None:
             assert line.rstrip() in lines, f"the README shows a line that is not printed there: {line}"
 
 
+@pytest.mark.long
 def test_the_demo_prints_what_the_readme_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -44,6 +45,7 @@ def test_the_demo_prints_what_the_readme_shows(
     assert "exists already" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_python_prints_what_the_readme_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -54,6 +56,7 @@ def test_python_prints_what_the_readme_shows(
     assert sorted(p.name for p in Path().iterdir()) == ["model.json", "report.html"]
 
 
+@pytest.mark.long
 def test_the_real_machine_prints_what_its_page_shows(
     shared_data: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -63,6 +66,7 @@ def test_the_real_machine_prints_what_its_page_shows(
     assert_printed(page_blocks("real_machine.rst")[1], capsys.readouterr().out)
 
 
+@pytest.mark.long
 def test_the_study_prints_what_its_page_shows(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

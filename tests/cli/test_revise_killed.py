@@ -27,6 +27,7 @@ def hidden() -> list[Path]:
     return sorted(p for p in Path().iterdir() if p.name.startswith("."))
 
 
+@pytest.mark.long
 def test_the_next_run_clears_away_what_a_killed_one_has_left(job_folder: Path) -> None:
     head = "G21 G90 G17 G54 G94\nS4000 M3\nG0 X0 Y0 Z5\nG1 Z-1 F50\n"
     Path("long.ngc").write_text(head + "X1\nX0\n" * 20_000 + "M2\n", encoding="ascii")

@@ -187,6 +187,7 @@ def test_the_shipped_files_are_small() -> None:
         assert (Path(package.__path__[0]) / "reduced" / f"{name}.npz").stat().st_size < 2e6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", list(MODELS))
 def test_the_shipped_numbers_are_those_of_the_mesh(name: str) -> None:
     made, shipped = MODELS[name](), ReducedModel.load(name)

@@ -124,6 +124,7 @@ def test_psi_does_not_change_under_invertible_transformations(scale: float, shif
     assert np.exp(T["T1"] / 5).nunique() == T["T1"].nunique()
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(3, 60), st.integers(1, 4), st.integers(1, 12), st.booleans())
 def test_converged_kernel_is_the_limit_of_its_twin(seed: int, n: int, p: int, half: int, ties: bool) -> None:

@@ -219,6 +219,7 @@ def test_statistics_count_the_coefficients() -> None:
     assert m.n_rows_ == len(y)
 
 
+@pytest.mark.long
 def test_collinear_channels_of_a_real_machine(shared_data: Path) -> None:
     """fl_thermal, the last two cycles unseen: all shrink the error of plain least squares to a third."""
     table = pd.read_csv(shared_data / "fl_thermal" / "recording.csv")

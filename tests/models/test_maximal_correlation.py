@@ -48,6 +48,7 @@ def test_each_is_the_single_model(step: float) -> None:
                 assert found.psi[d, i, k] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", [0.0, 0.5])
 def test_converged_is_the_limit_of_the_sweeps(step: float) -> None:
     from thermocomp.models.kernels import ace as kernel

@@ -25,6 +25,7 @@ def tried(path: Path, folder: Path, drift: Steady, way: str, every: float | None
         return error
 
 
+@pytest.mark.long
 @given(programs, st.sampled_from(["coordinates", "offset"]), st.sampled_from([None, 5.0]))
 @example("G21 G90\nF100 S1000 M3\nG1 X0\nG17 G90 G81 X1 Z-1 R0.2\nG98 X2\nG80\nM2\n", "coordinates", None)
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
@@ -43,6 +44,7 @@ def test_a_random_program_keeps_the_law_or_is_refused(
         assert "is no thermal drift" in str(trial)  # a program of hours, a drift of 0.1 um/s
 
 
+@pytest.mark.long
 @needs_programs
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 def test_the_programs_of_linuxcnc_as_they_are(way: str, tmp_path: Path) -> None:

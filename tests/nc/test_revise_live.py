@@ -112,6 +112,7 @@ def compared(programs: dict[str, str], folder: Path) -> None:
     assert not wrong
 
 
+@pytest.mark.long
 def test_every_move_of_a_revised_program_takes_its_time(tmp_path: Path) -> None:
     compared(PROGRAMS, tmp_path)
 

@@ -13,6 +13,7 @@ def right(counts: Counts) -> None:
         assert not counts.of(way, "report")
 
 
+@pytest.mark.long
 def test_programs_are_right_in_every_state() -> None:
     counts = Counts(list(sweep(range(1, 17))))
     right(counts)
@@ -20,7 +21,7 @@ def test_programs_are_right_in_every_state() -> None:
     assert len(counts.of("coordinates", "revised")) >= 12
 
 
-@pytest.mark.long
+@pytest.mark.hours
 def test_two_thousand_programs_are_right_in_every_state() -> None:
     counts = Counts(list(sweep(range(1, 2001), processes=2)))
     right(counts)

@@ -113,6 +113,7 @@ def ours(lines: list[str]) -> list[Timed]:
     return list(timed(blocks, KINEMATICS))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_the_whole_run_and_stretches_of_it_are_within_2_percent(name: str, ran: dict[str, linuxcncrun.Run]) -> None:
     """They are within 0.1 %; the issue asks for 2 %."""

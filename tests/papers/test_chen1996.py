@@ -24,6 +24,8 @@ from thermocomp.papers.studies import run
 from thermocomp.papers.study import Claim, Study
 from thermocomp.recording.samples import Samples
 
+pytestmark = pytest.mark.long
+
 #: studies of the paper; its other ids are those of methods and data structures
 IDS = {f"C-{n:02d}" for n in (4, 5, 7, *range(9, 21), *range(22, 37)) if n != 21} | {"E-C9", "E-C12"}
 

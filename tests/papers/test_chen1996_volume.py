@@ -14,6 +14,7 @@ def found() -> anywhere.Volume:
     return anywhere.judge(volume.learn(1), 2)
 
 
+@pytest.mark.long
 def test_the_error_at_random_points_and_states_is_ten_times_smaller() -> None:
     sizes = found().sizes
     assert all(len(size) == anywhere.POINTS for size in sizes.values())

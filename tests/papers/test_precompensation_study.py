@@ -66,6 +66,7 @@ def simple(monkeypatch: pytest.MonkeyPatch) -> Study:
     return another_machine(monkeypatch)
 
 
+@pytest.mark.long
 def test_the_virtual_machine() -> None:
     told: list[float] = []
     study = precompensation.run(0, lambda share, _: told.append(share))
@@ -93,6 +94,7 @@ def test_the_virtual_machine() -> None:
     assert len({f.key for f in study.figures}) == len(study.figures) == 6
 
 
+@pytest.mark.long
 def test_a_machine_with_one_store_of_heat(simple: Study) -> None:
     n = simple.numbers
     # noise of the probe biases one-step coefficients a little (E-P3), so not to nothing
@@ -110,6 +112,7 @@ def test_a_machine_with_one_store_of_heat(simple: Study) -> None:
     assert n["program_depth_difference_cold_um"] == n["program_depth_difference_room_warms_um"]
 
 
+@pytest.mark.long
 def test_a_room_that_changes_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """P-05 and P-07 can fail, and E-P6 says why: nothing of that drift follows from the speed."""
     study = another_machine(monkeypatch, room=15)

@@ -206,6 +206,7 @@ def test_a_recording_repeats_nothing_of_itself() -> None:
 # -- no copies -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_two_hundred_random_walks_in_coarse_steps() -> None:
     rng = np.random.default_rng(14)
     before: list[Prints] = []
