@@ -3,13 +3,14 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 BENCH ?= .venv-bench
+PYTEST ?=
 
 .PHONY: help demo test test-long check bench docs clean
 
 help:
 	@echo "make demo    the main job on the virtual machine: record, fit, judge on unseen cycles, report"
-	@echo "make test    all tests (installs what they need)"
-	@echo "make test-long   the tests that take minutes: 2,000 random NC programs among them"
+	@echo "make test    the tests (installs what they need)"
+	@echo "make test-long   the tests that take long, and 2,000 random NC programs"
 	@echo "make check   format, lint, types, architecture"
 	@echo "make bench   speed and accuracy beside the peers"
 	@echo "make docs    the documentation, into docs/_build/html"
@@ -20,7 +21,7 @@ demo: $(VENV)/.study
 
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium linuxcnc-uspace
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh linuxcnc-uspace

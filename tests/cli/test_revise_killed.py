@@ -5,6 +5,7 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from reviseruns import revise
 
 CODE = "import sys\nfrom thermocomp.cli.app import run\nsys.exit(run(sys.argv[1:]))"
