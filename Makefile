@@ -25,7 +25,7 @@ test: $(VENV)/.dev
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh linuxcnc-uspace
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m long
+	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -n 2 --dist loadfile -m long
 	$(BIN)/python -m pytest -m hours
 
 check: $(VENV)/.dev

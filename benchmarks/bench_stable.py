@@ -46,7 +46,7 @@ def main() -> int:
     for key, word in words[0].items():
         fives = [w[key] for w in words[1:]]
         stays = fives.count(word)
-        ok = "refused" not in fives and (word != "accepted" or stays >= LEAST)
+        ok = word != "accepted" or (stays >= LEAST and "refused" not in fives)
         missed += not ok
         print(
             f"{key[0]:6} {key[1]:10} {word:9} stays so with {stays} of {len(fives)}  {'' if ok else f'MISSED {fives}'}"

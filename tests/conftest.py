@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from driftmodels import lags
+from hypothesis import settings
 from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
 
@@ -14,6 +15,11 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
 ROOT = Path(__file__).resolve().parent.parent
+
+#: of a property that does not say how many examples it wants: few at the desk, many in CI (HYPOTHESIS_PROFILE=thorough)
+settings.register_profile("quick", max_examples=25, deadline=None)
+settings.register_profile("thorough", max_examples=200, deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 
 @pytest.fixture(scope="session")

@@ -80,6 +80,7 @@ def test_every_setting_says_who_looks_at_it() -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks Linux how long a process has computed")
+@pytest.mark.long
 def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
     """One interrupt is enough, and what was found is not thrown away."""
     rng = np.random.default_rng(0)

@@ -110,6 +110,7 @@ def test_every_page_is_in_a_table_of_contents() -> None:
 
 
 @pytest.mark.parametrize("page", [p.name for p in _pages() if ">>>" in p.read_text(encoding="utf-8")])
+@pytest.mark.long
 def test_the_examples_of_a_page_still_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(DOCS / "files", tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)

@@ -25,6 +25,7 @@ def test_the_error_at_random_points_and_states_is_ten_times_smaller() -> None:
     assert 30.0 < rms[anywhere.WITHOUT] < 60.0
 
 
+@pytest.mark.long
 def test_what_is_left_is_told_by_where_it_comes_from() -> None:
     causes = found().causes
     left = causes[anywhere.SPINDLE] + causes[anywhere.AXES_SHARE]
