@@ -10,7 +10,7 @@ from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
 
 from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.cli import reviserun
+from thermocomp.api.revision import job as jobs
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
@@ -56,7 +56,7 @@ def interpreter() -> None:
 def job_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a program and a model, where commands run; nothing is drawn and no interpreter starts."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(reviserun, "find_spec", lambda _: None)
+    monkeypatch.setattr(jobs, "find_spec", lambda _: None)
     write_models([judged(lags("z_um"))], "model.json")
     Path("part.ngc").write_text(PLATE, encoding="ascii")
     return tmp_path

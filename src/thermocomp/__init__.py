@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import read, training_table
+    from thermocomp.api.revise import revise
     from thermocomp.api.verbs import assess, compare, fit, select, simulate
-    from thermocomp.cli.revisecall import revise
     from thermocomp.core.correction import Correction, Deviation, Limits
     from thermocomp.core.exceptions import ThermocompError
     from thermocomp.core.lineardynamic import LinearDynamic
@@ -51,7 +51,7 @@ _PUBLIC = {
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
     "assess": "thermocomp.api.verbs",
-    "revise": "thermocomp.cli.revisecall",
+    "revise": "thermocomp.api.revise",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recording.recording",

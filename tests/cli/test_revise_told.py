@@ -9,7 +9,7 @@ from driftmodels import lags
 from matplotlib.figure import Figure
 from reviseruns import PLATE, judged, revise, said, write_models
 
-from thermocomp.cli import reviserun
+from thermocomp.api.revision import job as jobs
 from thermocomp.nc.rewrite.header import MARK
 from thermocomp.nc.rewrite.revise import Revision
 from thermocomp.report import revision as pictures
@@ -108,7 +108,7 @@ def test_a_refusal_in_a_long_program_comes_before_the_work(
     job_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("part.ngc").write_text(PLATE.replace("M5\n", "G77\nM5\n"), encoding="ascii")
-    monkeypatch.setattr(reviserun, "LONG", 100)
+    monkeypatch.setattr(jobs, "LONG", 100)
     monkeypatch.setattr(Revision, "revise", None)  # whoever gets there fails
     before = set(job_folder.iterdir())
     assert revise() == 2
@@ -119,6 +119,6 @@ def test_a_refusal_in_a_long_program_comes_before_the_work(
 def test_a_long_program_comes_out_as_a_short_one(job_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert revise("--date", "2026-01-31") == 0
     short = Path("out.ngc").read_bytes()
-    monkeypatch.setattr(reviserun, "LONG", 100)
+    monkeypatch.setattr(jobs, "LONG", 100)
     assert revise("--date", "2026-01-31", "--overwrite") == 0
     assert Path("out.ngc").read_bytes() == short

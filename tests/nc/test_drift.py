@@ -94,7 +94,7 @@ def test_it_does_not_matter_how_a_time_is_divided(
     whole.state()
     pieces.state()
     # the last pieces before a change may be shorter than SOON: they count with their mean, not with that of the square
-    assert pieces.deviation(ORIGIN)[2] == pytest.approx(whole.deviation(ORIGIN)[2], abs=3e-3)
+    assert pieces.deviation(ORIGIN)[2] == pytest.approx(whole.deviation(ORIGIN)[2], abs=2e-3 * len(schedule))
 
 
 def test_a_long_dwell_is_as_many_seconds() -> None:

@@ -3,15 +3,15 @@
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App
+from cyclopts import App, Parameter
 from rich.console import Console
 from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import jsonoutput
 from thermocomp.cli.exits import STDIN, STOPPED
-from thermocomp.cli.shown import shown
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.shown import shown
 
 app = App(
     name="thermocomp",
@@ -21,6 +21,8 @@ app = App(
     # every command returns its exit code; nothing but `main` leaves the process
     result_action="return_value",
     suppress_keyboard_interrupt=False,
+    # a flag is set or not, and an option takes all words up to the next one
+    default_parameter=Parameter(negative=(), consume_multiple=True),
 )
 
 #: a file each; it is read when its command is called, so this line of its docstring stands here too (a test compares)

@@ -8,8 +8,6 @@ from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
-    Json,
-    Recordings,
     read_recordings,
     tell_trouble,
 )
@@ -20,14 +18,14 @@ _console = Console(highlight=False)
 
 def assess(
     model: Path,
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
     mapping: Path | None = None,
     harm_margin: float | None = None,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
-    json: Json = False,
+    json: bool = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
 

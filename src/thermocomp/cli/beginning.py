@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cyclopts import Parameter
 
-from thermocomp.cli.options import OptionalPaths, read_recordings
+from thermocomp.cli.options import read_recordings
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Beginning:
     """
 
     start: Literal["cold", "continued", "rezeroed", "known"] | None = None
-    continues: OptionalPaths = None
+    continues: list[Path] | None = None
     gap: float | None = None
     zero: str | None = None
 

@@ -6,25 +6,22 @@ from rich.console import Console
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
-    Flag,
-    Json,
     OptionalOutput,
-    Recordings,
     read_recordings,
-    refuse_existing,
 )
+from thermocomp.files.draft import refuse_existing
 
 _console = Console(highlight=False)
 
 
 def check(
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
     mapping: Path | None = None,
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Tell what recordings hold and what is wrong with them; of more than three files, a line each.
 

@@ -1,5 +1,7 @@
 """`thermocomp compare`: methods, judged beside each other."""
 
+from pathlib import Path
+
 from rich.console import Console
 
 from thermocomp.cli.beginning import Beginning
@@ -7,11 +9,7 @@ from thermocomp.cli.exits import STOPPED
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
-    Flag,
-    Json,
-    Names,
     OptionalOutput,
-    Recordings,
     Study,
 )
 from thermocomp.cli.progress import by_steps
@@ -22,17 +20,17 @@ _console = Console(highlight=False)
 
 
 def compare(
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
     study: Study = Study(),  # noqa: B008 - frozen
-    models: Names = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
+    models: list[str] = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
     primary: str | None = None,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Compare methods on thermal cycles they have not seen, beside no compensation.
 

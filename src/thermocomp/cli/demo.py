@@ -7,21 +7,19 @@ from rich.console import Console
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import (
-    Flag,
-    Json,
     Output,
     Study,
     read_recordings,
-    refuse_existing,
 )
 from thermocomp.cli.simulate import simulate
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
 
 _console = Console(highlight=False)
 
 
 def demo(
-    *, output: Output = Path("thermocomp-demo"), seed: int = 0, overwrite: Flag = False, json: Json = False
+    *, output: Output = Path("thermocomp-demo"), seed: int = 0, overwrite: bool = False, json: bool = False
 ) -> int:
     """Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.
 

@@ -1,4 +1,4 @@
-"""What all commands have in common with a shell."""
+"""What all commands have in common with a shell, and with a terminal."""
 
 from pathlib import Path
 
@@ -6,3 +6,9 @@ from pathlib import Path
 STOPPED = 130
 #: stands for standard input, which is ``-`` on the command line: cyclopts takes that for an option
 STDIN = Path("<stdin>")
+
+
+def mark(verdict: str) -> str:
+    """Return a verdict in its colour."""
+    colour = {"accepted": "green", "unproven": "yellow"}.get(verdict.partition(" ")[0], "red")
+    return f"[{colour}]{verdict}[/]"

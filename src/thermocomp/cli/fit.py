@@ -1,6 +1,7 @@
 """`thermocomp fit`: a model with its honest error, in a file."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 from rich.console import Console
@@ -9,12 +10,8 @@ from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
-    Flag,
-    Json,
-    OptionalNames,
     Output,
     Quiet,
-    Recordings,
     Study,
 )
 from thermocomp.cli.progress import by_steps
@@ -25,20 +22,20 @@ _console = Console(highlight=False)
 
 
 def fit(
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
     study: Study = Study(),  # noqa: B008 - frozen
     model: str = "dynamic",
-    tilt: OptionalNames = None,
+    tilt: list[str] | None = None,
     output: Output,
     support: Policy = "clip",
     margin: float = 0.25,
     accept_unproven: str | None = None,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
     quiet: Quiet = False,
 ) -> int:
     """Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.

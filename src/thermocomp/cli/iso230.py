@@ -12,16 +12,13 @@ from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     Compensator,
-    Flag,
-    Json,
-    OptionalNames,
     OptionalOutput,
     read_recordings,
-    refuse_existing,
     tell_trouble,
 )
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.units import measured
+from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.iso230.part2 import PositioningResult
@@ -29,8 +26,7 @@ if TYPE_CHECKING:
     from thermocomp.iso230.thermaltest import Pair, ThermalTest
     from thermocomp.recording.recording import Recording
 
-Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False, show_default=False)]
-Tables = Annotated[list[Path], Parameter(consume_multiple=True, negative=(), show_default=False)]
+Tables = Annotated[list[Path], Parameter(show_default=False)]
 Test = Literal["etve", "spindle", "axis"]
 
 _console = Console(highlight=False)
@@ -39,12 +35,12 @@ TABLE_WIDTH = 136
 
 
 def iso230(
-    recordings: Recordings = [],  # noqa: B006 - never changed
+    recordings: list[Path] = [],  # noqa: B006 - never changed
     /,
     *,
     test: Test | None = None,
     distance: str | None = None,
-    pairs: OptionalNames = None,
+    pairs: list[str] | None = None,
     ambient: str | None = None,
     model: Path | None = None,
     compensator: Compensator = Compensator(),  # noqa: B008 - frozen
@@ -52,8 +48,8 @@ def iso230(
     positioning: Tables = [],  # noqa: B006 - never changed
     mapping: Path | None = None,
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of channels.
 

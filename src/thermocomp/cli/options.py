@@ -18,6 +18,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
+from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne, Prepared
@@ -29,13 +30,7 @@ if TYPE_CHECKING:
 
 _stderr = Console(stderr=True, highlight=False)
 
-Recordings = Annotated[list[Path], Parameter(negative=(), allow_leading_hyphen=False)]
-Names = Annotated[list[str], Parameter(consume_multiple=True, negative=())]
-OptionalNames = Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())]
-OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
-Flag = Annotated[bool, Parameter(negative=())]
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
-Json = Annotated[bool, Parameter(name="--json", negative=())]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
 OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
@@ -72,14 +67,14 @@ class Study:
         Processes to share the work among; -1 takes all cores.
     """
 
-    target: OptionalNames = None
-    inputs: OptionalNames = None
+    target: list[str] | None = None
+    inputs: list[str] | None = None
     mapping: Path | None = None
     split: str | None = None
-    leave_one_cycle_out: Flag = False
-    leave_one_day_out: Flag = False
-    leave_one_file_out: Flag = False
-    absolute: Flag = False
+    leave_one_cycle_out: bool = False
+    leave_one_day_out: bool = False
+    leave_one_file_out: bool = False
+    absolute: bool = False
     harm_margin: float | None = None
     zero_over: float = Zeroing.at_rest
     jobs: int = -1
@@ -180,9 +175,9 @@ class Compensator:
 class Selector(Settings):  # noqa: D101 - that of Settings, which the help is made from
     __doc__ = Settings.__doc__
 
-    unsigned: Flag = False
-    models: Names = field(default_factory=lambda: ["ols", "dynamic"])
-    holm: Flag = False
+    unsigned: bool = False
+    models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
+    holm: bool = False
 
 
 def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]":
@@ -207,33 +202,6 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
 def _displacements(tests: "Sequence[Recording]") -> str:
     names = dict.fromkeys(c.name for test in tests for c in test.displacements)
     return ", ".join(names) or "no recording has a displacement"
-
-
-def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
-    """Raise `InputError` if an output cannot be written, before any work is done.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        To be written.
-    overwrite : bool
-        Existing files may be replaced.
-    inputs : sequence of Path
-        What is read: never to be replaced.
-    ending : str
-        Of the names of such files, such as ``.html``.
-    """
-    for path in paths:
-        if not path.parent.is_dir():
-            raise InputError(f"{path}: there is no folder {path.parent}; make it first")
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder; name a file")
-        if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
-            raise InputError(f"{path}: is also an input; choose another name")
-        if path.exists() and not overwrite:
-            raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
-        if ending and path.suffix.lower() != ending:
-            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
 
 
 def tell_trouble(tests: "Sequence[Recording]") -> list[str]:

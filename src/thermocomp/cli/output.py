@@ -17,8 +17,8 @@ from thermocomp.assessment.do_no_harm import Unit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.checked import recording_content
+from thermocomp.cli.exits import mark
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.shown import mark
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start

@@ -12,16 +12,13 @@ from rich.table import Table
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
-    Flag,
-    Json,
-    OptionalNames,
     OptionalOutput,
     read_recordings,
-    refuse_existing,
     tell_trouble,
 )
 from thermocomp.cli.progress import by_share
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.papers.study import Claim, Study
@@ -30,8 +27,8 @@ if TYPE_CHECKING:
     from thermocomp.recording.recording import Recording
 
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
-Names = Annotated[list[Name], Parameter(negative=(), allow_leading_hyphen=False, show_default=False)]
-Measured = Annotated[list[Path], Parameter(name="--with", consume_multiple=True, negative=(), show_default=False)]
+Names = Annotated[list[Name], Parameter(show_default=False)]
+Measured = Annotated[list[Path], Parameter(name="--with", show_default=False)]
 #: what is not a paper's study but the table of all methods on all experiments (X-03)
 CROSS = "cross"
 
@@ -48,13 +45,13 @@ def papers(
     *,
     measured: Measured = [],  # noqa: B006 - never changed
     mapping: Path | None = None,
-    target: OptionalNames = None,
-    models: OptionalNames = None,
+    target: list[str] | None = None,
+    models: list[str] | None = None,
     seed: int = 0,
     repeats: int = 3,
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds here.
 

@@ -10,22 +10,16 @@ from thermocomp.cli import progress
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
-    Flag,
-    Json,
-    Names,
-    OptionalNames,
     OptionalOutput,
-    Recordings,
     Study,
-    refuse_existing,
     tell_trouble,
 )
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.recording.profiles import Profiles
 
-States = Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())]
 Switch = Annotated[bool | None, Parameter(negative="--no-offset")]
 
 #: stands for every component that has columns of its own
@@ -37,31 +31,31 @@ _console = Console(highlight=False)
 
 
 def position(
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
-    component: Names,
+    component: list[str],
     columns: str = "",
     positions: Path | None = None,
     layout: Literal["wide", "long"] | None = None,
     mapping: Path | None = None,
     model: str = "dynamic",
-    inputs: OptionalNames = None,
+    inputs: list[str] | None = None,
     slopes: int | None = None,
     offset: Switch = None,
     profile: Literal["polynomial", "spline"] = "polynomial",
     order: int | None = None,
-    reference: States = None,
+    reference: list[int] | None = None,
     reference_position: float | None = None,
     split: str | None = None,
-    leave_one_cycle_out: Flag = False,
-    leave_one_file_out: Flag = False,
-    absolute: Flag = False,
+    leave_one_cycle_out: bool = False,
+    leave_one_file_out: bool = False,
+    absolute: bool = False,
     jobs: int = -1,
     accept_unproven: str | None = None,
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.
 

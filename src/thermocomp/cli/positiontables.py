@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.assessment.position import CycleErrors, PositionStudy
-from thermocomp.cli.shown import mark
+from thermocomp.cli.exits import mark
 from thermocomp.files.profiles import NOT_TAKEN
 from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles

@@ -18,7 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from thermocomp.cli.shown import shown
+from thermocomp.core.shown import shown
 
 #: without a terminal a line is told so often; work that takes less time tells none [s]
 OFTEN = 10.0

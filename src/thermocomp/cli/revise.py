@@ -1,27 +1,41 @@
-"""``thermocomp revise``: an NC program is corrected by the drift it will cause, before it is run."""
+"""`thermocomp revise`: an NC program is corrected by the drift it will cause, before it is run."""
 
+import math
 import sys
-from collections.abc import Mapping, Sequence
-from itertools import islice
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
+from cyclopts import Group, Parameter
 from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
-from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.cli import reviseheader, reviserun, revisetables
+from thermocomp.api.revision import outcome
+from thermocomp.api.revision.job import Done, Job
+from thermocomp.api.revision.job import revise as revise_program
+from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.api.revision.prepare import prepare_job
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import Flag, Json, Output, refuse_existing
-from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
-from thermocomp.cli.revisetravel import Travel
-from thermocomp.core.exceptions import InputError
-from thermocomp.files import ncprogram
-from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.parser.recognise import program_number
-from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.rewrite.revise import FIRST, Revision
-from thermocomp.nc.thermal.stations import Station
+from thermocomp.cli.options import Output
+from thermocomp.cli.progress import by_share
+from thermocomp.core.shown import shown
+from thermocomp.nc.rewrite.course import Bound
+
+#: lines from which on the time that one takes can be told
+MANY = 1000
 
 _console = Console(highlight=False)
+
+_GROUPS = {
+    "The drift": Drifting,
+    "The state at the start: exactly one of cold, carried, measured": Starting,
+    "The revision": Way,
+    "The controller: what does not stand in the program": Controller,
+    "The time it takes": Timing,
+}
+for order, (title, group) in enumerate(_GROUPS.items(), start=1):
+    Parameter(name="*", group=Group(title, sort_key=order))(group)
 
 
 def revise(
@@ -35,8 +49,8 @@ def revise(
     controller: Controller = Controller(),
     timing: Timing = Timing(),
     date: str | None = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Correct an NC program by the drift it will cause, before it is run.
 
@@ -73,123 +87,77 @@ def revise(
     int
         0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
-    job, notes = prepared(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
     # a pipe gets its lines on stderr, whatever stdout is for
-    done = run(job, hidden=json and sys.stderr.isatty())
+    done = revise_program(job, partial(by_share, hidden=json and sys.stderr.isatty()))
     if json:
-        print_json(revisetables.content(job, done, notes), _console)
+        print_json(outcome.content(job, done, notes), _console)
     else:
-        revisetables.show(job, done, notes, _console)
+        _show(job, done, notes)
     return 0 if done.written else 1
 
 
-def prepared(
-    program: Path,
-    drifting: Drifting,
-    output: Path,
-    starting: Starting,
-    way: Way,
-    controller: Controller,
-    timing: Timing,
-    date: str | None,
-    *,
-    overwrite: bool,
-) -> tuple[reviserun.Job, list[str]]:
-    """Return what is to be done to a program, and notes, or refuse before any work; parameters as for `revise`."""
-    if controller.controller is None:
-        _refuse_number(program)
-    ncprogram.opened(program).close()
-    starting.check()
-    found = drifting.stations()
-    others, notes = drifting.others(found)
-    drift = starting.drift(found, others)
-    machine = timing.read()
-    setup = controller.setup(machine)
-    kinematics, guesses = timing.kinematics(machine)
-    method = way.made(setup, drift.driven)
-    models = _files(found, drifting.hashes())
-    header_lines = reviseheader.lines(models, by_position=drift.by_position, unproved=way.unproved)
-    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, way.split)
-    _check_interpreter(way, setup, diameters=controller.diameter is not None)
-    if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
-        _refuse_optional(program)
-    paths = reviserun.Paths.of(output, expanded=way.expand)
-    given = (timing.machine, starting.carried, drifting.forecast)
-    refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
-    job = reviserun.Job(
-        program,
-        paths,
-        revision,
-        drift,
-        models,
-        starting.words(),
-        f"drift counts {starting.counted()}",
-        f"method {way.words()}",
-        reviserun.moment(date),
-        unproved=way.unproved,
-        diameters=controller.diameters(expand=way.expand),
-        subroutines=way.folders(),
-        travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
-        overwrite=overwrite,
+def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
+    """Print what was done to a program, and how far the tool may still be off."""
+    revision = job.revision
+
+    def say(mark: str, text: str) -> None:
+        _console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
+
+    _console.print(
+        f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
+        f"{revision.changed if done.written else 'none'} of them changed; "
+        f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
+        f"{_many(len(revision.tool_changes), 'tool change')}",
+        soft_wrap=True,
     )
-    return job, [*notes, *guesses]
-
-
-def run(job: reviserun.Job, *, hidden: bool) -> reviserun.Done:
-    """Revise a program.
-
-    Raises
-    ------
-    InputError
-        It cannot be revised or proved; the message begins with its name.
-    """
-    try:
-        return reviserun.revise(job, hidden=hidden)
-    except InputError as e:
-        raise InputError(f"{job.program}: {e}") from e
-
-
-def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
-    """Return which files the models come from, each with what it is for."""
-    found = []
-    for name in dict.fromkeys(hashes[s.model.target] for s in stations):
-        mine = [s for s in stations if hashes[s.model.target] == name]
-        places = {a: [s.along for s in mine if s.axis == a] for a in dict.fromkeys(s.axis for s in mine)}
-        said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
-        unproven = any((h := s.model.honest_error) is not None and h.taken for s in mine)
-        found.append(f"{name} for {', '.join(said)}{' UNPROVEN' if unproven else ''}")
-    return found
-
-
-def _refuse_number(program: Path) -> None:
-    """Raise `InputError` if a program begins as a Fanuc's do, and nobody has said whose it is."""
-    with ncprogram.opened(program) as lines:
-        first = list(islice(lines, FIRST))
-    if number := program_number(first):
-        raise InputError(
-            f"{program}: line {number}: {first[number - 1].strip()[:40]!r} is how a Fanuc's or Haas's programs "
-            "begin: say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc"
+    say("", f"Start: {job.begun}; {job.method}")
+    _console.print(_bounds(done.bounds))
+    if (proof := done.proof) is not None:
+        say(
+            "[green]proved[/]",
+            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each that of the original plus "
+            f"its correction, within {max(proof.largest, 0.001):.3f} um",
         )
+        say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
+    for warning in outcome.warnings(job, done):
+        say("[yellow]but[/]", warning)
+    for note in (*notes, *outcome.place(job, done)):
+        say("[yellow]note[/]", note)
+    took = f"revised in {done.seconds:.1f} s"
+    if revision.lines >= MANY:
+        took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
+    _console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    if done.written:
+        say("", f"Written: {', '.join(map(str, job.paths.all()))}")
+    else:
+        say("[bold yellow]nothing written:[/]", outcome.nothing(job, done))
 
 
-def _refuse_optional(program: Path) -> None:
-    """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
-    with ncprogram.opened(program) as lines:
-        for line in read_lines(lines):
-            if line.optional:
-                raise InputError(
-                    f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
-                    "leaves it out; say --block-delete off or on"
-                )
+def _bounds(bounds: Sequence[Bound]) -> Table:
+    table = Table(
+        caption="um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    )
+    table.add_column("axis")
+    for heading in ("drift from", "to", "in the cuts", "left in the cuts", "at line", "model", "bound"):
+        table.add_column(heading, justify="right")
+    for b in bounds:
+        cells = (b.low, b.high, b.without, b.left)
+        rest = ("not known",) * 2 if math.isnan(b.model) else (_um(b.model), _um(b.most))
+        table.add_row(b.axis, *map(_um, cells), str(b.line or ""), *rest)
+    return table
 
 
-def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
-    """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
-    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.installed()) is not None:
-        raise InputError(f"--expand: {reason}")
-    if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
-        raise InputError(
-            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
-        )
-    if not way.unproved and (reason := rs274.installed()):
-        raise InputError(f"it cannot be proved: {reason}; {reviserun.ALL_THE_SAME}")
+def _um(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'s' * (n != 1)}"
+
+
+def _spindle(job: Job) -> str:
+    slowest, fastest = job.revision.slowest, job.revision.fastest
+    if not fastest:
+        return "the spindle stands still"
+    return f"spindle {slowest:g} 1/min" if slowest == fastest else f"spindle {slowest:g} to {fastest:g} 1/min"

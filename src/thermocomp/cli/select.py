@@ -1,5 +1,6 @@
 """`thermocomp select`: the few sensors that a model needs."""
 
+from pathlib import Path
 from typing import Literal
 
 from rich.console import Console
@@ -7,10 +8,7 @@ from rich.console import Console
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
-    Flag,
-    Json,
     OptionalOutput,
-    Recordings,
     Selector,
     Study,
 )
@@ -22,7 +20,7 @@ _console = Console(highlight=False)
 
 
 def select(
-    recordings: Recordings,
+    recordings: list[Path],
     /,
     *,
     study: Study = Study(),  # noqa: B008 - frozen
@@ -30,8 +28,8 @@ def select(
     settings: Selector = Selector(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Choose the few temperature sensors that a model needs.
 

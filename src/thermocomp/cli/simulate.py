@@ -7,14 +7,12 @@ from rich.console import Console
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
-    Flag,
-    Json,
     OptionalOutput,
     Quiet,
-    refuse_existing,
 )
 from thermocomp.cli.progress import by_steps
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
 
 _console = Console(highlight=False)
 
@@ -23,11 +21,11 @@ def simulate(
     experiment: str | None = None,
     *,
     output: OptionalOutput = None,
-    list_: Annotated[bool, Parameter(name="--list", negative=())] = False,
+    list_: Annotated[bool, Parameter(name="--list")] = False,
     seed: int = 0,
     noise: float | None = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
     quiet: Quiet = False,
 ) -> int:
     """Record an experiment on a virtual machine.

@@ -1,24 +1,23 @@
 """``thermocomp volumetric``: the error anywhere in the work volume, in the course of a recording."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.options import Flag, Json, OptionalOutput, read_recordings, refuse_existing, tell_trouble
+from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
 from thermocomp.cli.progress import by_share
 from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.assessment.volumetric import Moment, Volumetric
 
-Point = Annotated[tuple[float, float, float] | None, Parameter(negative=())]
-Hours = Annotated[list[float] | None, Parameter(consume_multiple=True, negative=())]
+Point = tuple[float, float, float] | None
 #: contributions that are told; --json has all
 TOLD = 8
 GRID = 5
@@ -35,10 +34,10 @@ def volumetric(
     at: Point = None,
     grid: int | None = None,
     tool_length: float | None = None,
-    time: Hours = None,
+    time: list[float] | None = None,
     output: OptionalOutput = None,
-    overwrite: Flag = False,
-    json: Json = False,
+    overwrite: bool = False,
+    json: bool = False,
 ) -> int:
     """Tell the error of the tool's tip at a point and all over the work volume, and what corrections leave of it.
 

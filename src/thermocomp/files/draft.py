@@ -7,7 +7,7 @@ has made it, however that ends: whoever can lock one knows that its run is dead,
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
@@ -64,6 +64,33 @@ def draft(target: Path) -> Iterator[Path]:
         path = folder / "draft"
         yield path
         path.replace(target)
+
+
+def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
+    """Raise `InputError` if an output cannot be written, before any work is done.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        To be written.
+    overwrite : bool
+        Existing files may be replaced.
+    inputs : sequence of Path
+        What is read: never to be replaced.
+    ending : str
+        Of the names of such files, such as ``.html``.
+    """
+    for path in paths:
+        if not path.parent.is_dir():
+            raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name a file")
+        if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
+            raise InputError(f"{path}: is also an input; choose another name")
+        if path.exists() and not overwrite:
+            raise InputError(f"{path}: exists already; choose another name or allow overwriting with --overwrite")
+        if ending and path.suffix.lower() != ending:
+            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
 
 
 def publish(drafts: Mapping[Path, Path], *, overwrite: bool) -> None:

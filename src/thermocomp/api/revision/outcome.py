@@ -1,61 +1,16 @@
-"""What ``thermocomp revise`` prints: a table for people, or all numbers for a program."""
+"""What has come of a revision: its warnings, and all its numbers."""
 
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
 from thermocomp.adapters.linuxcnc.verification.verify import Proof
-from thermocomp.cli import reviseheader
-from thermocomp.cli.reviserun import Done, Job
-from thermocomp.cli.shown import shown
+from thermocomp.api.revision import headers
+from thermocomp.api.revision.job import Done, Job
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.rewrite.course import Bound
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import TELLING
 from thermocomp.nc.thermal.inputs import SPEED
-
-#: lines from which on the time that one takes can be told
-MANY = 1000
-
-
-def show(job: Job, done: Done, notes: Sequence[str], console: Console) -> None:
-    """Print what was done to a program, and how far the tool may still be off."""
-    revision = job.revision
-
-    def say(mark: str, text: str) -> None:
-        console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
-
-    console.print(
-        f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
-        f"{revision.changed if done.written else 'none'} of them changed; "
-        f"runs {duration(revision.seconds)}; {_spindle(job)}; {_many(len(revision.tool_changes), 'tool change')}",
-        soft_wrap=True,
-    )
-    say("", f"Start: {job.begun}; {job.method}")
-    console.print(_bounds(done.bounds))
-    if (proof := done.proof) is not None:
-        say(
-            "[green]proved[/]",
-            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each that of the original plus "
-            f"its correction, within {max(proof.largest, 0.001):.3f} um",
-        )
-        say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
-    for warning in warnings(job, done):
-        say("[yellow]but[/]", warning)
-    for note in (*notes, *_place(job, done)):
-        say("[yellow]note[/]", note)
-    took = f"revised in {done.seconds:.1f} s"
-    if revision.lines >= MANY:
-        took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
-    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
-    if done.written:
-        say("", f"Written: {', '.join(map(str, job.paths.all()))}")
-    else:
-        say("[bold yellow]nothing written:[/]", nothing(job, done))
 
 
 def warnings(job: Job, done: Done) -> list[str]:
@@ -109,13 +64,13 @@ def warnings(job: Job, done: Done) -> list[str]:
     return found
 
 
-def _place(job: Job, done: Done) -> list[str]:
+def place(job: Job, done: Done) -> list[str]:
     """Return for which origins a program was made, where the drift depends on the place."""
     if not (done.written and job.drift.by_position):
         return []
     revision = job.revision
-    cost = reviseheader.cost(revision.elsewhere, job.drift.axes)
-    return [f"it is made for {reviseheader.made_for(revision.setup)}; {cost}"]
+    cost = headers.cost(revision.elsewhere, job.drift.axes)
+    return [f"it is made for {headers.made_for(revision.setup)}; {cost}"]
 
 
 def nothing(job: Job, done: Done) -> str:
@@ -191,7 +146,7 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
         "proof": None if done.proof is None else _proof(done.proof),
         "other_offset_um": dict(zip("xyz", revision.elsewhere.most, strict=True)) if job.drift.by_position else None,
         "warnings": warnings(job, done),
-        "notes": [*notes, *_place(job, done)],
+        "notes": [*notes, *place(job, done)],
         "us_per_line": 1e6 * done.seconds / max(revision.lines, 1),
         "revising_s": done.seconds,
         "proving_s": done.proving,
@@ -216,32 +171,3 @@ def duration(seconds: float) -> str:
         return f"{seconds:.3g} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def _bounds(bounds: Sequence[Bound]) -> Table:
-    table = Table(
-        caption="um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
-    )
-    table.add_column("axis")
-    for heading in ("drift from", "to", "in the cuts", "left in the cuts", "at line", "model", "bound"):
-        table.add_column(heading, justify="right")
-    for b in bounds:
-        cells = (b.low, b.high, b.without, b.left)
-        rest = ("not known",) * 2 if math.isnan(b.model) else (_um(b.model), _um(b.most))
-        table.add_row(b.axis, *map(_um, cells), str(b.line or ""), *rest)
-    return table
-
-
-def _um(value: float) -> str:
-    return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
-
-
-def _many(n: int, what: str) -> str:
-    return f"{n:,} {what}{'s' * (n != 1)}"
-
-
-def _spindle(job: Job) -> str:
-    slowest, fastest = job.revision.slowest, job.revision.fastest
-    if not fastest:
-        return "the spindle stands still"
-    return f"spindle {slowest:g} 1/min" if slowest == fastest else f"spindle {slowest:g} to {fastest:g} 1/min"

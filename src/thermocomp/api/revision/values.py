@@ -17,6 +17,21 @@ _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 def value(text: str, quantity: str, option: str, example: str) -> float:
     """Return the value of an option in house units.
 
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    quantity : str
+        Such as ``time``.
+    option : str
+        Its name.
+    example : str
+        Of what is wanted.
+
+    Returns
+    -------
+    float
+
     Raises
     ------
     InputError
@@ -32,7 +47,28 @@ def value(text: str, quantity: str, option: str, example: str) -> float:
 
 
 def positive(text: str, quantity: str, option: str, example: str) -> float:
-    """Return the value of an option that must be positive; see `value`."""
+    """Return the value of an option that must be positive.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    quantity : str
+        Such as ``time``.
+    option : str
+        Its name.
+    example : str
+        Of what is wanted.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        It is none, or not positive.
+    """
     number = value(text, quantity, option, example)
     if not number > 0:
         raise InputError(f"{option} {text!r}: must be positive")
@@ -40,14 +76,44 @@ def positive(text: str, quantity: str, option: str, example: str) -> float:
 
 
 def origin_of(text: str) -> tuple[int, Point]:
-    """Return number and origin [mm] of a work coordinate system."""
+    """Return number and origin [mm] of a work coordinate system.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+
+    Returns
+    -------
+    tuple of int and tuple of float
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
     name, _, place = text.partition("=")
     said = f"--origin {text!r}"
     return _system(name, said, "G54=100 mm, 50 mm, 0 mm"), point_of(place, said)
 
 
 def rotations_of(texts: Sequence[str]) -> dict[int, float]:
-    """Return the stored rotations of work coordinate systems [deg]."""
+    """Return the stored rotations of work coordinate systems [deg].
+
+    Parameters
+    ----------
+    texts : sequence of str
+        As they were given.
+
+    Returns
+    -------
+    dict of int to float
+
+    Raises
+    ------
+    InputError
+        One of them is none.
+    """
     if [text.strip().lower() for text in texts] == ["none"]:
         return dict.fromkeys(range(1, 10), 0.0)
     found = {}
@@ -75,7 +141,24 @@ def _system(name: str, said: str, example: str) -> int:
 
 
 def point_of(text: str, said: str) -> Point:
-    """Return a point [mm]."""
+    """Return a point [mm].
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    said : str
+        What the message begins with.
+
+    Returns
+    -------
+    tuple of float
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
@@ -84,7 +167,25 @@ def point_of(text: str, said: str) -> Point:
 
 
 def startup_of(text: str, controller: Controller) -> str:
-    """Return codes that are in force at the start."""
+    """Return codes that are in force at the start.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    controller : str
+        Whose.
+
+    Returns
+    -------
+    str
+        Tidied.
+
+    Raises
+    ------
+    InputError
+        They are none, or not such as may be stated.
+    """
     try:
         return startup.tidy(text, controller)
     except InputError as e:
@@ -92,7 +193,24 @@ def startup_of(text: str, controller: Controller) -> str:
 
 
 def m_code_of(text: str, controller: Controller) -> int:
-    """Return the number of an M code whose meaning is not known."""
+    """Return the number of an M code whose meaning is not known.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    controller : str
+        Whose.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    InputError
+        It is none, or its meaning is known.
+    """
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
         raise InputError(f"--harmless {text!r}: want an M code, such as M88")
@@ -102,7 +220,26 @@ def m_code_of(text: str, controller: Controller) -> int:
 
 
 def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
-    """Return number and length, or diameter, of a tool [mm]."""
+    """Return number and length, or diameter, of a tool [mm].
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    option : str
+        Its name.
+    example : str
+        Of what is wanted.
+
+    Returns
+    -------
+    tuple of int and float
+
+    Raises
+    ------
+    InputError
+        It is none.
+    """
     name, _, length = (part.strip() for part in text.partition("="))
     number = name.upper().removeprefix("T")
     if not number.isdecimal():

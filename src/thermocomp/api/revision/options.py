@@ -1,15 +1,12 @@
-"""What ``thermocomp revise`` can be told, and the objects that come of it."""
+"""What can be told of a revision, in the words of ``thermocomp revise``, and the objects that come of it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from cyclopts import Group, Parameter
-
-from thermocomp.cli.options import Flag, OptionalNames
-from thermocomp.cli.revisevalues import (
+from thermocomp.api.revision.values import (
     m_code_of,
     origin_of,
     point_of,
@@ -38,8 +35,6 @@ from thermocomp.nc.thermal.start import Start
 from thermocomp.nc.thermal.stations import Station, stations
 
 Zero = Literal["start", "cold", "last"]
-Models = Annotated[list[Path], Parameter(consume_multiple=True, negative=())]
-OptionalPaths = Annotated[list[Path] | None, Parameter(consume_multiple=True, negative=())]
 
 _COUNTED: dict[Zero, str] = {
     "start": "from the start of the program",
@@ -48,11 +43,6 @@ _COUNTED: dict[Zero, str] = {
 }
 
 
-def _group(name: str, order: int) -> Group:
-    return Group(name, sort_key=order)
-
-
-@Parameter(name="*", group=_group("The drift", 1))
 @dataclass(frozen=True, kw_only=True)
 class Drifting:
     """What makes the tool drift.
@@ -72,9 +62,9 @@ class Drifting:
         Who takes unproven models all the same, and why: "NAME, REASON".
     """
 
-    model: Models
-    axis: OptionalNames = None
-    constant: OptionalNames = None
+    model: list[Path]
+    axis: list[str] | None = None
+    constant: list[str] | None = None
     forecast: Path | None = None
     accept_unproven: str | None = None
 
@@ -120,7 +110,6 @@ def _taken(names: Iterable[str], how: str) -> list[str]:
     return [f"{name} is {how}: that it may be otherwise is in no bound" for name in sorted(names)]
 
 
-@Parameter(name="*", group=_group("The state at the start: exactly one of cold, carried, measured", 2))
 @dataclass(frozen=True, kw_only=True)
 class Starting:
     """How warm the machine is when the program starts.
@@ -141,10 +130,10 @@ class Starting:
         was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
     """
 
-    cold: Flag = False
+    cold: bool = False
     carried: Path | None = None
     pause: str | None = None
-    measured: OptionalNames = None
+    measured: list[str] | None = None
     zero: Zero | None = None
 
     def check(self) -> None:
@@ -188,7 +177,6 @@ class Starting:
         return _COUNTED[self._zero]
 
 
-@Parameter(name="*", group=_group("The revision", 3))
 @dataclass(frozen=True, kw_only=True)
 class Way:
     """How the correction gets into the program.
@@ -210,9 +198,9 @@ class Way:
     safe_z : str
         At and above this Z of the work coordinates the tool is up: no cut is there. If not given, the tool counts as up
         after a rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
-    split : bool
-        Split a long cut where one straight change of the correction would leave more than a step in its middle (method
-        coordinates, linuxcnc).
+    no_split : bool
+        Split no long cut. If not given, it is split where one straight change of the correction would leave more than a
+        step in its middle (method coordinates, linuxcnc).
     expand : bool
         Turn loops, variables and subprograms into plain lines first: by LinuxCNC's interpreter, or, for a Fanuc, those
         in the same file by an unroller of our own.
@@ -228,10 +216,10 @@ class Way:
     step: str = "1 um"
     largest: str = "400 um"
     safe_z: str | None = None
-    split: bool = True
-    expand: Flag = False
-    subroutines: OptionalPaths = None
-    unproved: Flag = False
+    no_split: bool = False
+    expand: bool = False
+    subroutines: list[Path] | None = None
+    unproved: bool = False
 
     def demand(self) -> Demand:
         """Return when the correction is renewed."""
@@ -270,7 +258,6 @@ class Way:
         return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
 
 
-@Parameter(name="*", group=_group("The controller: what does not stand in the program", 4))
 @dataclass(frozen=True, kw_only=True)
 class Controller:
     """What stands at the controller and not in the program.
@@ -316,16 +303,16 @@ class Controller:
     units: Literal["mm", "inch"] | None = None
     startup: str | None = None
     speed: str | None = None
-    origin: OptionalNames = None
-    tool: OptionalNames = None
-    diameter: OptionalNames = None
+    origin: list[str] | None = None
+    tool: list[str] | None = None
+    diameter: list[str] | None = None
     home: str | None = None
-    rotation: OptionalNames = None
-    no_g92: Flag = False
+    rotation: list[str] | None = None
+    no_g92: bool = False
     integers: Literal["whole", "least", "refuse"] | None = None
     least: str = "1 um"
     block_delete: Literal["on", "off"] | None = None
-    harmless: OptionalNames = None
+    harmless: list[str] | None = None
 
     @property
     def whose(self) -> Literal["linuxcnc", "fanuc"]:
@@ -360,7 +347,6 @@ class Controller:
         return dict(tool_of(text, "--diameter", "10 mm") for text in self.diameter)
 
 
-@Parameter(name="*", group=_group("The time it takes", 5))
 @dataclass(frozen=True, kw_only=True)
 class Timing:
     """How fast the machine is.

@@ -1,14 +1,17 @@
 """`thermocomp.revise`: the command as a function."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from thermocomp.cli import reviserun, revisetables
-from thermocomp.cli.revise import prepared, run
-from thermocomp.cli.reviseoptions import Controller, Drifting, Starting, Timing, Way
+from thermocomp.api.revision import outcome
+from thermocomp.api.revision.job import Tell
+from thermocomp.api.revision.job import revise as revise_program
+from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.api.revision.prepare import prepare_job
 from thermocomp.core.exceptions import InputError
 
 _GROUPS = (Drifting, Starting, Way, Controller, Timing)
@@ -98,13 +101,19 @@ def revise(
             raise InputError(f"revise: give {', '.join(missing)}")
         groups.append(group(**mine))
     drifting, starting, way, controller, timing = groups
-    job, notes = prepared(
+    job, notes = prepare_job(
         Path(program), drifting, Path(output), starting, way, controller, timing, date, overwrite=overwrite
     )
-    done: reviserun.Done = run(job, hidden=True)
+    done = revise_program(job, _untold)
     return RevisedProgram(
         Path(output),
         done.written,
         tuple(job.paths.all()) if done.written else (),
-        revisetables.content(job, done, notes),
+        outcome.content(job, done, notes),
     )
+
+
+@contextmanager
+def _untold(_: str) -> Iterator[Tell]:
+    """Tell nobody."""
+    yield lambda *_: None

@@ -1,21 +1,20 @@
-"""One run of ``thermocomp revise``: the files it reads and writes, all of them or none."""
+"""One revision of a program: the files it reads and writes, all of them or none."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from thermocomp import __version__
 from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prove
-from thermocomp.cli import reviseheader
-from thermocomp.cli.progress import Share, by_share
-from thermocomp.cli.reviseexpand import written_out
-from thermocomp.cli.revisetravel import Travel
-from thermocomp.cli.shown import shown
+from thermocomp.api.revision import headers
+from thermocomp.api.revision.expanded import write_expanded
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.core.shown import shown
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import publish, scratch
 from thermocomp.nc.parser.tokens import program_lines
@@ -23,6 +22,7 @@ from thermocomp.nc.rewrite import diff, header
 from thermocomp.nc.rewrite.course import Bound, Course, Run
 from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.revise import Revised, Revision
+from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.drift import Drift
 
 #: what a program that cannot be proved is refused with
@@ -33,6 +33,12 @@ PROGRAM, DIFF = "program", "diff"
 LONG = 2_000_000
 #: lines after which the bar moves
 TOLD = 500
+
+
+#: tells which share of the work is done, and where it is
+Tell = Callable[[float, str], None]
+#: for the time of a phase of the work: who is told
+Phase = Callable[[str], AbstractContextManager[Tell]]
 
 
 class Paths(NamedTuple):
@@ -120,28 +126,45 @@ class Done(NamedTuple):
     proving: float  #: for the proof
 
 
-def revise(job: Job, *, hidden: bool) -> Done:
+def revise(job: Job, phase: Phase) -> Done:
     """Revise a program and write all files; none if something is wrong, or if there is nothing to take off.
+
+    Parameters
+    ----------
+    job : Job
+    phase : callable
+        Gives, by the name of a phase, what is told how far that is.
+
+    Returns
+    -------
+    Done
 
     Raises
     ------
     InputError
-        The program cannot be revised or proved, or the interpreter disagrees.
+        The program cannot be revised or proved, or the interpreter disagrees; the message begins with its name.
     """
+    try:
+        return _revise(job, phase)
+    except InputError as e:
+        raise InputError(f"{job.program}: {e}") from e
+
+
+def _revise(job: Job, phase: Phase) -> Done:
     paths = job.paths
     with scratch(paths.program.parent) as folder:
         drafts = {p: folder / f"{k}" for k, p in enumerate(paths.all())}
         source, lines = job.program, None
         if paths.expanded is not None:
             source = drafts[paths.expanded]
-            lines = written_out(job.program, source, job.revision.setup, job.diameters, job.subroutines)
+            lines = write_expanded(job.program, source, job.revision.setup, job.diameters, job.subroutines)
         ledger, course = Ledger(), Course()
         watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()
         try:
             if source.stat().st_size > LONG:
-                _rehearse(job, source, hidden=hidden)
-            with by_share("revising", hidden=hidden) as tell:
+                _rehearse(job, source, phase)
+            with phase("revising") as tell:
                 blank = _write(job, source, folder, drafts[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
             if lines is not None and 0 < e.line <= len(lines):
@@ -155,7 +178,7 @@ def revise(job: Job, *, hidden: bool) -> Done:
         begin = time.perf_counter()
         proof = None
         if not job.unproved:
-            with by_share("proving", hidden=hidden) as tell:
+            with phase("proving") as tell:
                 proof = _proved(job, source, folder / PROGRAM, ledger, tell)
         # what is proved has a header that says nothing yet: from here on nothing but its comments changes
         filled = header.filled(
@@ -176,9 +199,9 @@ def revise(job: Job, *, hidden: bool) -> Done:
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 
-def _rehearse(job: Job, source: Path, *, hidden: bool) -> None:
+def _rehearse(job: Job, source: Path, phase: Phase) -> None:
     size = source.stat().st_size
-    with by_share("checking", hidden=hidden) as tell, ncprogram.opened(source) as texts:
+    with phase("checking") as tell, ncprogram.opened(source) as texts:
         read = 0
         for block in job.revision.rehearse(program_lines(texts)):
             read += len(block.line.text)
@@ -187,7 +210,7 @@ def _rehearse(job: Job, source: Path, *, hidden: bool) -> None:
 
 
 def _write(
-    job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Share
+    job: Job, source: Path, folder: Path, table: Path, listeners: Sequence[Ledger | Course | Travel], tell: Tell
 ) -> tuple[str, ...]:
     """Write program, diff and table, and return the header that still says nothing."""
     size = max(source.stat().st_size, 1)
@@ -257,21 +280,21 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
     """Return what the header says."""
     setup, place = job.revision.setup, list[str]()
     if job.drift.by_position:
-        place = reviseheader.told_place(setup, job.revision.elsewhere, job.drift.axes)
+        place = headers.told_place(setup, job.revision.elsewhere, job.drift.axes)
     return [
         f"thermocomp {__version__}, {job.when.date()}, for {setup.controller}",
         f"program {job.program.name}",
-        *reviseheader.told_models(job.models),
+        *headers.told_models(job.models),
         f"start {job.start}",
         job.zero,
         job.method,
-        reviseheader.told_bound(bounds),
+        headers.told_bound(bounds),
         *place,
-        *reviseheader.told_proof(proof),
+        *headers.told_proof(proof),
     ]
 
 
-def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share) -> Proof:
+def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
     """Return what the interpreter says."""
     lines, last = max(job.revision.lines, 1), 0
 
@@ -287,20 +310,3 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Share
         raise
     except InputError as e:  # whatever it is that keeps the interpreter from judging
         raise InputError(f"it cannot be proved: {e}; {ALL_THE_SAME}") from e
-
-
-def moment(text: str | None) -> datetime:
-    """Return when it is: a date the user gives, or now.
-
-    Raises
-    ------
-    InputError
-        It is no date.
-    """
-    if text is None:
-        return datetime.now().astimezone()
-    try:
-        given = date.fromisoformat(text)
-    except ValueError as e:
-        raise InputError(f"--date {text!r}: write year-month-day, such as 2026-01-31") from e
-    return datetime(given.year, given.month, given.day).astimezone()

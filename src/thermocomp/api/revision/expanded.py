@@ -1,4 +1,4 @@
-"""``thermocomp revise --expand``: the program is written out in plain lines before it is revised."""
+"""A program is written out in plain lines before it is revised (``--expand``)."""
 
 from array import array
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.parser.tokens import program_lines
 
 
-def written_out(
+def write_expanded(
     program: Path, out: Path, setup: Setup, diameters: Mapping[int, float] | None, subroutines: Sequence[Path]
 ) -> "array[int]":
     """Write a program out: LinuxCNC's by its interpreter, a Fanuc's by an unroller of our own.

@@ -1,0 +1,160 @@
+"""What is told of a revision becomes a job, or is refused before any work."""
+
+from collections.abc import Mapping, Sequence
+from datetime import date, datetime
+from itertools import islice
+from pathlib import Path
+
+from thermocomp.adapters.linuxcnc import rs274
+from thermocomp.api.revision import headers
+from thermocomp.api.revision.job import ALL_THE_SAME, Job, Paths
+from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.core.exceptions import InputError
+from thermocomp.files import ncprogram
+from thermocomp.files.draft import refuse_existing
+from thermocomp.nc.interpreter.block import Setup
+from thermocomp.nc.parser.recognise import program_number
+from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.nc.rewrite.revise import FIRST, Revision
+from thermocomp.nc.rewrite.travel import Travel
+from thermocomp.nc.thermal.stations import Station
+
+
+def prepare_job(
+    program: Path,
+    drifting: Drifting,
+    output: Path,
+    starting: Starting,
+    way: Way,
+    controller: Controller,
+    timing: Timing,
+    when: str | None,
+    *,
+    overwrite: bool,
+) -> tuple[Job, list[str]]:
+    """Return what is to be done to a program, and notes.
+
+    Parameters
+    ----------
+    program : Path
+    drifting : Drifting
+    output : Path
+    starting : Starting
+    way : Way
+    controller : Controller
+    timing : Timing
+    when : str or None
+        Date for the header; today without it.
+    overwrite : bool
+        Existing files are replaced.
+
+    Returns
+    -------
+    job : Job
+    notes : list of str
+
+    Raises
+    ------
+    InputError
+        It cannot be done, which is found out before any work.
+    """
+    if controller.controller is None:
+        _refuse_number(program)
+    ncprogram.opened(program).close()
+    starting.check()
+    found = drifting.stations()
+    others, notes = drifting.others(found)
+    drift = starting.drift(found, others)
+    machine = timing.read()
+    setup = controller.setup(machine)
+    kinematics, guesses = timing.kinematics(machine)
+    method = way.made(setup, drift.driven)
+    models = _files(found, drifting.hashes())
+    header_lines = headers.lines(models, by_position=drift.by_position, unproved=way.unproved)
+    revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
+    _check_interpreter(way, setup, diameters=controller.diameter is not None)
+    if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
+        _refuse_optional(program)
+    paths = Paths.of(output, expanded=way.expand)
+    given = (timing.machine, starting.carried, drifting.forecast)
+    refuse_existing(paths.all(), overwrite, [program, *drifting.model, *(p for p in given if p is not None)])
+    job = Job(
+        program,
+        paths,
+        revision,
+        drift,
+        models,
+        starting.words(),
+        f"drift counts {starting.counted()}",
+        f"method {way.words()}",
+        _moment(when),
+        unproved=way.unproved,
+        diameters=controller.diameters(expand=way.expand),
+        subroutines=way.folders(),
+        travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
+        overwrite=overwrite,
+    )
+    return job, [*notes, *guesses]
+
+
+def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
+    """Return which files the models come from, each with what it is for."""
+    found = []
+    for name in dict.fromkeys(hashes[s.model.target] for s in stations):
+        mine = [s for s in stations if hashes[s.model.target] == name]
+        places = {a: [s.along for s in mine if s.axis == a] for a in dict.fromkeys(s.axis for s in mine)}
+        said = [a if along[0] is None else f"{a} at {len(along)} places of {along[0]}" for a, along in places.items()]
+        unproven = any((h := s.model.honest_error) is not None and h.taken for s in mine)
+        found.append(f"{name} for {', '.join(said)}{' UNPROVEN' if unproven else ''}")
+    return found
+
+
+def _refuse_number(program: Path) -> None:
+    """Raise `InputError` if a program begins as a Fanuc's do, and nobody has said whose it is."""
+    with ncprogram.opened(program) as lines:
+        first = list(islice(lines, FIRST))
+    if number := program_number(first):
+        raise InputError(
+            f"{program}: line {number}: {first[number - 1].strip()[:40]!r} is how a Fanuc's or Haas's programs "
+            "begin: say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc"
+        )
+
+
+def _refuse_optional(program: Path) -> None:
+    """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
+    with ncprogram.opened(program) as lines:
+        for line in read_lines(lines):
+            if line.optional:
+                raise InputError(
+                    f"{program}: line {line.number}: an optional line: --expand writes it out as a plain one, or "
+                    "leaves it out; say --block-delete off or on"
+                )
+
+
+def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
+    """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
+    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.installed()) is not None:
+        raise InputError(f"--expand: {reason}")
+    if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
+        raise InputError(
+            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
+        )
+    if not way.unproved and (reason := rs274.installed()):
+        raise InputError(f"it cannot be proved: {reason}; {ALL_THE_SAME}")
+
+
+def _moment(text: str | None) -> datetime:
+    """Return when it is: a date the user gives, or now.
+
+    Raises
+    ------
+    InputError
+        It is no date.
+    """
+    if text is None:
+        return datetime.now().astimezone()
+    try:
+        given = date.fromisoformat(text)
+    except ValueError as e:
+        raise InputError(f"--date {text!r}: write year-month-day, such as 2026-01-31") from e
+    return datetime(given.year, given.month, given.day).astimezone()
