@@ -52,6 +52,8 @@ def run(folder: Path, tests: Sequence[str], patience: float | None = None) -> tu
         "-p",
         "no:cacheprovider",
         "--tb=line",
+        "-m",
+        "",  # those that take long, too
         *(f"tests/{test}" for test in tests),
     ]
     environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
