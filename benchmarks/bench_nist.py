@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 Solver = Callable[[FloatArray, FloatArray, bool], FloatArray]
 
 #: correct digits to reach
-GOALS = {"Longley": 13.0, "Wampler1": 9.0, "Wampler2": 9.0, "Wampler3": 9.0, "Filip": 7.0}
+GOALS = {"Longley": 10.5, "Wampler1": 9.0, "Wampler2": 9.0, "Wampler3": 9.0, "Filip": 7.5}
 PROBLEMS = ("Norris", "Pontius", "NoInt1", "NoInt2", "Longley", *(f"Wampler{k}" for k in range(1, 6)), "Filip")
 
 

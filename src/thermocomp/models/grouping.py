@@ -7,7 +7,6 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
-from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
 from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
@@ -144,7 +143,7 @@ class CorrelationGrouping(TermRegressor):
             Variable.single(names[i], i) if zero is None else Variable.difference(names, names[i], names[zero])
             for i in self.selected_
         ]
-        found = solve(values[:, self.candidates_], deviation, tri, columns=choice.selected, enough=ENOUGH)
+        found = solve(values[:, self.candidates_], deviation, tri, columns=choice.selected)
         self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total, self.fit_intercept)
         return self
 

@@ -6,7 +6,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.models import steplog
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import solve, triangle
-from thermocomp.models.numerics.stepwise import ENOUGH, FThresholds, alpha_of_f, r_squared_of_f, stepwise
+from thermocomp.models.numerics.stepwise import FThresholds, alpha_of_f, r_squared_of_f, stepwise
 
 
 class PartialF(TermRegressor):
@@ -73,7 +73,7 @@ class PartialF(TermRegressor):
         tri = triangle(both, intercept=self.fit_intercept)
         chosen = stepwise(tri, rule, names)
         self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
-        found = solve(change, deviation, tri, columns=self.selected_, enough=ENOUGH)
+        found = solve(change, deviation, tri, columns=self.selected_)
         variables = [Variable.single(name, i) for i, name in enumerate(names)]
         self._keep(found, variables, [(i,) for i in self.selected_], tri.total, self.fit_intercept)
         return self

@@ -10,7 +10,7 @@ from thermocomp.core.terms import Term, TermTable, Variable, second_order_terms
 from thermocomp.models import steplog
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import solve, triangle
-from thermocomp.models.numerics.stepwise import ENOUGH, AlphaThresholds, stepwise
+from thermocomp.models.numerics.stepwise import AlphaThresholds, stepwise
 
 FloatArray = NDArray[np.float64]
 
@@ -113,7 +113,7 @@ class SecondOrderRegression(TermRegressor):
         self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
         inside = [terms[k] for k in self.selected_]
         columns = _columns(values, inside, deviation)[:, :-1]
-        found = solve(columns, deviation, tri.part(self.selected_), enough=ENOUGH)
+        found = solve(columns, deviation, tri.part(self.selected_))
         self._keep(found, variables, inside, tri.total, self.fit_intercept)
         return self
 

@@ -12,7 +12,6 @@ from thermocomp.core.terms import Variable
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
-from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.subsets import Subsets, best_subsets
 
 FloatArray = NDArray[np.float64]
@@ -189,7 +188,7 @@ class BestSubset(TermRegressor):
             chosen = self.subsets_.best[place]
             self.selected_, self.proven_ = chosen.columns, chosen.proven
         tri = triangle(both, intercept=self.fit_intercept)
-        found = solve(change, deviation, tri, columns=self.selected_, enough=ENOUGH)
+        found = solve(change, deviation, tri, columns=self.selected_)
         variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
         self._keep(found, variables, [(i,) for i in self.selected_], tri.total, self.fit_intercept)
         return self
@@ -240,7 +239,7 @@ class BestSubset(TermRegressor):
         tri = triangle(table(train, known), intercept=self.fit_intercept)
         for best in found.best:
             if len(best.columns) in sizes:
-                model: Any = solve(train, known, tri, columns=best.columns, enough=ENOUGH)
+                model: Any = solve(train, known, tri, columns=best.columns)
                 missed = y[out] - model.intercept - X[out][:, best.columns] @ model.coefficients
                 errors[sizes.index(len(best.columns))] = missed @ missed
         return errors

@@ -22,8 +22,6 @@ FloatArray = NDArray[np.float64]
 
 #: least share of a candidate's own norm that the model must leave of it, else it does not enter
 TOLERANCE = 1e-8
-#: relative error of a coefficient that needs no refinement: no temperature has as many digits
-ENOUGH = 1e-9
 _TINY = float(np.finfo(np.float64).tiny)
 _SAME = 1e-10  # gains closer than this are equal, and the first candidate is taken whatever the rounding
 

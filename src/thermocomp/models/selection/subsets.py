@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.numerics.leastsquares import Triangle, solve, table, triangle
-from thermocomp.models.numerics.stepwise import ENOUGH
 from thermocomp.models.selection.subsetrun import Route, Stop, run
 from thermocomp.models.selection.subsetsearch import Problem
 
@@ -188,7 +187,7 @@ def best_subsets(
             where = tuple(sorted(kept[i] for i in columns))
             some = X[:, where]
             fresh = triangle(table(some, y), intercept=intercept)
-            found = solve(some, y, fresh, enough=ENOUGH)
+            found = solve(some, y, fresh)
             # what one unit in the last place of every number can do to the residual
             blur = float(fresh.last_place[:-1] @ np.abs(found.coefficients)) + problem.y_noise
             fitted.append((found.rss, where, blur))
