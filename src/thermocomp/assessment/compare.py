@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.coverage import cover
-from thermocomp.assessment.diagnostics import collinearity
+from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
 from thermocomp.assessment.replay import run
@@ -83,7 +83,6 @@ def compare(
     refuse_leaks(samples, judging)
     names = expand(methods)
     rules.check(names)
-    capped = alike(samples, judging)
     by_target = [readable(samples, k, judging) for k in range(len(samples.targets))]
     pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
@@ -101,36 +100,56 @@ def compare(
     except KeyboardInterrupt:
         if len(done) < len(by_target[0].splits):
             raise
-    parts: dict[tuple[int, str], list[Assessment]] = {}
-    for (k, name, _), a in zip(pieces, done, strict=False):
-        parts.setdefault((k, name), []).append(a)
-    # a method that was judged on some of the blocks only is left out
-    parts = {key: p for key, p in parts.items() if len(p) == len(by_target[key[0]].splits)}
+    capped = alike(samples, judging)
     found: list[Assessment] = []
     recommended: list[Recommendation] = []
+    finished = 0
     for k, target in enumerate(samples.targets):
-        mine = {p[0].model: p for (of, _), p in parts.items() if of == k}
+        mine: dict[str, list[Assessment]] = {}
+        for (of, name, _), a in zip(pieces, done, strict=False):
+            if of == k:
+                mine.setdefault(name, []).append(a)
+        # a method that was judged on some of the blocks only is left out
+        mine = {p[0].model: p for p in mine.values() if len(p) == len(by_target[k].splits)}
         if not mine:
             continue
+        finished += len(mine)
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
         best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
-        whole_of = {name: do_no_harm.together(v, caps=capped) for name, v in verdicts.items()}
-        after = corrected(whole_of, rules.primary, best)
-        for name, p in mine.items():
-            found += p if len(p) > 1 else []
-            found.append(replace(_together(p), verdict=after[name]))
-    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
-    values = samples.change()[samples.valid][:, temperatures]
-    heat = collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
+        found += _concluded(mine, verdicts, rules, best, capped)
     return Comparison(
         judging,
         tuple(found),
-        heat,
-        left=len(names) * len(by_target) - len(parts),
+        _heat(samples),
+        left=len(names) * len(by_target) - finished,
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
     )
+
+
+def _concluded(
+    parts: dict[str, list[Assessment]],
+    verdicts: dict[str, list[do_no_harm.Verdict]],
+    rules: Rules,
+    best: Recommendation | None,
+    caps: tuple[str, ...],
+) -> list[Assessment]:
+    """Return what was found for one target: each method in each block, and over all of them with its verdict."""
+    whole = {name: do_no_harm.together(v, caps=caps) for name, v in verdicts.items()}
+    after = corrected(whole, rules.primary, best)
+    found = []
+    for name, p in parts.items():
+        found += p if len(p) > 1 else []
+        found.append(replace(_together(p), verdict=after[name]))
+    return found
+
+
+def _heat(samples: Samples) -> Collinearity:
+    """Return how far the temperatures repeat each other."""
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    values = samples.change()[samples.valid][:, temperatures]
+    return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
 
 
 def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
@@ -254,6 +273,28 @@ def judge(
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
     segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
+    against = learned or samples.learned(target, rows)
+    verdict = do_no_harm.Verdict(
+        units=tuple(
+            _worse(
+                do_no_harm.measure(
+                    unit,
+                    measured[mine],
+                    run_or_alone[mine],
+                    against,
+                    unit=model.unit,
+                    margin=rules.margin,
+                    stretch=split.stretch,
+                )
+                for run_or_alone in (predicted, ran.deviation)
+            )
+            for unit, mine in segments
+            if mine.sum() >= do_no_harm.MIN_ROWS
+        ),
+        unit=model.unit,
+        caps=_caps(split, learned, samples, target),
+        refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
+    )
     return Assessment(
         model=name,
         target=model.target,
@@ -263,27 +304,7 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=do_no_harm.Verdict(
-            units=tuple(
-                _worse(
-                    do_no_harm.measure(
-                        unit,
-                        measured[mine],
-                        run_or_alone[mine],
-                        learned or samples.learned(target, rows),
-                        unit=model.unit,
-                        margin=rules.margin,
-                        stretch=split.stretch,
-                    )
-                    for run_or_alone in (predicted, ran.deviation)
-                )
-                for unit, mine in segments
-                if mine.sum() >= do_no_harm.MIN_ROWS
-            ),
-            unit=model.unit,
-            caps=_caps(split, learned, samples, target),
-            refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
-        ),
+        verdict=verdict,
         sensors=model.sensors,
         n_sensors=(len(model.sensors), len(model.sensors)),
         fit_s=fit_s,

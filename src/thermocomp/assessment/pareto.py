@@ -201,8 +201,6 @@ def budget(
         progress(f"{samples.targets[target].name}: judged")
         found.append(value)
     judged = [split.judge & np.isfinite(deviation) for split in splits]
-    values = samples.change()[samples.valid]
-    columns = [c.name for c in samples.inputs]
     return Budget(
         target=samples.targets[target].name,
         candidates=tuple(temperatures),
@@ -212,19 +210,17 @@ def budget(
         rms=np.moveaxis(np.reshape(found, (len(splits), len(names), n_sizes)), 0, 2),
         rows=np.array([rows.sum() for rows in judged]),
         none=np.array([rms(deviation[rows], np.zeros(rows.sum())) for rows in judged]),
-        frequency=np.array(
-            [
-                [np.mean([name in sensors[size] for sensors in chosen[1:]]) for name in temperatures]
-                for size in range(n_sizes)
-            ]
-        ),
-        condition=np.array(
-            [
-                collinearity(values[:, [columns.index(s) for s in sensors]], sensors).condition_number
-                for sensors in chosen[0]
-            ]
-        ),
+        frequency=np.mean([[[n in s for n in temperatures] for s in sensors] for sensors in chosen[1:]], axis=0),
+        condition=_conditions(samples, chosen[0]),
         proven=all(proven for _, proven in results),
+    )
+
+
+def _conditions(samples: Samples, sets: Sequence[Sequence[str]]) -> FloatArray:
+    """Return the condition number of each set of temperatures."""
+    values, columns = samples.change()[samples.valid], [c.name for c in samples.inputs]
+    return np.array(
+        [collinearity(values[:, [columns.index(s) for s in names]], tuple(names)).condition_number for names in sets]
     )
 
 
@@ -265,36 +261,11 @@ def choose(
         jobs=jobs,
         progress=progress,
     )
-    pooled = found.pooled()
     recommended = found.recommended()
     if recommended is None:
         raise FitError(f"{candidates.target}: none of {', '.join(found.models)} could be judged in every block")
     model, place = recommended
     sensors = found.sensors[place]
-    errors = Table(
-        f"Error on unseen blocks: {judging.name}",
-        ("sensors", *(f"{m} RMS [um]" for m in found.models), "condition", "chosen in all rows"),
-        tuple(
-            (size, *(float(v) for v in pooled[:, k]), float(found.condition[k]), " ".join(found.sensors[k]))
-            for k, size in enumerate(found.sizes)
-        ),
-        place,
-        f"Without compensation {found.none_pooled():.2f} um. Enough, each model by itself: "
-        + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models)
-        + ".",
-    )
-    order = np.argsort(-found.frequency[place], kind="stable")
-    frequency = Table(
-        f"How surely a sensor is among the best {len(sensors)}",
-        ("sensor", "share of the blocks [%]"),
-        tuple(
-            (found.candidates[j], float(100 * found.frequency[place, j]))
-            for j in order
-            if found.frequency[place, j] > 0
-        ),
-        None,
-        "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
-    )
     notes = [
         _rule(found),
         "Sensors of each number are the best subset by least squares in the rows to learn from, whatever model is then "
@@ -311,11 +282,42 @@ def choose(
         candidates.target,
         sensors,
         f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves "
-        f"{float(pooled[found.models.index(model), place]):.2f} um RMS on unseen cycles, instead of "
+        f"{float(found.pooled()[found.models.index(model), place]):.2f} um RMS on unseen cycles, instead of "
         f"{found.none_pooled():.2f} um; {_trade_off(found, model, place)}",
-        (errors, frequency, candidates.repeats(sensors)),
+        (_errors(found, judging, place), _frequency(found, place), candidates.repeats(sensors)),
         tuple(notes),
         found,
+    )
+
+
+def _errors(found: Budget, judging: Judging, place: int) -> Table:
+    pooled = found.pooled()
+    return Table(
+        f"Error on unseen blocks: {judging.name}",
+        ("sensors", *(f"{m} RMS [um]" for m in found.models), "condition", "chosen in all rows"),
+        tuple(
+            (size, *(float(v) for v in pooled[:, k]), float(found.condition[k]), " ".join(found.sensors[k]))
+            for k, size in enumerate(found.sizes)
+        ),
+        place,
+        f"Without compensation {found.none_pooled():.2f} um. Enough, each model by itself: "
+        + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models)
+        + ".",
+    )
+
+
+def _frequency(found: Budget, place: int) -> Table:
+    order = np.argsort(-found.frequency[place], kind="stable")
+    return Table(
+        f"How surely a sensor is among the best {len(found.sensors[place])}",
+        ("sensor", "share of the blocks [%]"),
+        tuple(
+            (found.candidates[j], float(100 * found.frequency[place, j]))
+            for j in order
+            if found.frequency[place, j] > 0
+        ),
+        None,
+        "Chosen anew without each block: a sensor far below 100 % was a matter of luck.",
     )
 
 

@@ -20,8 +20,13 @@ from thermocomp.models.numerics.stepwise import Step
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
-from thermocomp.models.selection.equivalents import equivalents
-from thermocomp.models.selection.maximal_correlation import DataSet, maximal_correlations, subsets_up_to
+from thermocomp.models.selection.equivalents import Equivalents, equivalents
+from thermocomp.models.selection.maximal_correlation import (
+    DataSet,
+    MaximalCorrelations,
+    maximal_correlations,
+    subsets_up_to,
+)
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recording.samples import Samples
 
@@ -130,6 +135,21 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
         int(np.argmin([s.mse for s in found.curve_])),
         f"{found.searched_[0]} subsets of representatives, then {found.searched_[1]} combinations of members.",
     )
+    sensors = candidates.called(found.selected_)
+    needed = (*sensors, *((settings.reference,) if settings.reference else ()))
+    return Choice(
+        "grouping",
+        candidates.target,
+        needed,
+        f"smallest residual mean square, {found.mse_:.4g} um^2, among the members of {len(found.participating_)} of "
+        f"{len(found.groups_)} groups",
+        (groups, curve, candidates.repeats(sensors), _other_thresholds(candidates, found, settings)),
+        _dependence(found.n_effective_, len(candidates.y)),
+        found,
+    )
+
+
+def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settings: Settings) -> Table:
     X = candidates.X.to_numpy()
     zero = candidates.names.index(settings.reference) if settings.reference is not None else None
     values = X if zero is None else X - X[:, [zero]]
@@ -141,7 +161,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
         list(part)
         for _, part in groupby(swept, lambda s: (len(s.interval.groups), s.choice.selected if s.choice else s.failure))
     ]
-    thresholds = Table(
+    return Table(
         "What other thresholds give",
         ("from", "to below", "groups", "sensors", "MSE_p [um^2]", "sum 1/eigenvalue [1/degC^2]"),
         tuple(
@@ -161,18 +181,6 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
             (k for k, part in enumerate(alike) if part[0].interval.low <= settings.threshold < part[-1].interval.high),
             None,
         ),
-    )
-    sensors = candidates.called(found.selected_)
-    needed = (*sensors, *((settings.reference,) if settings.reference else ()))
-    return Choice(
-        "grouping",
-        candidates.target,
-        needed,
-        f"smallest residual mean square, {found.mse_:.4g} um^2, among the members of {len(found.participating_)} of "
-        f"{len(found.groups_)} groups",
-        (groups, curve, candidates.repeats(sensors), thresholds),
-        _dependence(found.n_effective_, len(candidates.y)),
-        found,
     )
 
 
@@ -271,42 +279,12 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
         raise FitError("stopped before the first thermal cycle was done")
     same = equivalents(list(psi.psi[:, :, done]), psi.subsets, level=settings.level, holm=settings.holm)
 
-    def called(subset: Sequence[int]) -> str:
-        return " ".join(names[j] for j in subset)
-
     total = dict(zip(same.subsets, same.summed.sum(axis=0).tolist(), strict=True))
     enough = psi.least_size(ENOUGH_PSI)
     equals = same.common or tuple(dict.fromkeys(same.subsets[k] for k in same.best))
     least = max(enough or settings.most("ace"), min(len(s) for s in equals))
     small = [s for s in equals if len(s) <= least]
     chosen = max(small, key=lambda s: total[s])
-    per_target = Table(
-        "Best set for each displacement",
-        ("displacement", "best set", "mean Psi", "sets that are as good"),
-        tuple(
-            (t, called(same.subsets[k]), float(same.summed[d, k] / done.sum()), int(same.equivalent[d].sum()))
-            for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
-        ),
-        None,
-        f"{len(psi.subsets)} sets, {int(done.sum())} thermal cycles, {len(targets)} displacements: "
-        f"{len(psi.subsets) * int(done.sum()) * len(targets)} models.",
-    )
-    shown = same.table()[:30]
-    listed = Table(
-        "Sets by the number of displacements for which they are as good as the best",
-        ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for"),
-        tuple(
-            (
-                called(row.subset),
-                *(float(v / done.sum()) for v in row.summed),
-                min(row.p_values),
-                "all" if len(row.equivalent) == len(targets) else " ".join(targets[d] for d in row.equivalent),
-            )
-            for row in shown
-        ),
-        next((k for k, row in enumerate(shown) if row.subset == chosen), None),
-        f"The first {len(shown)} of {len(psi.subsets)}.",
-    )
     notes = list(dict.fromkeys(n.partition(": ")[2] for n in same.notes))
     number = enough or f"more than {settings.most('ace')}"
     notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement takes {number} sensor(s), no more are chosen.")
@@ -321,9 +299,51 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
         tuple(names[j] for j in chosen),
         f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors that are as good as the best for "
         f"all displacements ({len(same.common)} sets are)",
-        (per_target, listed),
+        (_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
         tuple(notes),
         same,
+    )
+
+
+def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:
+    done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
+    return Table(
+        "Best set for each displacement",
+        ("displacement", "best set", "mean Psi", "sets that are as good"),
+        tuple(
+            (
+                t,
+                " ".join(names[j] for j in same.subsets[k]),
+                float(same.summed[d, k] / done),
+                int(same.equivalent[d].sum()),
+            )
+            for d, (t, k) in enumerate(zip(targets, same.best, strict=True))
+        ),
+        None,
+        f"{len(psi.subsets)} sets, {done} thermal cycles, {len(targets)} displacements: "
+        f"{len(psi.subsets) * done * len(targets)} models.",
+    )
+
+
+def _listed_sets(
+    psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str], chosen: Sequence[int]
+) -> Table:
+    done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
+    shown = same.table()[:30]
+    return Table(
+        "Sets by the number of displacements for which they are as good as the best",
+        ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for"),
+        tuple(
+            (
+                " ".join(names[j] for j in row.subset),
+                *(float(v / done) for v in row.summed),
+                min(row.p_values),
+                "all" if len(row.equivalent) == len(targets) else " ".join(targets[d] for d in row.equivalent),
+            )
+            for row in shown
+        ),
+        next((k for k, row in enumerate(shown) if row.subset == chosen), None),
+        f"The first {len(shown)} of {len(psi.subsets)}.",
     )
 
 

@@ -10,6 +10,7 @@ the exact bounds of each period are ours, and said at each quantity.
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,37 +156,41 @@ def assess(
         name = f"{recording.name}, {number}" if len(starts) > 1 else recording.name
         lead = _lead(recording, phases[k - 1].start if k else 0, warm.start)
         more = [*notes, *_about_rows(recording, kind, rows, number, lead)]
-        tests.append(_evaluate(recording, kind, name, rows, (lead, k == 0), warm, pairs, air, residuals, more))
+        part = _Stretch(recording, kind, rows, lead, k == 0, warm)
+        tests.append(_evaluate(part, name, pairs, air, residuals, more))
     return tuple(tests)
 
 
-def _evaluate(
-    recording: Recording,
-    kind: Kind,
-    name: str,
-    rows: tuple[int, int, int],
-    before: tuple[int, bool],
-    warm: Phase,
-    pairs: Sequence[Pair],
-    air: Channel | None,
-    residuals: dict[str, FloatArray],
-    notes: list[str],
-) -> ThermalTest:
-    start, stop, end = rows
-    lead, rests = before
-    part = slice(start - lead, end + 1)
-    clock = recording.time[part] - recording.time[start]
-    time = clock[lead:]
+class _Stretch(NamedTuple):
+    """The rows of one test, and the rest before it."""
 
-    def curve(label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> Curve:
+    recording: Recording
+    kind: Kind
+    rows: tuple[int, int, int]  #: where it starts, where the drives stop, where it ends
+    lead: int  #: rows before it that tell what it starts from
+    rests: bool  #: nothing ran before
+    warm: Phase
+
+    @property
+    def part(self) -> slice:
+        """Its rows, with those before it."""
+        return slice(self.rows[0] - self.lead, self.rows[2] + 1)
+
+    def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> Curve:
+        """Return the figures of one channel, and of what a model leaves of it."""
+        start, stop, _ = self.rows
+        lead, rests, calm = self.lead, self.rests, self.kind == "etve"
+        clock = self.recording.time[self.part] - self.recording.time[start]
+        time = clock[lead:]
         told, remains = (
-            None if v is None else course(clock, v, lead, lead + stop - start, rests=rests, smooth=kind == "etve")
+            None if v is None else course(clock, v, lead, lead + stop - start, rests=rests, smooth=calm)
             for v in (measured, left)
         )
         assert told is not None
         values = measured[lead:] - told.zero.value
         after = None if left is None or remains is None else left[lead:] - remains.zero.value
         run = slice(0, lead + stop - start + 1)
+        settled = None if calm else settle(clock[run], measured[run], label, unit, self.warm, lead=lead, rests=rests)
         return Curve(
             name=label,
             unit=unit,
@@ -193,47 +198,35 @@ def _evaluate(
             values=values,
             course=told,
             figures=figures_of(time, told, values, stop - start),
-            settling=None
-            if kind == "etve"
-            else settle(clock[run], measured[run], label, unit, warm, lead=lead, rests=rests),
+            settling=settled,
             after=after,
             after_course=remains,
             after_figures=None if remains is None or after is None else figures_of(time, remains, after, stop - start),
         )
 
+
+def _evaluate(
+    part: _Stretch,
+    name: str,
+    pairs: Sequence[Pair],
+    air: Channel | None,
+    residuals: dict[str, FloatArray],
+    notes: list[str],
+) -> ThermalTest:
+    recording, kind, (start, stop, end) = part.recording, part.kind, part.rows
     channels = _probes(recording)
-    measured = {c.name: recording.table[c.name].to_numpy(dtype=np.float64)[part] for c in channels}
-    after = {n: v[part] for n, v in residuals.items()}
-    drawn = {c.name: curve(c.name, c.unit, c.place, measured[c.name], after.get(c.name)) for c in channels}
+    measured = {c.name: recording.table[c.name].to_numpy(dtype=np.float64)[part.part] for c in channels}
+    after = {n: v[part.part] for n, v in residuals.items()}
+    drawn = {c.name: part.curve(c.name, c.unit, c.place, measured[c.name], after.get(c.name)) for c in channels}
     tilts = []
     for p in pairs:
         left = p.angle(after[p.tip], after[p.spindle]) if p.tip in after and p.spindle in after else None
         place = f"from {p.tip} and {p.spindle}, {p.distance:g} mm apart"
-        tilts.append(curve(p.tilt, "urad", place, p.angle(measured[p.tip], measured[p.spindle]), left))
-    targets = []
-    for group, members in (_target_groups(recording) if kind == "axis" else {}).items():
-        ordered = sorted(members, key=lambda m: m[0])
-        low, high = ordered[0], ordered[-1]
-        ends = (low[1].name, high[1].name)
-        left = after[ends[1]] - after[ends[0]] if all(n in after for n in ends) else None
-        label = f"length {group.split('_')[0].upper()} {low[0]:g}-{high[0]:g} mm"
-        length = curve(label, "um", f"{ends[1]} minus {ends[0]}", measured[ends[1]] - measured[ends[0]], left)
-        positions = np.array([p for p, _ in ordered])
-        targets.append(
-            Targets(group, group[0].upper(), positions, tuple(drawn.pop(c.name) for _, c in ordered), length)
-        )
+        tilts.append(part.curve(p.tilt, "urad", place, p.angle(measured[p.tip], measured[p.spindle]), left))
+    targets = _lengths(part, measured, after, drawn) if kind == "axis" else []
+    curves = (*drawn.values(), *tilts, *(t.length for t in targets))
     air_values = recording.table[air.name].to_numpy()[start : end + 1] if air is not None else np.full(1, np.nan)
     known = air_values[np.isfinite(air_values)]
-    curves = (*drawn.values(), *tilts, *(t.length for t in targets))
-    still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
-    if still:
-        notes.append(f"{', '.join(still)}: its averages do not move beyond their noise, whose range it is that is told")
-    if kind == "spindle":
-        notes += _about_the_end([c for c in (*drawn.values(), *tilts) if c.name not in still])
-    for c in (*curves, *(c for t in targets for c in t.curves)):
-        if c.after_figures is not None and c.after_figures.range_all > c.figures.range_all:
-            grown = f"{c.figures.range_all:.3g} to {c.after_figures.range_all:.3g} {c.unit}"
-            notes.append(f"{c.name}: with the model its range grows, from {grown}")
     return ThermalTest(
         kind=kind,
         name=name,
@@ -248,8 +241,41 @@ def _evaluate(
         targets=tuple(targets),
         ambient=air,
         ambient_range=(float(known.min()), float(known.max())) if known.size else (float("nan"), float("nan")),
-        notes=tuple(notes),
+        notes=(*notes, *_about_curves(kind, curves, targets)),
     )
+
+
+def _lengths(
+    part: _Stretch, measured: dict[str, FloatArray], after: dict[str, FloatArray], drawn: dict[str, Curve]
+) -> list[Targets]:
+    """Return the targets of each axis, with what lies between the first and the last; they leave `drawn`."""
+    targets = []
+    for group, members in _target_groups(part.recording).items():
+        ordered = sorted(members, key=lambda m: m[0])
+        low, high = ordered[0], ordered[-1]
+        ends = (low[1].name, high[1].name)
+        left = after[ends[1]] - after[ends[0]] if all(n in after for n in ends) else None
+        label = f"length {group.split('_')[0].upper()} {low[0]:g}-{high[0]:g} mm"
+        length = part.curve(label, "um", f"{ends[1]} minus {ends[0]}", measured[ends[1]] - measured[ends[0]], left)
+        positions = np.array([p for p, _ in ordered])
+        curves = tuple(drawn.pop(c.name) for _, c in ordered)
+        targets.append(Targets(group, group[0].upper(), positions, curves, length))
+    return targets
+
+
+def _about_curves(kind: Kind, curves: Sequence[Curve], targets: Sequence[Targets]) -> list[str]:
+    """Return which curves do not move, how calm a spindle test ended, and what grows with a model."""
+    notes = []
+    still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
+    if still:
+        notes.append(f"{', '.join(still)}: its averages do not move beyond their noise, whose range it is that is told")
+    if kind == "spindle":
+        notes += _about_the_end([c for c in curves if c.name not in still])
+    for c in (*curves, *(c for t in targets for c in t.curves)):
+        if c.after_figures is not None and c.after_figures.range_all > c.figures.range_all:
+            grown = f"{c.figures.range_all:.3g} to {c.after_figures.range_all:.3g} {c.unit}"
+            notes.append(f"{c.name}: with the model its range grows, from {grown}")
+    return notes
 
 
 def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel | None) -> list[str]:

@@ -279,26 +279,8 @@ def stack(
     """
     if not recordings:
         raise InputError("no recording given")
+    target_channels, input_channels = _chosen_channels(recordings, targets, inputs)
     first = recordings[0]
-    target_channels = tuple(first.channel(name) for name in dict.fromkeys(targets))
-    if not target_channels:
-        raise InputError("no target given: name at least one displacement channel")
-    for c in target_channels:
-        if c.quantity not in ("displacement", "angle"):
-            raise InputError(f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle")
-    if inputs is None:
-        speed = first.speed
-        input_channels = first.temperatures + ((speed,) if speed is not None else ())
-    else:
-        input_channels = tuple(first.channel(name) for name in dict.fromkeys(inputs))
-    for c in input_channels:
-        if c.quantity in NO_INPUTS:
-            raise InputError(f"input {c.name} is a {c.quantity}: {NO_INPUTS[c.quantity]}")
-    if not input_channels:
-        raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
-    _refuse_twins(recordings)
-    if inputs is None:
-        _refuse_different_inputs(recordings, input_channels)
     names = [r.name for r in recordings]
     if len(set(names)) != len(names):
         names = [f"{n}#{k}" for k, n in enumerate(names, start=1)]
@@ -335,6 +317,33 @@ def stack(
         starts=tuple(p.start for p in parts),
         stamps=tuple((*p.start.earlier, r)[0].start for p, r in zip(parts, recordings, strict=True)),
     )
+
+
+def _chosen_channels(
+    recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None
+) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    """Return targets and inputs, or raise `InputError` if they are none that a model can have."""
+    first = recordings[0]
+    target_channels = tuple(first.channel(name) for name in dict.fromkeys(targets))
+    if not target_channels:
+        raise InputError("no target given: name at least one displacement channel")
+    for c in target_channels:
+        if c.quantity not in ("displacement", "angle"):
+            raise InputError(f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle")
+    if inputs is None:
+        speed = first.speed
+        input_channels = first.temperatures + ((speed,) if speed is not None else ())
+    else:
+        input_channels = tuple(first.channel(name) for name in dict.fromkeys(inputs))
+    for c in input_channels:
+        if c.quantity in NO_INPUTS:
+            raise InputError(f"input {c.name} is a {c.quantity}: {NO_INPUTS[c.quantity]}")
+    if not input_channels:
+        raise InputError(f"{first.name}: no temperature and no spindle speed to predict from")
+    _refuse_twins(recordings)
+    if inputs is None:
+        _refuse_different_inputs(recordings, input_channels)
+    return target_channels, input_channels
 
 
 class _Part(NamedTuple):

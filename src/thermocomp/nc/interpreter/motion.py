@@ -218,17 +218,7 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
     letter = "XYZ"[across]
     axes = {"XYZ"[i]: v / scale for i, v in state.axis_values(orders).items()}
     named = {c: v for c, v in axes.items() if c != letter}
-    kept = {c: values[c] for c in "RQPIJK" if c in values and (c != "K" or not state.fanuc)}
-    depth = {letter: axes[letter]} if letter in axes else {}
-    state.sticky = (state.sticky if again else {}) | kept | depth
-    missing = [c for c in KEPT[code] + letter if c not in state.sticky and not (state.fanuc and c == "P")]
-    if missing:
-        raise orders.error(f"{code} needs {' '.join(missing)} where it begins")
-    if code in ("G73", "G83") and state.sticky["Q"] <= 0.0:
-        raise orders.error(f"Q of {code} has to be above 0")
-    if code in ("G74", "G84") and not state.fanuc:
-        state.sticky.setdefault("P", state.last_dwell)  # that of the cycle before, in LinuxCNC
-    state.last_dwell = state.sticky.get("P", state.last_dwell)
+    _keep_words(state, orders, again, axes, letter)
     start = state.place
     frame = (modal.plane, modal.inch, modal.diameter)
     if state.level is None:
@@ -271,6 +261,22 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         known = mark(known, {i: 0.0 for i in range(3) if "XYZ"[i] in named}, to=True)
     state.place, state.machine = start, at
     state.known = mark(known, {across: 0.0}, to=_ends_certainly(state))
+
+
+def _keep_words(state: State, orders: Orders, again: bool, axes: dict[str, float], letter: str) -> None:
+    """Note the words of a cycle that hold for the holes after it as well."""
+    values, code = orders.values, state.modal.motion
+    kept = {c: values[c] for c in "RQPIJK" if c in values and (c != "K" or not state.fanuc)}
+    depth = {letter: axes[letter]} if letter in axes else {}
+    state.sticky = (state.sticky if again else {}) | kept | depth
+    missing = [c for c in KEPT[code] + letter if c not in state.sticky and not (state.fanuc and c == "P")]
+    if missing:
+        raise orders.error(f"{code} needs {' '.join(missing)} where it begins")
+    if code in ("G73", "G83") and state.sticky["Q"] <= 0.0:
+        raise orders.error(f"Q of {code} has to be above 0")
+    if code in ("G74", "G84") and not state.fanuc:
+        state.sticky.setdefault("P", state.last_dwell)  # that of the cycle before, in LinuxCNC
+    state.last_dwell = state.sticky.get("P", state.last_dwell)
 
 
 def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:

@@ -213,8 +213,7 @@ class Revision:
             if cutting:
                 if block.kind == "cycle":
                     knots = [(0.0, change.inner), (1.0, change.inner)]
-                cut = self.left.take(line.number, _beside(samples, knots))
-                self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
+                cut = self._cut(block, samples, knots, demand)
                 if self.drift.by_position:
                     self.elsewhere.take(end, point, self.drift)
             else:
@@ -242,6 +241,12 @@ class Revision:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
         if not ended and any(carried):
             self._refuse_open()
+
+    def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> Cut:
+        """Return how far the tool is off in a cut, and note what has held the correction."""
+        cut = self.left.take(block.line.number, _beside(samples, knots))
+        self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
+        return cut
 
     def _guarded(self, lines: Iterable[Line]) -> Iterator[Line]:
         for line in lines:
