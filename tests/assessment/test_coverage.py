@@ -77,6 +77,22 @@ def test_copies_count_once() -> None:
     assert covered(copied(3, 0.02, room=5.0), "files").independent == 3
 
 
+def test_an_idle_sensor_makes_no_two_tests_different() -> None:
+    rng = np.random.default_rng(2)
+    idle = Channel("t_idle_C", "temperature", "degC")
+    found = []
+    for plain in copied(4, 0.02):
+        table = plain.table.assign(t_idle_C=20 + 0.05 * rng.normal(size=len(plain.table)))
+        found.append(replace(plain, table=table, channels=(*plain.channels, idle)))
+    assert covered(found, "files").independent == 1
+
+
+def test_one_test_at_two_rates_is_one() -> None:
+    plain = small_machine()
+    thin = replace(plain, name="thin", table=plain.table.iloc[::3].reset_index(drop=True))
+    assert covered([plain, thin], "files").independent == 1
+
+
 def test_a_part_of_a_test_is_no_copy_of_it() -> None:
     whole = small_machine()
     half = len(whole) // 2

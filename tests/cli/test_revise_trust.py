@@ -12,6 +12,7 @@ from reviseruns import HONEST, PLATE, judged, revise, said, table, write_models
 
 from thermocomp.adapters.linuxcnc.verification.verify import Proof, prove
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.validity import Validity
 from thermocomp.nc.rewrite.header import MARK
 
 # -- how far to trust it ---------------------------------------------------------------------------------------------
@@ -65,7 +66,13 @@ def test_one_measurement_for_several_places(job_folder: Path, capsys: pytest.Cap
 
 
 def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_models([judged(lags("z_um", room=True))], "room.json")
+    heated = judged(lags("z_um", room=True))
+    write_models([heated], "room.json")
+    assert revise("--model", "room.json", "--constant", "t3=20degC", "--overwrite") == 2
+    assert "will not stand still while this program runs" in said(capsys)
+    known = Validity(4, 4, 0.5, (), (10.0, 30.0), "t3_C", None, 1, 9.0)
+    Path("room.json").unlink()
+    write_models([replace(heated, validity=known)], "room.json")
     still, warnings = bound(["--model", "room.json", "--constant", "t3=20degC"], capsys)
     assert not any("speed alone" in w for w in warnings)
     Path("room.csv").write_text("time_min,t3_C,other_C\n0,20,1\n10,23,1\n", encoding="ascii")
@@ -77,6 +84,24 @@ def test_temperatures_can_be_given(job_folder: Path, capsys: pytest.CaptureFixtu
     given = ["--model", "room.json", "--forecast", "room.csv", "--constant", "t3=20degC"]
     assert revise(*given, "--overwrite") == 2
     assert "t3_C is given by --constant too" in said(capsys)
+
+
+def test_who_takes_an_unproven_model_stands_in_the_program(
+    job_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    honest = replace(HONEST, verdict="unproven", reason="judged on 2 units", harm_margin=20.0)
+    write_models([replace(judged(lags("z_um")), honest_error=honest)], "trial.json")
+    given = ["--model", "trial.json", "--overwrite"]
+    assert revise(*given) == 2
+    assert "is unproven and runs in shadow only: judged on 2 units" in said(capsys)
+    assert not Path("out.ngc").exists()
+    assert revise(*given, "--accept-unproven", "") == 2
+    assert "want a name and a reason" in said(capsys)
+    assert revise(*given, "--accept-unproven", "M. Weber, trial on machine 7", "--json") == 0
+    assert f"({MARK} unproven, taken by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
+    warnings = json.loads(capsys.readouterr().out)["warnings"]
+    assert any("Taken by M. Weber, trial on machine 7" in w for w in warnings)
+    assert "the model of Z was judged with a stated harm margin of 20 um" in warnings
 
 
 def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -172,7 +172,7 @@ def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
         ({}, {"rows": packed(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not rise"),
         ({}, {"rows": packed(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
         ({}, {"moving": "AAAAAA=="}, "1 of moving for 3 rows"),
-        ({}, {"marks": {"z_um": "AAAAAA=="}}, "of a target and of one input"),
+        ({}, {"marks": {}}, "want those of a target at least"),
         ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 of z_um for 3 rows"),
         ({"steps": {"z_um": 0.3, "t2_C": 0.1}}, {}, "of z_um, t1_C: want those of z_um, t2_C"),
         ({"steps": {"z_um": 0.0, "t1_C": 0.1}}, {}, "fingerprints of z_um: a resolution of 0.0"),
@@ -243,4 +243,6 @@ def test_an_unproven_model_that_is_taken_says_so_for_ever() -> None:
     refused = replace(mine, honest_error=replace(honest, verdict="refused")).taken("M. Weber, trial")
     with pytest.raises(InputError, match="was refused and will not run"):
         refused.check_may_run()
-    assert mine.taken("") == mine
+    assert mine.taken(None) == mine
+    with pytest.raises(InputError, match="a name and a reason"):
+        mine.taken("")

@@ -378,3 +378,41 @@ def test_a_few_inputs_are_kept_those_that_say_most() -> None:
     assert names(kept())[0] == "z_um"
     assert set(names(kept())[1:]) == {"t1_C", "t2_C", "t3_C"}
     assert fingerprint(learned().take(np.arange(LENGTH)), 0, np.ones(LENGTH, dtype=np.bool_)) is None
+
+
+@pytest.mark.parametrize("copies", [2, 5, 9])
+def test_as_many_copies_as_one_likes_are_found(copies: int) -> None:
+    day = learned()
+    n = len(day)
+    found = repeats(joined(*(day.take(slice_of(0, n - 3 * k)) for k in range(copies))), 0)
+    assert (found[:n] == -1).mean() > 0.95
+    assert (found[n + 2 * LENGTH : n + 400] >= 0).all()
+    assert (found[n:] >= 0).mean() > 0.95
+
+
+def test_a_copy_that_was_read_at_another_rate_is_found_beside_the_original() -> None:
+    day = learned()
+    for every in (2, 3):
+        thin = day.take(np.arange(0, len(day), every))
+        both = replace(
+            day,
+            values=np.concatenate([day.values, thin.values]),
+            deviations=np.concatenate([day.deviations, thin.deviations]),
+            time=np.concatenate([day.time, thin.time]),
+            test=np.concatenate([day.test, thin.test + 1]),
+            cycle=np.concatenate([day.cycle, thin.cycle]),
+            row=np.concatenate([day.row, thin.row]),
+            resting=None,
+            test_names=("a", "b"),
+            hashes=("", ""),
+            starts=(),
+        )
+        assert (repeats(both, 0)[len(day) :] >= 0).mean() > 0.9
+
+
+def test_a_target_beside_the_speed_alone_is_known_if_it_comes_again_for_long() -> None:
+    walk = np.cumsum(np.random.default_rng(3).normal(size=700))
+    speed = Channel("spindle_rpm", "spindle_speed", "1/min")
+    once = replace(series(np.zeros((700, 1)), walk), inputs=(speed,))
+    assert (repeats(once, 0) == -1).all()
+    assert (repeats(joined(once, once), 0)[700:] >= 0).mean() > 0.95

@@ -167,6 +167,7 @@ def fit(
     margin: float = Support.margin,
     harm_margin: float | None = None,
     limits: Limits = Limits(),
+    accept_unproven: str | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = _silent,
 ) -> FittedModels:
@@ -182,6 +183,9 @@ def fit(
         As for `compare`.
     limits : Limits
         Of the compensator that is judged with the models.
+    accept_unproven : str, optional
+        Who takes the models if they are unproven, and why, such as ``"M. Weber, trial on machine 7"``: they run then,
+        and it is said wherever they are shown.
     jobs, progress
         As for `compare`.
 
@@ -207,6 +211,7 @@ def fit(
         jobs=jobs,
         progress=progress,
     )
+    found = replace(found, models=tuple(m.taken(accept_unproven) for m in found.models))
     return FittedModels(found, ready.tests, tuple(ready.trouble))
 
 

@@ -294,6 +294,7 @@ def judge(
         unit=model.unit,
         caps=_caps(split, learned, samples, target),
         refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
+        stated=rules.margin,
     )
     return Assessment(
         model=name,

@@ -1,10 +1,11 @@
 """What the judged units covered, and how alike they are: for which conditions an honest error speaks.
 
-Alike: each unit's inputs (as recorded, so that the room counts) are read at `PLACES` places from its first row to its
-last. The distance of two units is the root mean square difference over places and inputs, each input by its standard
-deviation over all judged rows, and the logarithm of the ratio of their numbers of rows beside it. Two units below
-`ALIKE` are alike: a copy of a unit, or the same program on the same kind of day, tells nothing new. Alike units count
-once (single linkage).
+Alike: each unit's inputs (as recorded, so that the room counts) are averaged over `PLACES` parts of its time. The
+squared distance of two units is the mean square difference over these parts, summed over the inputs of a quantity and
+divided by their summed variance over all judged rows, averaged over the quantities; and the squared logarithm of the
+ratio of their durations. So a sensor counts as much as it moves: one that stands idle in its noise makes no two units
+different. Two units below `ALIKE` are alike: a copy of a unit, or the same program on the same kind of day, tells
+nothing new. Alike units count once (single linkage).
 """
 
 from collections.abc import Sequence
@@ -80,18 +81,28 @@ def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
     if not blocks:
         return np.empty((0, 0))
     judged = np.any(blocks, axis=0)
-    spread = samples.values[judged].std(axis=0)
-    moving = spread > 1e-9 * np.abs(samples.values[judged]).max(axis=0)
-    curves, durations = [], []
-    for rows in blocks:
-        # rows of several tests, one after the other: by their number
-        place = np.linspace(0.0, rows.sum() - 1.0, PLACES)
-        values = samples.values[rows][:, moving] / spread[moving]
-        curves.append([np.interp(place, np.arange(len(values)), v) for v in values.T])
-        durations.append(float(rows.sum()))
-    shape, length = np.array(curves).reshape(len(blocks), -1), np.log(durations)
-    square = ((shape[:, None] - shape[None]) ** 2).mean(axis=-1) if shape.shape[1] else np.zeros((len(blocks),) * 2)
-    return np.asarray(np.sqrt(square + (length[:, None] - length[None]) ** 2))
+    steps = np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)
+    durations = np.log([max(float(steps[rows].sum()), 1e-9) for rows in blocks])
+    square = (durations[:, None] - durations[None]) ** 2
+    moving = []
+    for quantity in dict.fromkeys(c.quantity for c in samples.inputs):
+        own = [j for j, c in enumerate(samples.inputs) if c.quantity == quantity]
+        variance = float(samples.values[judged][:, own].var(axis=0).sum())
+        if variance > (1e-9 * np.abs(samples.values[judged][:, own]).max()) ** 2:
+            curves = np.array([_curve(samples.values[rows][:, own], steps[rows]) for rows in blocks])
+            apart = ((curves[:, None] - curves[None]) ** 2).mean(axis=2).sum(axis=-1)
+            moving.append(apart / variance)
+    return np.asarray(np.sqrt(square + np.mean(moving, axis=0)) if moving else np.sqrt(square))
+
+
+def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
+    """Return the means of a unit's inputs in `PLACES` parts of its time, (n_places, n_inputs)."""
+    time = np.cumsum(steps)
+    part = np.minimum((PLACES * time / max(time[-1], 1e-9)).astype(np.intp), PLACES - 1)
+    known, at = np.unique(part, return_inverse=True)
+    count = np.bincount(at)
+    means = np.stack([np.bincount(at, v) / count for v in values.T], axis=1)
+    return np.stack([np.interp(np.arange(PLACES), known, v) for v in means.T], axis=1)
 
 
 def _groups(alike: BoolArray) -> int:

@@ -122,6 +122,8 @@ class Verdict:
         Why it is not corrected for that number, if it is not.
     names : tuple of str
         Of the baselines.
+    stated : float or None
+        Harm that is let pass, as the user stated it before judging; None: by rule.
     """
 
     units: tuple[Unit, ...]
@@ -132,6 +134,7 @@ class Verdict:
     p: float | None = None
     about: str = ""
     names: tuple[str, ...] = NAMES
+    stated: float | None = None
 
     @cached_property
     def p_values(self) -> tuple[float, ...]:
@@ -186,6 +189,10 @@ class Verdict:
         """Why, in one sentence, by the unit or baseline that decided."""
         if self.refusal or not self.units:
             return self.refusal or f"fewer than {MIN_ROWS} rows of any cycle to judge on"
+        stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
+        return self._by_units() + stated
+
+    def _by_units(self) -> str:
         if any(u.harmful for u in self.units):
             worst = max(self.units, key=lambda u: u.harm - u.margin)
             return f"does harm in {worst.name}: {self._figures(worst)} (margin {worst.margin:.2g} {self.unit})"
@@ -314,6 +321,7 @@ def together(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = 
         caps=tuple(dict.fromkeys([*caps, *(c for v in parts for c in v.caps)])),
         refusal=next((v.refusal for v in parts if v.refusal), ""),
         about=about,
+        stated=parts[0].stated,
     )
 
 

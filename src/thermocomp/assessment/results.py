@@ -144,7 +144,9 @@ class Assessment:
         """What noise or a lost sensor does to a model that is good without them; empty if they do no harm."""
         if self.robustness is None or self.verdict.word != "accepted":
             return ""
-        return self.robustness.harm_beyond(max(u.margin for u in self.verdict.units))
+        margin = max(u.margin for u in self.verdict.units)  # one that was stated is for what was judged, not for this
+        most = do_no_harm.MOST_MARGIN.get(self.verdict.unit, np.inf)
+        return self.robustness.harm_beyond(min(margin, most))
 
     @property
     def reason(self) -> str:

@@ -1,7 +1,7 @@
 """What noise and a lost sensor do to a model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,27 @@ class Robustness:
     def worst_lost(self) -> tuple[str, float]:
         """The sensor whose loss hurts most, and the RMS without it [um]."""
         return max(self.lost_rms.items(), key=lambda item: item[1], default=("", float("nan")))
+
+
+def worse(one: Robustness, other: Robustness) -> Robustness:
+    """Return one, with noise and lost sensors of whichever of the two leaves more.
+
+    Parameters
+    ----------
+    one, other : Robustness
+        Of the same rows.
+
+    Returns
+    -------
+    Robustness
+    """
+    noise = {
+        law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
+        for law, (mean, largest) in one.noise_rms.items()
+    }
+    names = dict.fromkeys((*one.lost_rms, *other.lost_rms))
+    lost = {n: max(one.lost_rms.get(n, 0.0), other.lost_rms.get(n, 0.0)) for n in names}
+    return replace(one, noise_rms=noise, lost_rms=lost)
 
 
 def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:

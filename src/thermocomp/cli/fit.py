@@ -97,7 +97,7 @@ def fit(
             jobs=study.jobs,
             progress=progress,
         )
-    result = replace(result, models=tuple(m.taken(accept_unproven or "") for m in result.models))
+    result = replace(result, models=tuple(m.taken(accept_unproven) for m in result.models))
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
         out.show_fit(result, output, ready.trouble, _console, as_json=json)

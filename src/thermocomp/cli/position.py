@@ -162,7 +162,7 @@ def position(
     with progress.by_steps(assessing.n_pieces(tests, how, asked.judging), hidden=json) as tell:
         found = assessing.study_all(tests, how, left_open=left_open, judging=asked.judging, jobs=jobs, progress=tell)
     if output is not None:
-        positionfile.write([f.fit.model.taken(accept_unproven or "") for f in found], output, overwrite=overwrite)
+        positionfile.write([f.fit.model.taken(accept_unproven) for f in found], output, overwrite=overwrite)
     if json:
         entries = [told.content(f, left_open) for f in found]
         content = {"components": entries} if several else entries[0]

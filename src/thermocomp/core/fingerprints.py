@@ -57,8 +57,8 @@ class Runs:
     def __post_init__(self) -> None:
         if self.stride < 1:
             raise InputError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
-        if len(self.marks) < 2:
-            raise InputError("fingerprints: want those of a target and of one input at least")
+        if not self.marks:
+            raise InputError("fingerprints: want those of a target at least")
         rows = unpacked(self.rows)
         if not (np.diff(rows.astype(np.int64)) > 0).all():
             raise InputError("fingerprints: their rows do not rise")

@@ -177,6 +177,8 @@ class HonestError:
         By which it was judged, see `RULES`; older ones prove nothing.
     taken : str
         Who takes an unproven model all the same, and why; empty without that.
+    harm_margin : float or None
+        Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
     """
 
     protocol: str
@@ -192,6 +194,7 @@ class HonestError:
     tried: int = 1
     rules: int = 0
     taken: str = ""
+    harm_margin: float | None = None
 
     @property
     def word(self) -> Literal["accepted", "unproven", "refused"]:
@@ -505,20 +508,20 @@ class ErrorModel(ABC):
         """True if the do-no-harm gate has let this model pass."""
         return self.honest_error is not None and self.honest_error.word == "accepted"
 
-    def taken(self, by: str) -> Self:
+    def taken(self, by: str | None) -> Self:
         """Return this model as one that somebody takes although it is unproven; as it is, if it is not.
 
         Parameters
         ----------
-        by : str
-            Who, and why, such as ``"M. Weber, trial on machine 7"``; the empty string is nobody.
+        by : str or None
+            Who, and why, such as ``"M. Weber, trial on machine 7"``; None is nobody.
 
         Raises
         ------
         InputError
             It has no name or no reason.
         """
-        if not by:
+        if by is None:
             return self
         name, _, reason = by.partition(",")
         if not (name.strip() and reason.strip()):
@@ -538,7 +541,7 @@ class ErrorModel(ABC):
         if not found.taken:
             raise InputError(
                 f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "
-                '--accept-unproven "NAME, REASON"'
+                '--accept-unproven "NAME, REASON", in Python taken("NAME, REASON") of the model'
             )
 
 

@@ -28,8 +28,14 @@ LONG = (60, 12, 6, 4, 2)
 INPUTS = 4
 #: of fingerprints in a model file [byte]; as text they are a third more
 BYTES = 14_000
-#: a run whose half occurs more often is something periodic
-REPEATS = 4
+#: a run whose half goes on in more ways than these says too little
+WAYS = 4
+#: a run that comes again within so many of its lengths is something periodic
+PERIOD = 5
+#: runs long that a match has to be where no input says anything, such as a spindle speed
+ALONE = 5
+#: tests whose intervals differ by less are read at one rate
+SAME_RATE = 0.05
 #: least mean of the third differences where rounding hides the noise [resolution]; of a smooth curve it is 1.03 at most
 ROUGH = 1.2
 
@@ -91,7 +97,8 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     scales = {name: _scale(x) for name, x in channels.items()}
     short = {name: _windows(x, scales[name], 1, rows) for name, x in channels.items() if np.isfinite(x).any()}
     names = [first.name, *_best(short, first.name)]
-    if len(names) == 1:
+    # temperatures that say nothing keep the target from being known again; a spindle speed never says anything
+    if first.name not in short or (len(names) == 1 and any(c.quantity == "temperature" for c in others)):
         return None
     found = {1: short}
     for stride in [s for s in LONG if 3 * s * LENGTH <= len(rows.at)][:1]:
@@ -107,7 +114,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     if not any(run.rows for run in runs):
         return None
     steps = {name: float(scales[name].step) for name in names}
-    return Prints(_interval(samples), _stretches(samples, learn), steps, tuple(runs))
+    return Prints(_interval(samples, learn), _stretches(samples, learn), steps, tuple(runs))
 
 
 def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
@@ -126,7 +133,8 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
     ndarray of int of shape (n_rows,)
         Row that was learned from, about, counted through all tests; -1 where a row is new.
     """
-    return _overlap(prints, samples, target, own=False)
+    everything = np.ones(len(samples), dtype=np.bool_)
+    return _overlap(prints, samples, target, _interval(samples, everything), own=False)
 
 
 def repeats(samples: Samples, target: int) -> IntArray:
@@ -143,10 +151,26 @@ def repeats(samples: Samples, target: int) -> IntArray:
     ndarray of int of shape (n_rows,)
         Row of the samples that is repeated, about; -1 where there is none.
     """
-    prints = fingerprint(samples, target, np.ones(len(samples), dtype=np.bool_), thin=False)
-    if prints is None:
-        return np.full(len(samples), -1, dtype=np.intp)
-    return _overlap(prints, samples, target, own=True)
+    # tests that were read at other intervals may be copies with fewer rows
+    intervals = [_interval(samples, samples.test == k) for k in range(len(samples.test_names))]
+    rates: list[float] = []
+    for interval in intervals:
+        if all(abs(interval / rate - 1.0) > SAME_RATE for rate in rates):
+            rates.append(interval)
+    group = np.array([np.abs(np.log(i / np.array(rates))).argmin() for i in intervals])[samples.test]
+    source = np.full(len(samples), -1, dtype=np.intp)
+    for k in range(len(rates)):
+        prints = fingerprint(samples, target, group == k, thin=False)
+        for other in range(k, len(rates)):
+            rows = np.flatnonzero(group == other)
+            if prints is None:
+                continue
+            if other == k:
+                found = _overlap(prints, samples, target, rates[k], own=True)[rows]
+            else:
+                found = _overlap(prints, samples.take(rows), target, rates[other], own=False)
+            source[rows] = np.where(source[rows] < 0, found, source[rows])
+    return source
 
 
 # -- runs ----------------------------------------------------------------------------------------------------------
@@ -212,17 +236,30 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: _Rows) -> _Windows
         margin = np.minimum(margin, off[k * stride :][:n])
         if k < LENGTH - 2:
             roughness += rough[k * stride :][:n]
-    telling = (mark > 0) & _seldom(_marks(x, scale.step, stride, LENGTH // 2), n, stride)
+    telling = (mark > 0) & _seldom(mark, _marks(x, scale.step, stride, LENGTH // 2), stride)
     if scale.step <= scale.resolution:
         telling &= roughness >= ROUGH * (LENGTH - 2)
     return _Windows(mark, telling, _moving(x, scale, rows)[LENGTH * stride // 2 :][:n], margin)
 
 
-def _seldom(halves: Marks, n: int, stride: int) -> BoolArray:
-    """Return the runs of which neither half occurs often."""
-    _, number, count = np.unique(halves, return_inverse=True, return_counts=True)
-    seldom = count[number] <= REPEATS
-    return np.asarray(seldom[:n] & seldom[LENGTH // 2 * stride :][:n])
+def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
+    """Return the runs of which neither half goes on in many ways, and which do not come again soon.
+
+    However often all of a run comes, it counts: so do the copies of a recording.
+    """
+    n, later = len(mark), LENGTH // 2 * stride
+    number = np.unique(halves, return_inverse=True)[1]
+    whole = np.flatnonzero(mark > 0)
+    ways = np.zeros(number.max(initial=-1) + 1, dtype=np.intp)
+    for at in (0, later):  # as the beginning of a run, and as its end
+        pairs = np.unique(np.stack([number[whole + at], mark[whole].astype(np.intp)]), axis=1)
+        ways = np.maximum(ways, np.bincount(pairs[0], minlength=len(ways)))
+    seldom = ways[number] <= WAYS
+    order = whole[np.argsort(mark[whole], kind="stable")]
+    soon = (np.diff(mark[order]) == 0) & (np.diff(order) < PERIOD * LENGTH * stride)
+    periodic = np.zeros(n, dtype=np.bool_)
+    periodic[order[1:][soon]] = periodic[order[:-1][soon]] = True
+    return np.asarray(seldom[:n] & seldom[later:][:n] & ~periodic)
 
 
 def _moving(x: FloatArray, scale: _Scale, rows: _Rows) -> BoolArray:
@@ -260,10 +297,12 @@ def _kept(
 ) -> Runs:
     """Return at most `most` runs, one of each of as many stretches of rows."""
     target, *inputs = (windows[name] for name in names)
-    usable = np.logical_or.reduce([w.telling for w in inputs]) & target.telling & whole
-    moving = np.logical_or.reduce([w.telling & w.moving for w in inputs]) & target.moving
-    margin = np.max([np.where(w.telling, w.margin, 0.0) for w in inputs], axis=0)
-    score = np.minimum(target.margin, margin) + moving
+    usable, moving, margin = target.telling & whole, target.moving, target.margin
+    if inputs:
+        usable &= np.logical_or.reduce([w.telling for w in inputs])
+        moving = np.logical_or.reduce([w.telling & w.moving for w in inputs]) & target.moving
+        margin = np.minimum(margin, np.max([np.where(w.telling, w.margin, 0.0) for w in inputs], axis=0))
+    score = margin + moving
     rows = np.flatnonzero(usable)
     if len(rows) > most:
         cell = rows // -(-len(whole) // most)
@@ -279,21 +318,21 @@ def _stretches(samples: Samples, learn: BoolArray) -> tuple[tuple[int, int], ...
     return tuple((a, b) for a, b in pairwise(ends) if test[a] >= 0)
 
 
-def _interval(samples: Samples) -> float:
-    steps = samples.dt()
+def _interval(samples: Samples, rows: BoolArray) -> float:
+    steps = samples.dt()[rows]
     return float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 1.0
 
 
 # -- looking up ----------------------------------------------------------------------------------------------------
 
 
-def _overlap(prints: Prints, samples: Samples, target: int, *, own: bool) -> IntArray:
+def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, own: bool) -> IntArray:
     source = np.full(len(samples), -1, dtype=np.intp)
     rows = _rows(samples, target)
     columns = {c.name: samples.values[rows.at, j] for j, c in enumerate(samples.inputs)}
     first, *others = prints.steps
     columns = {first: samples.deviations[rows.at, target]} | {n: columns[n] for n in others if n in columns}
-    for run, stride in _tries(prints, _interval(samples)):
+    for run, stride in _tries(prints, interval):
         if LENGTH * stride >= len(rows.at):
             continue
         inside = rows.starts(LENGTH * stride)
@@ -327,7 +366,7 @@ def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     place = np.minimum(np.searchsorted(known, marks[first]), known.size - 1)
     same = which[place]
-    alike = np.zeros(len(same), dtype=np.bool_)
+    alike = np.full(len(same), not others)
     for name in others:
         if name in marks:
             alike |= (marks[name] == stored[name][same]) & (marks[name] > 0)
@@ -353,8 +392,9 @@ def _fill(
     for mine in _chains(rows.at[found], learned[of], rows.test[found], scale, max(3.0 * usual, 2.0 * LENGTH)):
         here, there = rows.at[found[mine]], learned[of[mine]]
         end = int(rows.at[found[mine[-1]] + LENGTH * stride])
-        # one place may be chance: two that move, more than a run long, are not
-        if np.count_nonzero(moving[of[mine]]) < 2 or end - here[0] < 1.5 * LENGTH * stride:
+        # one place may be chance: two that move, more than a run long, are not; without an input it takes more
+        least = (1.5 if len(run.marks) > 1 else ALONE) * LENGTH * stride
+        if np.count_nonzero(moving[of[mine]]) < 2 or end - here[0] < least:
             continue
         low, high = (0, 0) if own else _reach(prints, learned, there)
         whole = rows.at[rows.test == rows.test[found[mine[0]]]]

@@ -16,15 +16,21 @@ _MODELS, _PLACE, _PROOF = 2, 3, 4
 _ALWAYS = 7
 
 
-def lines(models: Sequence[str], *, by_position: bool, unproved: bool) -> int:
+def lines(models: Sequence[str], taken: Sequence[str], *, by_position: bool, unproved: bool) -> int:
     """Return how many lines a header has, before it is known what they say."""
-    return _ALWAYS + min(len(models), _MODELS) + _PLACE * by_position + (1 if unproved else _PROOF)
+    told = min(len(models), _MODELS) + len(told_taken(taken))
+    return _ALWAYS + told + _PLACE * by_position + (1 if unproved else _PROOF)
 
 
 def told_models(models: Sequence[str]) -> list[str]:
     """Return the lines about the models, the last ones on one line."""
     said = [f"model {m}" for m in models]
     return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
+
+
+def told_taken(taken: Sequence[str]) -> list[str]:
+    """Return the line about unproven models: who takes them."""
+    return [f"unproven, taken by {'; '.join(taken)}"] if taken else []
 
 
 def told_bound(bounds: Sequence[Bound]) -> str:

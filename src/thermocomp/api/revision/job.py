@@ -79,6 +79,8 @@ class Job:
     drift : Drift
         That of the revision.
     models : sequence of str
+    taken : sequence of str
+        Who takes unproven ones of them, and why.
     start, zero, method : str
         For the header: which models, from what state, what the drift counts from, in what way.
     when : date
@@ -99,6 +101,7 @@ class Job:
     revision: Revision
     drift: Drift
     models: Sequence[str]
+    taken: Sequence[str]
     start: str
     zero: str
     method: str
@@ -285,6 +288,7 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
         f"thermocomp {__version__}, {job.when.date()}, for {setup.controller}",
         f"program {job.program.name}",
         *headers.told_models(job.models),
+        *headers.told_taken(job.taken),
         f"start {job.start}",
         job.zero,
         job.method,

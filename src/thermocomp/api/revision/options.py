@@ -18,6 +18,7 @@ from thermocomp.api.revision.values import (
 )
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
+from thermocomp.core.model import ErrorModel
 from thermocomp.files import forecast as forecasts
 from thermocomp.files import jobstate, modelfile
 from thermocomp.files.machines import read_machine
@@ -35,6 +36,9 @@ from thermocomp.nc.thermal.start import Start
 from thermocomp.nc.thermal.stations import Station, stations
 
 Zero = Literal["start", "cold", "last"]
+
+#: a temperature that has moved by more is no constant, unless it is that of the surroundings [degC]
+WARMED = 3.0
 
 _COUNTED: dict[Zero, str] = {
     "start": "from the start of the program",
@@ -70,7 +74,7 @@ class Drifting:
 
     def stations(self) -> list[Station]:
         """Return which model stands for which axis."""
-        models = [m.taken(self.accept_unproven or "") for path in self.model for m in modelfile.read(path)]
+        models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
         return stations(models, self.axis or ())
 
     def others(self, found: Sequence[Station]) -> tuple[dict[str, Signal], list[str]]:
@@ -79,6 +83,8 @@ class Drifting:
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
             raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
         signals = constants(self.constant or (), models)
+        for m in models:
+            _refuse_heated(m, signals)
         driven = any(i.quantity == SPEED and i.name in m.sensors for m in models for i in m.inputs)
         if not driven and self.forecast is None and any(m.sensors for m in models):
             raise InputError(
@@ -104,6 +110,18 @@ class Drifting:
             for path in self.model
             for m in modelfile.read(path)
         }
+
+
+def _refuse_heated(model: ErrorModel, constant: Iterable[str]) -> None:
+    """Raise `InputError` if a temperature that the machine warms is said to stand still while a program runs."""
+    surroundings = model.validity.ambient_channel if model.validity is not None else ""
+    for i in model.inputs:
+        if i.name in constant and i.quantity == "temperature" and i.name != surroundings and i.high - i.low > WARMED:
+            raise InputError(
+                f"--constant {i.name}: it went over {i.high - i.low:.1f} degC in training, so it will not stand still "
+                "while this program runs; give it by --forecast, or fit a model that does without it, such as "
+                "--inputs spindle_rpm"
+            )
 
 
 def _taken(names: Iterable[str], how: str) -> list[str]:

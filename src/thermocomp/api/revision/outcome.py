@@ -55,6 +55,11 @@ def warnings(job: Job, done: Done) -> list[str]:
         for s in drift.stations
         if (honest := s.model.honest_error) is not None and honest.taken
     ]
+    found += [
+        f"the model of {s.axis} was judged with a stated harm margin of {honest.harm_margin:g} um"
+        for s in drift.stations
+        if (honest := s.model.honest_error) is not None and honest.harm_margin is not None
+    ]
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append("the models know the spindle speed alone: a change of the room is in no bound")
     if done.written and done.proof is None:

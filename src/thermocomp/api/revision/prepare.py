@@ -70,7 +70,8 @@ def prepare_job(
     kinematics, guesses = timing.kinematics(machine)
     method = way.made(setup, drift.driven)
     models = _files(found, drifting.hashes())
-    header_lines = headers.lines(models, by_position=drift.by_position, unproved=way.unproved)
+    taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
+    header_lines = headers.lines(models, taken, by_position=drift.by_position, unproved=way.unproved)
     revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
     _check_interpreter(way, setup, diameters=controller.diameter is not None)
     if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
@@ -84,6 +85,7 @@ def prepare_job(
         revision,
         drift,
         models,
+        taken,
         starting.words(),
         f"drift counts {starting.counted()}",
         f"method {way.words()}",
