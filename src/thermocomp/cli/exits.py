@@ -6,9 +6,3 @@ from pathlib import Path
 STOPPED = 130
 #: stands for standard input, which is ``-`` on the command line: cyclopts takes that for an option
 STDIN = Path("<stdin>")
-
-
-def mark(verdict: str) -> str:
-    """Return a verdict in its colour."""
-    colour = {"accepted": "green", "unproven": "yellow"}.get(verdict.partition(" ")[0], "red")
-    return f"[{colour}]{verdict}[/]"

@@ -186,9 +186,10 @@ def _show(
     positioned: "list[PositioningResult]",
     page: Path | None,
 ) -> None:
-    from thermocomp.cli.output import print_table
+    from thermocomp.cli.terminal import print_table
     from thermocomp.iso230 import tables
     from thermocomp.iso230.thermaltest import TITLES
+    from thermocomp.report.layout import laid_out
 
     # numbers must not be cut: a narrow terminal wraps whole lines instead
     wide = Console(highlight=False, width=max(_console.width, TABLE_WIDTH))
@@ -197,16 +198,16 @@ def _show(
         _console.print(escape(t.described))
         for table in tables.thermal_tables(t):
             _console.print(f"\n[bold]{escape(table.title)}[/]")
-            print_table(table, wide)
+            print_table(laid_out(table), wide)
         for note in t.notes:
             _console.print(f"[yellow]note[/] {escape(note)}")
     for recording, mine in settlings:
         for table in tables.time_constant_tables(mine):
             _console.print(f"\n[bold]{escape(recording.name)}: {escape(table.title)}[/]")
-            print_table(table, wide)
+            print_table(laid_out(table), wide)
     for table in tables.positioning_tables(positioned):
         _console.print(f"\n[bold]{escape(table.title)}[/]")
-        print_table(table, wide)
+        print_table(laid_out(table), wide)
     for r in positioned:
         for note in r.notes:
             where = " ".join(part for part in (r.test.axis, r.test.state) if part)

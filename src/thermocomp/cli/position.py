@@ -131,6 +131,7 @@ def position(
         from thermocomp.models.methods import method
         from thermocomp.models.position import PositionOptions
         from thermocomp.models.positionoptions import Setting
+        from thermocomp.report import records
     if jobs == 0:
         raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
     if not method(model).kind.freezable:
@@ -164,7 +165,7 @@ def position(
     if output is not None:
         positionfile.write([f.fit.model.taken(accept_unproven or "") for f in found], output, overwrite=overwrite)
     if json:
-        entries = [told.content(f, left_open) for f in found]
+        entries = [records.position(f, left_open) for f in found]
         content = {"components": entries} if several else entries[0]
         file = None if output is None else str(output)
         print_json({"trouble": trouble, "judging": found[0].assessment.protocol, **content, "file": file}, _console)

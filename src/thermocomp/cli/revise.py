@@ -9,7 +9,6 @@ from pathlib import Path
 from cyclopts import Group, Parameter
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from thermocomp.api.revision import outcome
 from thermocomp.api.revision.job import Done, Job
@@ -19,8 +18,10 @@ from thermocomp.api.revision.prepare import prepare_job
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import by_share
+from thermocomp.cli.terminal import print_table
 from thermocomp.core.shown import shown
 from thermocomp.nc.rewrite.course import Bound
+from thermocomp.report.layout import Column, Layout
 
 #: lines from which on the time that one takes can be told
 MANY = 1000
@@ -112,7 +113,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
         soft_wrap=True,
     )
     say("", f"Start: {job.begun}; {job.method}")
-    _console.print(_bounds(done.bounds))
+    print_table(_bounds(done.bounds), _console)
     if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
@@ -134,22 +135,23 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
         say("[bold yellow]nothing written:[/]", outcome.nothing(job, done))
 
 
-def _bounds(bounds: Sequence[Bound]) -> Table:
-    table = Table(
-        caption="um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+def _bounds(bounds: Sequence[Bound]) -> Layout:
+    columns = (
+        Column("axis", lambda b: b.axis),
+        Column("drift from", lambda b: b.low, "um"),
+        Column("to", lambda b: b.high, "um"),
+        Column("in the cuts", lambda b: b.without, "um"),
+        Column("left in the cuts", lambda b: b.left, "um"),
+        Column("at line", lambda b: b.line or "", ">"),
+        Column("model", lambda b: _known(b, b.model), "um"),
+        Column("bound", lambda b: _known(b, b.most), "um"),
     )
-    table.add_column("axis")
-    for heading in ("drift from", "to", "in the cuts", "left in the cuts", "at line", "model", "bound"):
-        table.add_column(heading, justify="right")
-    for b in bounds:
-        cells = (b.low, b.high, b.without, b.left)
-        rest = ("not known",) * 2 if math.isnan(b.model) else (_um(b.model), _um(b.most))
-        table.add_row(b.axis, *map(_um, cells), str(b.line or ""), *rest)
-    return table
+    caption = "um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    return Layout(columns, bounds, caption=caption)
 
 
-def _um(value: float) -> str:
-    return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+def _known(bound: Bound, value: float) -> str | float:
+    return "not known" if math.isnan(bound.model) else value
 
 
 def _many(n: int, what: str) -> str:

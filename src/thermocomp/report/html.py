@@ -1,17 +1,17 @@
 """Numbers, then a dict, then a template, then one offline HTML file."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from thermocomp import __version__
-from thermocomp.assessment.choice import Choice, written
+from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.results import Comparison
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report import figures, selections
+from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
 
 
@@ -112,13 +112,7 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    pages.filters["um"] = _number
+    pages.filters["um"] = in_um
     pages.filters["hours"] = lambda value: f"{value:.1f}"
-    pages.filters["cell"] = written
+    pages.filters["laid_out"] = laid_out
     return pages
-
-
-def _number(value: float | None) -> str:
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # no minus zero

@@ -1,15 +1,18 @@
 """A comparison as plain numbers and text: what the template prints."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from thermocomp import __version__
 from thermocomp.assessment import coverage, do_no_harm
+from thermocomp.assessment.choice import Table
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.robustness import Robustness
+from thermocomp.core.validity import Validity
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.recording.quality import check
@@ -20,7 +23,7 @@ from thermocomp.report.running import told
 #: rows that are unlike the training are a caution if their RMS is so many times that of all rows
 WORSE = 1.25
 #: metrics of the big table, in its order
-TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
+SHOWN = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
 
 def summarise(
@@ -45,9 +48,7 @@ def summarise(
         "version": __version__,
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
-        "covered": None
-        if samples is None
-        else coverage.table({"judged": coverage.cover(samples, comparison.judging, recordings)}),
+        "covered": None if samples is None else _covered(coverage.cover(samples, comparison.judging, recordings)),
         "cautions": cautions(comparison),
         "running": told(comparison.overall()),
         "starts": [start.told(name) for name, start in comparison.starts],
@@ -58,7 +59,7 @@ def summarise(
             {"name": m, "summary": METHODS[m].summary if m in METHODS else "an estimator that was handed in"}
             for m in _models(comparison)
         ],
-        "metrics": [METRICS[name] for name in TABLE],
+        "metrics": [METRICS[name] for name in SHOWN],
         "condition_number": comparison.collinearity.condition_number,
         "vif": sorted(
             zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True), key=lambda v: -v[1]
@@ -131,6 +132,12 @@ def unlike(r: Robustness) -> str:
     )
 
 
+def _covered(judged: Validity) -> Table:
+    table = coverage.table({"judged": judged})
+    for_these = "The errors above speak for these conditions; beyond them nobody has looked."
+    return replace(table, caption=f"{table.caption} {for_these}")
+
+
 def _models(comparison: Comparison) -> list[str]:
     return list(dict.fromkeys(a.model for a in comparison.assessments))
 
@@ -142,7 +149,7 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
     cycles = [u.name for u in max((a.verdict.units for a in overall), key=len)]
     return {
         "name": target,
-        "none": {m: none.none_metric(m) for m in TABLE if m != "reduction"},
+        "none": {m: none.none_metric(m) for m in SHOWN if m != "reduction"},
         "rows": [_row(a, best) for a in overall],
         "cycles": cycles,
         "per_cycle": [
@@ -158,7 +165,7 @@ def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
     r = a.robustness
     return {
         "model": a.model,
-        "values": {m: a.metric(m) for m in TABLE},
+        "values": {m: a.metric(m) for m in SHOWN},
         "word": a.word,
         "alone": a.alone_metric("rms"),
         "reason": a.reason,
