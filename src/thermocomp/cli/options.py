@@ -23,10 +23,8 @@ from thermocomp.files.draft import refuse_existing
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne, Prepared
     from thermocomp.assessment.results import Rules
-    from thermocomp.assessment.splits import Judging
     from thermocomp.cli.beginning import Beginning
     from thermocomp.recording.recording import Recording
-    from thermocomp.recording.samples import Samples
 
 _stderr = Console(stderr=True, highlight=False)
 
@@ -120,12 +118,6 @@ class Study:
         )
         _told(ready.trouble)
         return ready
-
-    def judging(self, samples: "Samples") -> "Judging":
-        """Return what is learned from and what is judged."""
-        from thermocomp.api.inputs import judging_of
-
-        return judging_of(samples, split=self.split, leave_one=self._left_out())
 
     def _left_out(self) -> "LeaveOne | None":
         units: dict[LeaveOne, bool] = {

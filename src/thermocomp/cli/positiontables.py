@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 
+from thermocomp.api.position import Positioned
 from thermocomp.assessment.position import PositionStudy
 from thermocomp.cli.terminal import mark, marked, print_table
 from thermocomp.files.profiles import NOT_TAKEN
@@ -18,6 +20,16 @@ from thermocomp.report.layout import Column, Layout, Toned, verdict
 FEW, WORST = 12, 5
 #: characters of a formula that are told; --json has all
 FORMULA = 300
+
+
+def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
+    """Print what was found of one component, or of several, and where the models are."""
+    if result.several:
+        show_all(result.found, result.tests, result.left_open, console)
+    else:
+        show(result.found[0], result.tests[0], result.left_open, console)
+    if file is not None:
+        console.print(f"Model file: {file}", soft_wrap=True)
 
 
 def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:

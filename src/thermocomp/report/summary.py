@@ -18,6 +18,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.report import records
 from thermocomp.report.running import told
 
 #: rows that are unlike the training are a caution if their RMS is so many times that of all rows
@@ -150,7 +151,7 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
     return {
         "name": target,
         "none": {m: none.none_metric(m) for m in SHOWN if m != "reduction"},
-        "rows": [_row(a, best) for a in overall],
+        "rows": overall,
         "cycles": cycles,
         "per_cycle": [
             {"model": a.model, "cells": [{u.name: u for u in a.verdict.units}.get(name) for name in cycles]}
@@ -158,28 +159,6 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
         ],
         "best": best.model if best else None,
         "formula": _formula(comparison, best, samples),
-    }
-
-
-def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
-    r = a.robustness
-    return {
-        "model": a.model,
-        "values": {m: a.metric(m) for m in SHOWN},
-        "word": a.word,
-        "alone": a.alone_metric("rms"),
-        "reason": a.reason,
-        "best": best is not None and a.model == best.model,
-        "sensors": a.sensors,
-        "n_sensors": a.n_sensors,
-        "n_effective": a.n_effective,
-        "rows": len(a.measured),
-        "fit_s": a.fit_s,
-        "noise": {law: mean for law, (mean, _) in r.noise_rms.items()} if r else None,
-        "lost": r.worst_lost if r else None,
-        "harm": r.harm if r else "",
-        "worse_than_none": r.worse_than_none if r else (),
-        "outside": r.outside if r else None,
     }
 
 
@@ -210,21 +189,13 @@ def _formula(comparison: Comparison, best: Assessment | None, samples: Samples |
 
 def _recording(r: Recording) -> dict[str, Any]:
     return {
-        "name": r.name,
+        **records.recording(r, check(r)),
         "file": r.source.replace("\\", "/").rsplit("/", 1)[-1] or r.name,
         "sha256": r.sha256,
         "start": r.start,
-        "rows": len(r),
-        "hours": (r.time[-1] - r.time[0]) / 3600,
-        "interval": r.sampling_interval,
         "temperatures": len(r.temperatures),
         "displacements": [c.name for c in r.displacements],
-        "cycles": [
-            {"name": c.name, "rows": f"{c.start}-{c.stop - 1}", "hours": (r.time[c.stop - 1] - r.time[c.start]) / 3600}
-            for c in r.cycles
-        ],
-        "findings": check(r),
-        "notes": r.notes,
+        "cycle_hours": [(r.time[c.stop - 1] - r.time[c.start]) / 3600 for c in r.cycles],
     }
 
 
