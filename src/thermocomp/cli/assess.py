@@ -4,6 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from thermocomp.cli import loudness
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
@@ -62,6 +63,7 @@ def assess(
         from thermocomp.cli import output as out
         from thermocomp.files import modelfile
     models = modelfile.read(model)
+    loudness.tell(f"read {model}: models of {', '.join(m.target for m in models)}")
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
         judged = studies.assess(

@@ -3,7 +3,7 @@
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
+from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
 from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
@@ -180,15 +181,21 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
         from thermocomp.files import mapping as mappings
         from thermocomp.files import recordings as reader
     columns = mappings.read_mapping(mapping) if mapping is not None else None
+    found = _read_all(paths, lambda named: reader.read_all(named, columns))
+    loudness.tell_read(found)
+    return found
+
+
+def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
-        return reader.read_all(paths, columns)
+        return read(paths)
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")
     with tempfile.TemporaryDirectory(prefix="thermocomp-") as folder:
         typed = Path(folder, "stdin.csv")
         with typed.open("wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
-        return reader.read_all([typed if p == STDIN else p for p in paths], columns)
+        return read([typed if p == STDIN else p for p in paths])
 
 
 def _displacements(tests: "Sequence[Recording]") -> str:
@@ -214,6 +221,6 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 
 def _told(lines: list[str]) -> list[str]:
-    for line in lines:
+    for line in () if loudness.quiet else lines:
         _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
     return lines

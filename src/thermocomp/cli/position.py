@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from rich.console import Console
 
 from thermocomp.api.positionsettings import PositionSettings
-from thermocomp.cli import progress
+from thermocomp.cli import loudness, progress
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
@@ -80,6 +80,7 @@ def position(
     if settings.jobs == 0:
         raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
     job = prepare(recordings, component, settings)
+    loudness.tell_read(job.recordings)
     trouble = tell_trouble(job.recordings)
     with progress.by_steps(job.n_pieces, hidden=json) as tell:
         result = job.run(tell)

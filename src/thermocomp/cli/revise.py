@@ -15,6 +15,7 @@ from thermocomp.api.revision.job import Done, Job
 from thermocomp.api.revision.job import revise as revise_program
 from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
 from thermocomp.api.revision.prepare import prepare_job
+from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import by_share
@@ -89,6 +90,7 @@ def revise(
         0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    loudness.tell(f"read {job.program}")
     # a pipe gets its lines on stderr, whatever stdout is for
     done = revise_program(job, partial(by_share, hidden=json and sys.stderr.isatty()))
     if json:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.markup import escape
 
+from thermocomp.cli import loudness
 from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
@@ -82,6 +83,7 @@ def volumetric(
     if output is not None:
         refuse_existing([output], overwrite, inputs, ".html")
     known = read_machine(machine)
+    loudness.tell(f"read {machine}: {len(known.axes)} axes, {len(known.components)} components")
     tests = read_recordings([recording], mapping) if recording is not None else []
     trouble = tell_trouble(tests)
     with by_share("replaying", hidden=json) as progress:
