@@ -12,6 +12,7 @@ from rich.markup import escape
 from thermocomp import __version__
 from thermocomp.cli import jsonoutput, loudness
 from thermocomp.cli.exits import FAULT, STDIN, STOPPED
+from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.core.shown import shown
 
@@ -70,7 +71,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     begin = time.perf_counter()
     try:
         words = loudness.taken_off(given)
-        code = app([str(STDIN) if word == "-" else word for word in words])
+        with needs("study"):
+            code = app([str(STDIN) if word == "-" else word for word in words])
         loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
         return _unusable(str(e))
@@ -112,7 +114,7 @@ def _fault(error: Exception) -> int:
 
 def _tell_programs(message: str) -> None:
     if "--json" in jsonoutput.called_with:
-        jsonoutput.print_json({"error": message}, Console())
+        jsonoutput.print_json({"error": message})
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def show_check(
     """
     told = [records.recording(r, found) for r, found in zip(tests, findings, strict=True)]
     if as_json:
-        print_json({"recordings": told, "page": None if page is None else str(page)}, console)
+        print_json({"recordings": told, "page": None if page is None else str(page)})
         return
     if len(tests) > MANY:
         print_table(_overview(told), console)

@@ -8,7 +8,6 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     Compensator,
@@ -16,7 +15,7 @@ from thermocomp.cli.options import (
     read_recordings,
     tell_trouble,
 )
-from thermocomp.cli.terminal import print_table
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.files.draft import refuse_existing
 
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 Tables = Annotated[list[Path], Parameter(show_default=False)]
 Test = Literal["etve", "spindle", "axis"]
 
-_console = Console(highlight=False)
 #: columns that the widest table needs
 TABLE_WIDTH = 136
 
@@ -95,9 +93,9 @@ def iso230(
             raise InputError(f"{option} is for recordings of thermal tests: name one")
     if distance is not None and pairs:
         raise InputError("--distance is for probes named x1, x2, y1, y2; those of --pairs carry their own")
-    with needs("study"):
-        from thermocomp.api.iso230 import evaluate
-        from thermocomp.files import modelfile
+    from thermocomp.api.iso230 import evaluate
+    from thermocomp.files import modelfile
+
     given = [Path(p) for p in (model, mapping) if p is not None]
     if output is not None:
         refuse_existing([output], overwrite, [*recordings, *positioning, *given], ".html")
@@ -122,7 +120,7 @@ def iso230(
     if output is not None:
         found.report(output)
     if json:
-        print_json({"trouble": trouble, **found.content()}, _console)
+        print_json({"trouble": trouble, **found.content()})
     else:
         _show(found, output)
     return 0
@@ -134,25 +132,25 @@ def _show(found: "Evaluated", page: Path | None) -> None:
     from thermocomp.report.layout import laid_out
 
     # numbers must not be cut: a narrow terminal wraps whole lines instead
-    wide = Console(highlight=False, width=max(_console.width, TABLE_WIDTH))
+    wide = Console(highlight=False, width=max(console.width, TABLE_WIDTH))
     for t in found.thermal:
-        _console.print(f"\n[bold]{escape(t.name)}: {TITLES[t.kind]}[/]")
-        _console.print(escape(t.described))
+        console.print(f"\n[bold]{escape(t.name)}: {TITLES[t.kind]}[/]")
+        console.print(escape(t.described))
         for table in tables.thermal_tables(t):
-            _console.print(f"\n[bold]{escape(table.title)}[/]")
+            console.print(f"\n[bold]{escape(table.title)}[/]")
             print_table(laid_out(table), wide)
         for note in t.notes:
-            _console.print(f"[yellow]note[/] {escape(note)}")
+            console.print(f"[yellow]note[/] {escape(note)}")
     for recording, mine in found.settlings:
         for table in tables.time_constant_tables(mine):
-            _console.print(f"\n[bold]{escape(recording.name)}: {escape(table.title)}[/]")
+            console.print(f"\n[bold]{escape(recording.name)}: {escape(table.title)}[/]")
             print_table(laid_out(table), wide)
     for table in tables.positioning_tables(found.positioned):
-        _console.print(f"\n[bold]{escape(table.title)}[/]")
+        console.print(f"\n[bold]{escape(table.title)}[/]")
         print_table(laid_out(table), wide)
     for r in found.positioned:
         for note in r.notes:
             where = " ".join(part for part in (r.test.axis, r.test.state) if part)
-            _console.print(f"[yellow]note[/] {escape(f'{where}: {note}' if where else note)}")
+            console.print(f"[yellow]note[/] {escape(f'{where}: {note}' if where else note)}")
     if page is not None:
-        _console.print(f"Page: {page}", soft_wrap=True)
+        console.print(f"Page: {page}", soft_wrap=True)

@@ -15,7 +15,6 @@ from rich.markup import escape
 from thermocomp.assessment.choice import Settings
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
-from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
@@ -94,9 +93,9 @@ class Study:
         Before any work it is made sure that the outputs can be written.
         """
         tests = read_recordings(paths, self.mapping)
-        with needs("study"):
-            from thermocomp.api.inputs import prepare
-            from thermocomp.recording.tilts import with_tilts
+        from thermocomp.api.inputs import prepare
+        from thermocomp.recording.tilts import with_tilts
+
         if not self.target:
             raise InputError(f"name what to predict with --target: {_displacements(tests)}")
         tests, names = with_tilts(tests, tilt) if tilt else (tests, [])
@@ -177,9 +176,9 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
     """Read the recordings named on the command line; ``-`` is a CSV file on standard input."""
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
-    with needs("study"):
-        from thermocomp.files import mapping as mappings
-        from thermocomp.files import recordings as reader
+    from thermocomp.files import mapping as mappings
+    from thermocomp.files import recordings as reader
+
     columns = mappings.read_mapping(mapping) if mapping is not None else None
     found = _read_all(paths, lambda named: reader.read_all(named, columns))
     loudness.tell_read(found)

@@ -53,7 +53,7 @@ def show_comparison(
             ],
             "results": [records.assessment(a) for a in comparison.assessments],
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(comparison.starts, console)
     console.print(f"Judged on: {comparison.judging.name}")
@@ -102,7 +102,7 @@ def show_choices(
                 for c in choices
             ],
         }
-        print_json(content, console)
+        print_json(content)
         return
     for c in choices:
         for t in c.tables:
@@ -128,7 +128,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
             "trouble": trouble,
             "models": models,
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(fitted.comparison.starts, console)
     console.print(f"Judged on: {fitted.comparison.judging.name}")
@@ -163,7 +163,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
             "results": [records.assessment(a) for a in judged.assessments],
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(judged.starts, console)
     print_table(_assessment_table(judged.assessments), console)
@@ -205,7 +205,7 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
     """Print what was recorded on the virtual machine."""
     if as_json:
         content = [{"file": str(p), **records.recording(r, ())} for r, p in zip(tests, paths, strict=True)]
-        print_json({"recordings": content}, console)
+        print_json({"recordings": content})
         return
     for r, p in zip(tests, paths, strict=True):
         hours = (r.time[-1] - r.time[0]) / 3600
@@ -219,7 +219,7 @@ def show_experiments(experiments: Sequence[Experiment], console: Console, *, as_
     """Print what can be recorded on the virtual machines."""
     if as_json:
         content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
-        print_json({"experiments": content}, console)
+        print_json({"experiments": content})
         return
     columns = (
         Column("experiment", lambda e: e.name),

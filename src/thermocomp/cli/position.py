@@ -5,22 +5,19 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
 from thermocomp.api.positionsettings import PositionSettings
 from thermocomp.cli import loudness, progress
-from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     OptionalOutput,
     tell_trouble,
 )
+from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
 
 Switch = Annotated[bool | None, Parameter(negative="--no-offset")]
-
-_console = Console(highlight=False)
 
 
 @Parameter(name="*")
@@ -74,9 +71,9 @@ def position(
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".json")
-    with needs("study"):
-        from thermocomp.api.position import prepare
-        from thermocomp.cli import positiontables
+    from thermocomp.api.position import prepare
+    from thermocomp.cli import positiontables
+
     if settings.jobs == 0:
         raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
     job = prepare(recordings, component, settings)
@@ -88,7 +85,7 @@ def position(
         result.save(output, taken=accept_unproven or "", overwrite=overwrite)
     if json:
         file = None if output is None else str(output)
-        print_json({"trouble": trouble, **result.content(), "file": file}, _console)
+        print_json({"trouble": trouble, **result.content(), "file": file})
     else:
-        positiontables.show_positioned(result, output, _console)
+        positiontables.show_positioned(result, output, console)
     return 1 if any(f.assessment.verdict.word == "refused" for f in result.found) else 0

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 from cyclopts import Group, Parameter
-from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.api.revision import outcome
@@ -19,7 +18,7 @@ from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import by_share
-from thermocomp.cli.terminal import print_table
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.shown import shown
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.report.layout import Column, Layout
@@ -27,7 +26,6 @@ from thermocomp.report.layout import Column, Layout
 #: lines from which on the time that one takes can be told
 MANY = 1000
 
-_console = Console(highlight=False)
 
 _GROUPS = {
     "The drift": Drifting,
@@ -94,7 +92,7 @@ def revise(
     # a pipe gets its lines on stderr, whatever stdout is for
     done = revise_program(job, partial(by_share, hidden=json and sys.stderr.isatty()))
     if json:
-        print_json(outcome.content(job, done, notes), _console)
+        print_json(outcome.content(job, done, notes))
     else:
         _show(job, done, notes)
     return 0 if done.written else 1
@@ -105,9 +103,9 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     revision = job.revision
 
     def say(mark: str, text: str) -> None:
-        _console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
+        console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
 
-    _console.print(
+    console.print(
         f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
         f"{revision.changed if done.written else 'none'} of them changed; "
         f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
@@ -115,7 +113,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
         soft_wrap=True,
     )
     say("", f"Start: {job.begun}; {job.method}")
-    print_table(_bounds(done.bounds), _console)
+    print_table(_bounds(done.bounds), console)
     if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
@@ -130,7 +128,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
         took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
-    _console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
     if done.written:
         say("", f"Written: {', '.join(map(str, job.paths.all()))}")
     else:

@@ -9,6 +9,9 @@ from rich.table import Table
 
 from thermocomp.report.layout import Column, Layout, Toned, verdict
 
+#: of all commands
+console = Console(highlight=False)
+
 _TONES = {"good": "green", "doubtful": "yellow", "bad": "red", "grave": "bold red", "soft": "dim", "strong": "bold"}
 _ROWS = {"best": "bold green", "none": "dim"}
 

@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.cli import loudness
-from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
 from thermocomp.cli.progress import by_share
-from thermocomp.cli.terminal import print_table
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
 
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float, float] | None
 GRID = 5
-
-_console = Console(highlight=False)
 
 
 def volumetric(
@@ -75,10 +71,10 @@ def volumetric(
         raise InputError(f"--tool-length {tool_length:g}: must not be negative")
     if recording is None and mapping is not None:
         raise InputError("--mapping is for a recording: name one by --recording")
-    with needs("study"):
-        from thermocomp.assessment.volumetric import study
-        from thermocomp.files.machines import read_machine
-        from thermocomp.report import volumetric_tables
+    from thermocomp.assessment.volumetric import study
+    from thermocomp.files.machines import read_machine
+    from thermocomp.report import volumetric_tables
+
     inputs = [machine] if recording is None else [machine, recording]
     if output is not None:
         refuse_existing([output], overwrite, inputs, ".html")
@@ -97,15 +93,15 @@ def volumetric(
             progress=progress,
         )
     if output is not None:
-        with needs("study"):
-            from thermocomp.report import volumetric as pages
+        from thermocomp.report import volumetric as pages
+
         pages.write(result, output)
     if json:
-        print_json({"trouble": trouble, **volumetric_tables.content(result)}, _console)
+        print_json({"trouble": trouble, **volumetric_tables.content(result)})
     else:
         _show(result, point=at is not None or grid is None, volume=grid is not None or at is None)
         if output is not None:
-            _console.print(f"Page: {output}", soft_wrap=True)
+            console.print(f"Page: {output}", soft_wrap=True)
     return 0
 
 
@@ -117,28 +113,28 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
     if recording is not None:
         hours = (recording.time[-1] - recording.time[0]) / 3600
         replayed = f"{recording.source or recording.name}, {len(recording)} rows, {hours:.2f} h"
-    _console.print(f"[bold]{escape(machine.name)}[/], {escape(machine.structure.code)}: {escape(replayed)}")
+    console.print(f"[bold]{escape(machine.name)}[/], {escape(machine.structure.code)}: {escape(replayed)}")
     known, components = told.components(study), told.listed(study)
     if known.rows:
-        print_table(known, _console)
+        print_table(known, console)
     others = [c["code"] for c in components if c["source"] == "nothing"]
-    _console.print(
+    console.print(
         f"{len(known.rows)} of {len(components)} components are known" + "; taken as zero: " * bool(others), end=""
     )
-    _console.print(", ".join(others), soft_wrap=True)
+    console.print(", ".join(others), soft_wrap=True)
     if point:
-        _console.print(f"\n[bold]At {told.said(study.course.point)}[/], the tip at {told.said(study.course.tool)}")
-        print_table(told.at_point(study), _console)
-    print_table(told.contributions(study, point=point), _console)
-    print_table(told.lines(study), _console)
+        console.print(f"\n[bold]At {told.said(study.course.point)}[/], the tip at {told.said(study.course.tool)}")
+        print_table(told.at_point(study), console)
+    print_table(told.contributions(study, point=point), console)
+    print_table(told.lines(study), console)
     if volume:
-        print_table(told.volume(study), _console)
+        print_table(told.volume(study), console)
     for what, codes in (("never judged on unseen cycles", told.untested(study)), ("unproven", told.unproven(study))):
         if codes:
-            _console.print(f"[yellow]but[/] {what}: {escape(', '.join(codes))}", soft_wrap=True)
+            console.print(f"[yellow]but[/] {what}: {escape(', '.join(codes))}", soft_wrap=True)
     if study.missing:
-        _console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
+        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
     for note in study.notes:
-        _console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
+        console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
     if volume:
-        _console.print(f"[bold]{told.headline(study)}[/]", soft_wrap=True)
+        console.print(f"[bold]{told.headline(study)}[/]", soft_wrap=True)

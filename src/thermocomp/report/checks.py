@@ -9,13 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermocomp import __version__
 from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report import records
 from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, plain, svg, thinned
-from thermocomp.report.html import environment
+from thermocomp.report.html import page
 from thermocomp.report.layout import Column, Layout
 
 #: what is drawn below each other, in this order
@@ -38,13 +37,9 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     -------
     str
     """
-    return (
-        environment()
-        .get_template("check.html")
-        .render(
-            version=__version__,
-            recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
-        )
+    return page(
+        "check.html",
+        recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
@@ -30,7 +31,6 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
     -------
     str
     """
-    pages = environment()
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -45,7 +45,8 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             ]
             drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
     stressed = dict.fromkeys(model for model, _ in drawn.values())
-    return pages.get_template("report.html").render(
+    return page(
+        "report.html",
         **summarise(comparison, recordings, samples),
         measured=[figures.measured(r) for r in recordings],
         overview=figures.overview(comparison),
@@ -71,16 +72,12 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
     -------
     str
     """
-    return (
-        environment()
-        .get_template("selection.html")
-        .render(
-            version=__version__,
-            recordings=[r.source or r.name for r in recordings],
-            method=choices[0].method,
-            choices=choices,
-            figures=[selections.draw(c) for c in choices],
-        )
+    return page(
+        "selection.html",
+        recordings=[r.source or r.name for r in recordings],
+        method=choices[0].method,
+        choices=choices,
+        figures=[selections.draw(c) for c in choices],
     )
 
 
@@ -101,6 +98,11 @@ def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, s
         See `render`.
     """
     path.write_text(render(comparison, recordings, samples), encoding="utf-8")
+
+
+def page(template: str, **content: Any) -> str:
+    """Return a page of a template; all of them name the version."""
+    return environment().get_template(template).render(version=__version__, **content)
 
 
 def environment() -> Environment:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp import __version__
 from thermocomp.assessment import coverage, do_no_harm
 from thermocomp.assessment.choice import Table
 from thermocomp.assessment.metrics import METRICS
@@ -46,7 +45,6 @@ def summarise(
     """
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     return {
-        "version": __version__,
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
         "covered": None if samples is None else _covered(coverage.cover(samples, comparison.judging, recordings)),

@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
-from thermocomp import __version__
 from thermocomp.assessment.volumetric import Volumetric
 from thermocomp.core.components import COMPONENTS
 from thermocomp.report import volumetric_figures as figures
 from thermocomp.report import volumetric_space as space
 from thermocomp.report import volumetric_tables as tables
-from thermocomp.report.html import environment
+from thermocomp.report.html import page
 
 
 def render(study: Volumetric) -> str:
@@ -25,35 +24,31 @@ def render(study: Volumetric) -> str:
     machine, recording, course = study.machine, study.recording, study.course
     known = machine.components
     n_axes, over_time = len(machine.structure.axes), len(course.time) > 1
-    return (
-        environment()
-        .get_template("volumetric.html")
-        .render(
-            version=__version__,
-            study=study,
-            headline=tables.headline(study),
-            travels=", ".join(
-                f"{a.name} {a.travel[0]:g} to {a.travel[1]:g} mm" for a in sorted(machine.axes, key=lambda a: a.name)
-            ),
-            replayed=(recording.source or recording.name) if recording is not None else "reference state",
-            n_points=study.moments[0].grid.size // 3,
-            tool=f"the tool's tip at {tables.said(course.tool)} from the gauge point",
-            point=tables.said(course.point),
-            volume=tables.volume(study),
-            at=tables.at_point(study, page=True),
-            lines=tables.lines(study, page=True),
-            components=tables.components(study, page=True),
-            untested=tables.untested(study),
-            unproven=tables.unproven(study),
-            boxes=space.boxes(study) if n_axes == 3 else "",
-            sections=space.sections(study, study.worst) if n_axes > 1 else "",
-            over_time=figures.over_time(study) if over_time else "",
-            contributions=figures.contributions(study) if known else "",
-            curves=figures.curves(study) if any(c.depends_on and c.code in known for c in COMPONENTS) else "",
-            scalars=figures.scalars(study)
-            if over_time and any(c.is_scalar and c.code in known for c in COMPONENTS)
-            else "",
-        )
+    return page(
+        "volumetric.html",
+        study=study,
+        headline=tables.headline(study),
+        travels=", ".join(
+            f"{a.name} {a.travel[0]:g} to {a.travel[1]:g} mm" for a in sorted(machine.axes, key=lambda a: a.name)
+        ),
+        replayed=(recording.source or recording.name) if recording is not None else "reference state",
+        n_points=study.moments[0].grid.size // 3,
+        tool=f"the tool's tip at {tables.said(course.tool)} from the gauge point",
+        point=tables.said(course.point),
+        volume=tables.volume(study),
+        at=tables.at_point(study, page=True),
+        lines=tables.lines(study, page=True),
+        components=tables.components(study, page=True),
+        untested=tables.untested(study),
+        unproven=tables.unproven(study),
+        boxes=space.boxes(study) if n_axes == 3 else "",
+        sections=space.sections(study, study.worst) if n_axes > 1 else "",
+        over_time=figures.over_time(study) if over_time else "",
+        contributions=figures.contributions(study) if known else "",
+        curves=figures.curves(study) if any(c.depends_on and c.code in known for c in COMPONENTS) else "",
+        scalars=figures.scalars(study)
+        if over_time and any(c.is_scalar and c.code in known for c in COMPONENTS)
+        else "",
     )
 
 
