@@ -48,8 +48,6 @@ class Column:
     unit : str
     whole : bool
         Its cells are never broken over two lines.
-    below : bool
-        Told below the table where that would be too wide for the terminal.
     """
 
     heading: str
@@ -57,7 +55,6 @@ class Column:
     form: str = ""
     unit: str = ""
     whole: bool = False
-    below: bool = False
 
     def text(self, row: Any, *, page: bool = False) -> str:
         """Return the cell of a row as text; what is not known is empty, or a dash among the numbers of a page."""
@@ -107,16 +104,8 @@ class Layout:
 
 
 def laid_out(t: Table) -> Layout:
-    """Return the layout of a table of results, whose title stands above it; its lists of names may stand below."""
-    columns = [
-        Column(
-            heading,
-            partial(_cell, j),
-            "" if j in t.words else ">",
-            below=j in t.words and any(" " in str(row[j]) for row in t.rows),
-        )
-        for j, heading in enumerate(t.columns)
-    ]
+    """Return the layout of a table of results, whose title stands above it."""
+    columns = [Column(heading, partial(_cell, j), "" if j in t.words else ">") for j, heading in enumerate(t.columns)]
     return Layout(columns, t.rows, note=t.caption, tones={} if t.marked is None else {t.marked: "best"})
 
 
