@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
-from thermocomp.cli import app, commands
+from thermocomp.cli import app
 
 COLUMNS = 104
 
@@ -45,8 +45,7 @@ class CliHelp(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the help as a literal block."""
-        for module in (app, commands):
-            self.env.note_dependency(str(module.__file__))
+        self.env.note_dependency(str(app.__file__))
         try:
             text = printed([*self.arguments, "--help"])
         except RuntimeError as e:

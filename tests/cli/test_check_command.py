@@ -8,7 +8,7 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.cli.app import run
-from thermocomp.cli.checked import stretches
+from thermocomp.report.records import stretches
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from thermocomp.api.iso230 import length
 from thermocomp.cli.app import run
-from thermocomp.cli.iso230 import length
 from thermocomp.core.exceptions import InputError
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

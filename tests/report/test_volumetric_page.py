@@ -17,6 +17,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.report import volumetric as page
 from thermocomp.report import volumetric_figures as figures
 from thermocomp.report import volumetric_space as space
+from thermocomp.report import volumetric_tables
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def test_the_page_says_all_of_it(found: Volumetric, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     page.write(found, path)
     text = path.read_text(encoding="utf-8")
-    assert page.headline(found) in text
+    assert volumetric_tables.headline(found) in text
     assert "X 0 to 600 mm, Y -200 to 200 mm, Z 0 to 500 mm" in text
     assert text.count("<svg") == 6
     assert text.count("<tr") == (1 + 9) + (1 + 3) + (1 + 9) + (1 + 32)
@@ -107,11 +108,11 @@ def test_machines_of_fewer_axes_and_of_no_errors(mill: tuple[Machine, Recording]
         assert text.count("<svg") == drawn
     nothing = study(replace(machine, components={}))
     assert page.render(nothing).count("<svg") == 2
-    assert page.headline(nothing).startswith("Largest error in the work volume 0.0 um")
+    assert volumetric_tables.headline(nothing).startswith("Largest error in the work volume 0.0 um")
     # what an axis that is not there would have to correct, stays
     sizes = study(two).worst.sizes
     assert sizes["everything"].largest == pytest.approx(3.0, abs=1e-3)
-    assert page.headline(study(two)).endswith("3.00 um")
+    assert volumetric_tables.headline(study(two)).endswith("3.00 um")
 
 
 def test_the_largest_error_is_looked_for_at_the_corners_too() -> None:

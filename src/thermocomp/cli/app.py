@@ -1,6 +1,8 @@
 """The command line's door: one app, one place where errors become messages and exit codes."""
 
 import sys
+import time
+import traceback
 from collections.abc import Sequence
 
 from cyclopts import App, Parameter
@@ -8,8 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp import __version__
-from thermocomp.cli import jsonoutput
-from thermocomp.cli.exits import STDIN, STOPPED
+from thermocomp.cli import jsonoutput, loudness
+from thermocomp.cli.exits import FAULT, STDIN, STOPPED
+from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.core.shown import shown
 
@@ -45,6 +48,8 @@ COMMANDS = {
 }
 for command, summary in COMMANDS.items():
     app.command(f"thermocomp.cli.{command}:{command}", name=command, help=summary)
+for flag, summary in loudness.FLAGS.items():  # for the help: `run` takes them off before anything is looked up
+    app.command(lambda: None, name=flag, help=summary)
 app.register_install_completion_command()
 
 
@@ -59,19 +64,29 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 judged bad, 2 unusable input, 130 stopped by the keyboard.
+        0 done, 1 judged bad, 2 unusable input, 3 a fault of the program, 130 stopped by the keyboard.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     jsonoutput.called_with = given
+    begin = time.perf_counter()
     try:
-        code = app([str(STDIN) if word == "-" else word for word in given])
+        words = loudness.taken_off(given)
+        with needs("study"):
+            code = app([str(STDIN) if word == "-" else word for word in words])
+        loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
         return _unusable(str(e))
     except OSError as e:  # a folder that may not be written to, a full disk
         return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
+    except SystemExit as e:
+        if e.code and e.__context__ is not None:  # words that no command takes: it was told on stderr
+            _tell_programs(str(e.__context__))
+        raise
     except KeyboardInterrupt:
         Console(stderr=True, highlight=False).print("[bold red]stopped:[/] nothing was finished, nothing was written")
         return STOPPED
+    except Exception as e:  # noqa: BLE001 - a user is told what happened, and how to see where
+        return _fault(e)
     return code if isinstance(code, int) else 0
 
 
@@ -83,9 +98,23 @@ def main() -> None:
 def _unusable(message: str) -> int:
     text = "\n".join(shown(line) for line in message.split("\n"))
     Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
-    if "--json" in jsonoutput.called_with:
-        jsonoutput.print_json({"error": message}, Console())
+    _tell_programs(message)
     return 2
+
+
+def _fault(error: Exception) -> int:
+    if loudness.verbose:
+        traceback.print_exception(error)
+    message = f"unexpected: {type(error).__name__}: {error}"
+    hint = "" if loudness.verbose else "; this is a fault of thermocomp: --verbose tells where, for a report"
+    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(shown(message + hint))}", soft_wrap=True)
+    _tell_programs(message)
+    return FAULT
+
+
+def _tell_programs(message: str) -> None:
+    if "--json" in jsonoutput.called_with:
+        jsonoutput.print_json({"error": message})
 
 
 if __name__ == "__main__":

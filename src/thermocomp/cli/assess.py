@@ -2,18 +2,15 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
+from thermocomp.cli import loudness
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
     read_recordings,
     tell_trouble,
 )
 from thermocomp.cli.progress import by_steps
-
-_console = Console(highlight=False)
+from thermocomp.cli.terminal import console
 
 
 def assess(
@@ -56,12 +53,13 @@ def assess(
         on, 2 unusable input.
     """
     tests = read_recordings(recordings, mapping)
-    with needs("study"):
-        from thermocomp.assessment import study as studies
-        from thermocomp.assessment.results import Rules
-        from thermocomp.cli import output as out
-        from thermocomp.files import modelfile
+    from thermocomp.assessment import study as studies
+    from thermocomp.assessment.results import Rules
+    from thermocomp.cli import output as out
+    from thermocomp.files import modelfile
+
     models = modelfile.read(model)
+    loudness.tell(f"read {model}: models of {', '.join(m.target for m in models)}")
     trouble = tell_trouble(tests)
     with by_steps(len(models), hidden=json) as progress:
         judged = studies.assess(
@@ -72,6 +70,6 @@ def assess(
             starts=beginning.of(tests, mapping),
             progress=progress,
         )
-    out.show_assess(judged, trouble, _console, as_json=json)
+    out.show_assess(judged, trouble, console, as_json=json)
     before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in judged.overall()} else 0

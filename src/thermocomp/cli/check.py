@@ -2,16 +2,12 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     OptionalOutput,
     read_recordings,
 )
+from thermocomp.cli.terminal import console
 from thermocomp.files.draft import refuse_existing
-
-_console = Console(highlight=False)
 
 
 def check(
@@ -46,13 +42,13 @@ def check(
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".html")
     tests = read_recordings(recordings, mapping)
-    with needs("study"):
-        from thermocomp.cli import checked
-        from thermocomp.recording.quality import check as findings_of
+    from thermocomp.cli import checked
+    from thermocomp.recording.quality import check as findings_of
+
     findings = [findings_of(test) for test in tests]
     if output is not None:
-        with needs("study"):
-            from thermocomp.report import checks
+        from thermocomp.report import checks
+
         checks.write(tests, findings, output)
-    checked.show_check(tests, findings, output, _console, as_json=json)
+    checked.show_check(tests, findings, output, console, as_json=json)
     return 1 if any(f.severity == "trouble" for found in findings for f in found) else 0

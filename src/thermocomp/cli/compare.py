@@ -2,21 +2,17 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.exits import STOPPED
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
     OptionalOutput,
     Study,
 )
 from thermocomp.cli.progress import by_steps
+from thermocomp.cli.terminal import console
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
-
-_console = Console(highlight=False)
 
 
 def compare(
@@ -64,19 +60,19 @@ def compare(
         (what was judged until then is shown).
     """
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html")
-    with needs("study"):
-        from thermocomp.assessment import compare as comparing
-        from thermocomp.cli import output as out
+    from thermocomp.assessment import compare as comparing
+    from thermocomp.cli import output as out
+
     samples, judging, rules, limits = ready.samples, ready.judging, study.rules(primary), compensator.limits()
     with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
         comparison = comparing.compare(
             samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
         )
     if output is not None:
-        with needs("study"):
-            from thermocomp.report import html
+        from thermocomp.report import html
+
         html.write(comparison, ready.tests, output, samples)
-    out.show_comparison(comparison, output, ready.trouble, _console, as_json=json)
+    out.show_comparison(comparison, output, ready.trouble, console, as_json=json)
     if comparison.left:
         return STOPPED
     return 0 if all(comparison.best(c.name) is not None for c in samples.targets) else 1

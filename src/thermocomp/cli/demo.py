@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-from rich.console import Console
-
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import (
@@ -12,10 +10,9 @@ from thermocomp.cli.options import (
     read_recordings,
 )
 from thermocomp.cli.simulate import simulate
+from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
-
-_console = Console(highlight=False)
 
 
 def demo(
@@ -45,12 +42,12 @@ def demo(
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
     if not json:
-        _console.print("[bold]1. The virtual machine tool runs a drift test[/]")
+        console.print("[bold]1. The virtual machine tool runs a drift test[/]")
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
     study = Study(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
-        _console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
+        console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
     compare([recording], study=study, output=report, overwrite=overwrite, json=json)
     if not json:
-        _console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
+        console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
     return fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)

@@ -1,14 +1,10 @@
-"""What all commands have in common with a shell, and with a terminal."""
+"""What all commands have in common with a shell."""
 
 from pathlib import Path
 
+#: exit code of a fault of the program itself
+FAULT = 3
 #: exit code of work that was stopped by the keyboard, as shells have it
 STOPPED = 130
 #: stands for standard input, which is ``-`` on the command line: cyclopts takes that for an option
 STDIN = Path("<stdin>")
-
-
-def mark(verdict: str) -> str:
-    """Return a verdict in its colour."""
-    colour = {"accepted": "green", "unproven": "yellow"}.get(verdict.partition(" ")[0], "red")
-    return f"[{colour}]{verdict}[/]"

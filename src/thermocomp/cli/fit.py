@@ -4,10 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from rich.console import Console
-
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     Compensator,
     Output,
@@ -15,10 +12,9 @@ from thermocomp.cli.options import (
     Study,
 )
 from thermocomp.cli.progress import by_steps
+from thermocomp.cli.terminal import console
 
 Policy = Literal["clip", "hold", "fade"]
-
-_console = Console(highlight=False)
 
 
 def fit(
@@ -78,12 +74,12 @@ def fit(
         0 done, 1 a component was refused, 2 unusable input.
     """
     ready = study.prepare(recordings, beginning, [output], overwrite, ".json", tilt=tilt)
-    with needs("study"):
-        from thermocomp.assessment import study as studies
-        from thermocomp.assessment.compare import n_pieces
-        from thermocomp.cli import output as out
-        from thermocomp.core.model import Support
-        from thermocomp.files import modelfile
+    from thermocomp.assessment import study as studies
+    from thermocomp.assessment.compare import n_pieces
+    from thermocomp.cli import output as out
+    from thermocomp.core.model import Support
+    from thermocomp.files import modelfile
+
     samples, judging = ready.samples, ready.judging
     with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
@@ -100,5 +96,5 @@ def fit(
     result = replace(result, models=tuple(m.taken(accept_unproven) for m in result.models))
     modelfile.write(result.models, output, overwrite=overwrite)
     if not quiet:
-        out.show_fit(result, output, ready.trouble, _console, as_json=json)
+        out.show_fit(result, output, ready.trouble, console, as_json=json)
     return 1 if any(a.word == "refused" for a in result.comparison.overall()) else 0

@@ -2,10 +2,9 @@
 
 import json
 import math
+import sys
 from numbers import Integral, Real
 from typing import Any
-
-from rich.console import Console
 
 from thermocomp import __version__
 
@@ -13,13 +12,13 @@ from thermocomp import __version__
 called_with: list[str] = []
 
 
-def print_json(content: dict[str, Any], console: Console) -> None:
+def print_json(content: dict[str, Any]) -> None:
     """Print what a program shall read, and by which version and settings it was made."""
     content = {"thermocomp": __version__, "arguments": called_with, **content}
     # JSON has no nan and no infinity: what is not known is null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
     # a name of a file that is no text: what stands for its bytes is written as JSON escapes it
-    console.file.write(text.encode("utf-8", "backslashreplace").decode("utf-8") + "\n")
+    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode("utf-8") + "\n")
 
 
 def _nulled(value: Any) -> Any:

@@ -3,7 +3,7 @@
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
+from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
-from thermocomp.cli.extras import needs
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
@@ -23,10 +23,8 @@ from thermocomp.files.draft import refuse_existing
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne, Prepared
     from thermocomp.assessment.results import Rules
-    from thermocomp.assessment.splits import Judging
     from thermocomp.cli.beginning import Beginning
     from thermocomp.recording.recording import Recording
-    from thermocomp.recording.samples import Samples
 
 _stderr = Console(stderr=True, highlight=False)
 
@@ -95,9 +93,9 @@ class Study:
         Before any work it is made sure that the outputs can be written.
         """
         tests = read_recordings(paths, self.mapping)
-        with needs("study"):
-            from thermocomp.api.inputs import prepare
-            from thermocomp.recording.tilts import with_tilts
+        from thermocomp.api.inputs import prepare
+        from thermocomp.recording.tilts import with_tilts
+
         if not self.target:
             raise InputError(f"name what to predict with --target: {_displacements(tests)}")
         tests, names = with_tilts(tests, tilt) if tilt else (tests, [])
@@ -120,12 +118,6 @@ class Study:
         )
         _told(ready.trouble)
         return ready
-
-    def judging(self, samples: "Samples") -> "Judging":
-        """Return what is learned from and what is judged."""
-        from thermocomp.api.inputs import judging_of
-
-        return judging_of(samples, split=self.split, leave_one=self._left_out())
 
     def _left_out(self) -> "LeaveOne | None":
         units: dict[LeaveOne, bool] = {
@@ -184,19 +176,25 @@ def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]
     """Read the recordings named on the command line; ``-`` is a CSV file on standard input."""
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
-    with needs("study"):
-        from thermocomp.files import mapping as mappings
-        from thermocomp.files import recordings as reader
+    from thermocomp.files import mapping as mappings
+    from thermocomp.files import recordings as reader
+
     columns = mappings.read_mapping(mapping) if mapping is not None else None
+    found = _read_all(paths, lambda named: reader.read_all(named, columns))
+    loudness.tell_read(found)
+    return found
+
+
+def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
-        return reader.read_all(paths, columns)
+        return read(paths)
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")
     with tempfile.TemporaryDirectory(prefix="thermocomp-") as folder:
         typed = Path(folder, "stdin.csv")
         with typed.open("wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
-        return reader.read_all([typed if p == STDIN else p for p in paths], columns)
+        return read([typed if p == STDIN else p for p in paths])
 
 
 def _displacements(tests: "Sequence[Recording]") -> str:
@@ -222,6 +220,6 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 
 def _told(lines: list[str]) -> list[str]:
-    for line in lines:
+    for line in () if loudness.quiet else lines:
         _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
     return lines

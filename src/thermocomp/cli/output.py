@@ -1,27 +1,23 @@
 """What the commands print: a table for people, JSON for machines."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Column, Table
 
 from thermocomp.assessment import coverage
-from thermocomp.assessment.choice import Choice, written
-from thermocomp.assessment.choice import Table as ChoiceTable
+from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.do_no_harm import Unit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
-from thermocomp.cli.checked import recording_content
-from thermocomp.cli.exits import mark
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.core.model import ErrorModel
+from thermocomp.cli.terminal import mark, print_table
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
+from thermocomp.report import records
+from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
 from thermocomp.report.running import told
 from thermocomp.report.summary import cautions, unlike
 from thermocomp.simulation.protocol import Experiment
@@ -55,14 +51,14 @@ def show_comparison(
                 }
                 for r in comparison.recommended
             ],
-            "results": [_result(a) for a in comparison.assessments],
+            "results": [records.assessment(a) for a in comparison.assessments],
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(comparison.starts, console)
     console.print(f"Judged on: {comparison.judging.name}")
-    console.print(_assessment_table(comparison.assessments))
-    console.print(_cycle_table(comparison.assessments))
+    print_table(_assessment_table(comparison.assessments), console)
+    print_table(_cycle_table(comparison.assessments), console)
     for a in comparison.overall():
         if not a.accepted:
             console.print(f"{mark(a.word)} {a.model} for {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
@@ -106,12 +102,12 @@ def show_choices(
                 for c in choices
             ],
         }
-        print_json(content, console)
+        print_json(content)
         return
     for c in choices:
         for t in c.tables:
             console.print(f"\n[bold]{escape(c.target)}: {escape(t.title)}[/]")
-            print_table(t, console)
+            print_table(laid_out(t), console)
         for note in c.notes:
             console.print(f"[dim]note[/] {escape(note)}")
         console.print(
@@ -121,33 +117,10 @@ def show_choices(
         console.print(f"Page: {page}", soft_wrap=True)
 
 
-def print_table(t: ChoiceTable, console: Console) -> None:
-    """Print a table; where it is too wide, its lists of names follow below it."""
-    lists = [j for j in t.words if any(" " in str(row[j]) for row in t.rows)]
-    for below in ([], lists):
-        table = Table()
-        columns = [j for j in range(len(t.columns)) if j not in below]
-        for j in columns:
-            table.add_column(escape(t.columns[j]), justify="left" if j in t.words else "right", overflow="fold")
-        for k, row in enumerate(t.rows):
-            cells = (escape(written(row[j])) for j in columns)
-            table.add_row(*cells, style="bold green" if k == t.marked else None)
-        if console.measure(table).maximum <= console.width:
-            break
-    console.print(table)
-    for j in below:
-        console.print(f"[dim]{escape(t.columns[j])}[/]")
-        for k, row in enumerate(t.rows):
-            style = "bold green" if k == t.marked else None
-            console.print(f"  {escape(written(row[0]))}: {escape(written(row[j]))}", style=style)
-    if t.caption:
-        console.print(escape(t.caption), style="dim")
-
-
 def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
     """Print models that were fitted and written."""
+    models = [records.model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
     if as_json:
-        models = [_model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
         content = {
             "judging": fitted.comparison.judging.name,
             "starts": _starts(fitted.comparison.starts),
@@ -155,25 +128,19 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
             "trouble": trouble,
             "models": models,
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(fitted.comparison.starts, console)
     console.print(f"Judged on: {fitted.comparison.judging.name}")
-    table = Table()
-    for heading in ("target", "sensors", "R2 of the fit", "unseen RMS, um", "none RMS, um", "verdict"):
-        table.add_column(heading, justify="left" if heading in ("target", "verdict") else "right")
-    for m, r2 in zip(fitted.models, fitted.r_squared, strict=True):
-        honest = m.honest_error
-        assert honest is not None
-        table.add_row(
-            escape(m.target),
-            str(len(m.sensors)),
-            f"{r2:.4f}",
-            f"{honest.rms:.2f}",
-            f"{honest.none_rms:.2f}",
-            mark(honest.word),
-        )
-    console.print(table)
+    columns = (
+        Column("target", "target"),
+        Column("sensors", lambda m: len(m["sensors"]), ">"),
+        Column("R2 of the fit", "r_squared", ".4f"),
+        Column("unseen RMS", "unseen_rms_um", ".2f", "um"),
+        Column("none RMS", "none_rms_um", ".2f", "um"),
+        Column("verdict", lambda m: verdict(m["verdict"])),
+    )
+    print_table(Layout(columns, models), console)
     for m in fitted.models:
         if m.honest_error is not None:
             console.print(
@@ -194,27 +161,14 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "trouble": trouble,
             "validity": asdict(judged.validity) if judged.validity is not None else None,
             "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
-            "results": [_result(a) for a in judged.assessments],
+            "results": [records.assessment(a) for a in judged.assessments],
         }
-        print_json(content, console)
+        print_json(content)
         return
     _tell_starts(judged.starts, console)
-    console.print(_assessment_table(judged.assessments))
-    console.print(_cycle_table(judged.assessments))
-    table = Table(title="Robustness: RMS in um")
-    for heading in ("target", "clean", "uniform noise", "normal noise", "worst lost sensor", "rows outside range"):
-        table.add_column(heading, justify="left" if heading == "target" else "right")
-    for a in judged.overall():
-        if a.robustness is not None:
-            name, lost = a.robustness.worst_lost
-            table.add_row(
-                escape(a.target),
-                f"{a.metric('rms'):.2f}",
-                *(f"{a.robustness.noise_rms[law][0]:.2f}" for law in ("uniform", "normal")),
-                f"{lost:.2f} ({escape(name)})",
-                f"{100 * a.robustness.outside:.1f} %",
-            )
-    console.print(table)
+    print_table(_assessment_table(judged.assessments), console)
+    print_table(_cycle_table(judged.assessments), console)
+    print_table(_robustness(judged.overall()), console)
     for a in judged.overall():
         console.print(f"{mark(a.word)} {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
         if a.robustness is not None and a.robustness.harm:
@@ -231,7 +185,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     if known:
         covered = coverage.table(known)
         console.print(f"\n[bold]{escape(covered.title)}[/]")
-        print_table(covered, console)
+        print_table(laid_out(covered), console)
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             word = mark(f"{m.honest_error.word} when it was fitted")
@@ -250,8 +204,8 @@ def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
 def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: Console, *, as_json: bool) -> None:
     """Print what was recorded on the virtual machine."""
     if as_json:
-        content = [{"file": str(p), **recording_content(r, ())} for r, p in zip(tests, paths, strict=True)]
-        print_json({"recordings": content}, console)
+        content = [{"file": str(p), **records.recording(r, ())} for r, p in zip(tests, paths, strict=True)]
+        print_json({"recordings": content})
         return
     for r, p in zip(tests, paths, strict=True):
         hours = (r.time[-1] - r.time[0]) / 3600
@@ -265,141 +219,89 @@ def show_experiments(experiments: Sequence[Experiment], console: Console, *, as_
     """Print what can be recorded on the virtual machines."""
     if as_json:
         content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
-        print_json({"experiments": content}, console)
+        print_json({"experiments": content})
         return
-    table = Table("experiment", Column("tests", justify="right"), "what it is", box=None)
-    for e in experiments:
-        table.add_row(e.name, str(len(e.tests)), escape(e.description))
-    console.print(table)
+    columns = (
+        Column("experiment", lambda e: e.name),
+        Column("tests", lambda e: len(e.tests), ">"),
+        Column("what it is", lambda e: e.description),
+    )
+    print_table(Layout(columns, experiments), console, box=None)
 
 
-def _assessment_table(assessments: Sequence[Assessment]) -> Table:
+def _robustness(assessments: Sequence[Assessment]) -> Layout:
+    columns = (
+        Column("target", "target"),
+        Column("clean", "clean", ".2f"),
+        Column("uniform noise", "uniform", ".2f"),
+        Column("normal noise", "normal", ".2f"),
+        Column("worst lost sensor", "lost", ">"),
+        Column("rows outside range", "outside", ">"),
+    )
+    rows = [
+        {
+            "target": a.target,
+            "clean": a.metric("rms"),
+            **{law: mean for law, (mean, _) in a.robustness.noise_rms.items()},
+            "lost": "{1:.2f} ({0})".format(*a.robustness.worst_lost),
+            "outside": f"{100 * a.robustness.outside:.1f} %",
+        }
+        for a in assessments
+        if a.robustness is not None
+    ]
+    return Layout(columns, rows, "Robustness: RMS in um")
+
+
+def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
     """Return a table with a section per target and a row per model."""
-    table = Table(caption="residual in um where it was judged")
-    table.add_column("")
-    for heading in ("MAE", "RMS", "max", "less", "sensors"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
+    metrics = {"MAE": "mae", "RMS": "rms", "max": "max_abs"}
+    rows: list[tuple[str | float, ...]] = []
+    sections = []
     for mine in _by_target(assessments):
-        table.add_section()
-        none = (_number(mine[0].none_metric(m)) for m in ("mae", "rms", "max_abs"))
-        table.add_row(f"[bold]{escape(mine[0].target)}[/], none", *none, style="dim")
+        sections.append(len(rows))
+        none = (mine[0].none_metric(m) for m in metrics.values())
+        rows.append((Toned(f"{mine[0].target}, none", "strong"), *none, "", "", ""))
         for a in mine:
-            figures = (_number(a.metric(m)) for m in ("mae", "rms", "max_abs"))
+            figures = (a.metric(m) for m in metrics.values())
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
-            table.add_row(a.model, *figures, less, _span(a.n_sensors), mark(a.word))
-    return table
+            rows.append((a.model, *figures, less, "-".join(map(str, dict.fromkeys(a.n_sensors))), verdict(a.word)))
+    headings = (*((h, ".2f") for h in metrics), ("less", ">"), ("sensors", ">"), ("verdict", ""))
+    columns = (Column("", 0), *(Column(h, k, form, whole=True) for k, (h, form) in enumerate(headings, start=1)))
+    return Layout(
+        columns,
+        rows,
+        caption="residual in um where it was judged",
+        tones=dict.fromkeys(sections, "none"),
+        sections=frozenset(sections),
+    )
 
 
-def _cycle_table(assessments: Sequence[Assessment]) -> Table:
+def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
     """Return the RMS in every unseen cycle, a section per target; whatever there is more of goes down the page."""
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
     cycles = list(dict.fromkeys(c.name for a in assessments for c in a.verdict.units))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
     space = " " if down is models else ""  # where others have their mark
-    table = Table(caption="RMS in um in each cycle, or the part of it, that was judged; ! = harmful")
-    table.add_column("", no_wrap=True)
-    for heading in across:
-        table.add_column(escape(heading), justify="right", no_wrap=across is models)
+    rows: list[tuple[str, ...]] = []
+    sections = set()
     for mine in _by_target(assessments):
         cells = {(a.model, c.name): _passed(c) for a in mine for c in a.verdict.units}
         cells |= {("none", c.name): f"{c.none_rms:.2f}{space}" for a in mine for c in a.verdict.units}
-        table.add_section()
-        table.add_row(f"[bold]{escape(mine[0].target)}[/]")
+        sections.add(len(rows))
+        rows.append((Toned(mine[0].target, "strong"), *([""] * len(across))))
         for name in down:
             keys = [(name, other) if down is models else (other, name) for other in across]
             if any(k in cells for k in keys):
-                table.add_row(f"  {escape(name)}", *(cells.get(k, "") for k in keys))
-    return table
+                rows.append((f"  {name}", *(cells.get(k, "") for k in keys)))
+    columns = (Column(h, k, ">", whole=across is models) for k, h in enumerate(across, start=1))
+    caption = "RMS in um in each cycle, or the part of it, that was judged; ! = harmful"
+    return Layout((Column("", 0, whole=True), *columns), rows, caption=caption, sections=frozenset(sections))
 
 
 def _passed(cycle: Unit) -> str:
-    return f"[red]{cycle.rms:.2f}![/]" if cycle.harmful else f"{cycle.rms:.2f} "
+    return Toned(f"{cycle.rms:.2f}!", "bad") if cycle.harmful else f"{cycle.rms:.2f} "
 
 
 def _by_target(assessments: Sequence[Assessment]) -> list[list[Assessment]]:
     overall = [a for a in assessments if a.overall]
     return [[a for a in overall if a.target == t] for t in dict.fromkeys(a.target for a in overall)]
-
-
-def _span(numbers: tuple[int, int]) -> str:
-    return "-".join(str(n) for n in dict.fromkeys(numbers))
-
-
-def _number(value: float) -> str:
-    return f"{value:.2f}" if math.isfinite(value) else ""
-
-
-def _result(a: Assessment) -> dict[str, Any]:
-    content: dict[str, Any] = {
-        "model": a.model,
-        "target": a.target,
-        "block": a.block,
-        "mae_um": a.metric("mae"),
-        "rms_um": a.metric("rms"),
-        "max_um": a.metric("max_abs"),
-        "alone_mae_um": a.alone_metric("mae"),
-        "alone_rms_um": a.alone_metric("rms"),
-        "alone_max_um": a.alone_metric("max_abs"),
-        "peak_to_peak_um": a.metric("peak_to_peak"),
-        "none_mae_um": a.none_metric("mae"),
-        "none_rms_um": a.none_metric("rms"),
-        "none_peak_to_peak_um": a.none_metric("peak_to_peak"),
-        "reduction_pct": a.metric("reduction"),
-        "verdict": a.word,
-        "reason": a.reason,
-        "p_value": a.verdict.p_value if a.verdict.units else None,
-        "tried": a.verdict.tried,
-        "units": [
-            {
-                "name": u.name,
-                "rms_um": u.rms,
-                "none_rms_um": u.none_rms,
-                "baselines_rms_um": dict(zip(a.verdict.names, u.baselines, strict=False)),
-                "margin_um": u.margin,
-                "harmful": u.harmful,
-            }
-            for u in a.verdict.units
-        ],
-        "sensors": list(a.sensors),
-        "n_sensors": a.n_sensors[1],
-        "n_sensors_least": a.n_sensors[0],
-        "fit_s": a.fit_s,
-        "n_rows": len(a.measured),
-        "n_rows_learned_from": a.learned,
-        "n_effective": a.n_effective,
-        "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
-        "readings_turned_away": a.rejected,
-        "first_turned_away": a.turned_away,
-    }
-    if a.robustness is not None:
-        r = a.robustness
-        content["robustness"] = {
-            "noise_degC": r.noise,
-            "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
-            "lost_sensor_rms_um": r.lost_rms,
-            "worse_than_none": list(r.worse_than_none),
-            "unlike_training_pct": 100 * r.unlike,
-            "unlike_training_rms_um": r.unlike_rms,
-            "outside_range_pct": 100 * r.outside,
-            "outside_range_rms_um": r.outside_rms,
-        }
-    return content
-
-
-def _model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
-    honest = m.honest_error
-    return {
-        "target": m.target,
-        "unit": m.unit,
-        "family": m.family,
-        "formula": m.formula(),
-        "coefficients": m.coefficients_by_name(),
-        "intercept": m.intercept,
-        "r_squared": r_squared,
-        "sensors": list(m.sensors),
-        "unseen_rms_um": honest.rms if honest else None,
-        "none_rms_um": honest.none_rms if honest else None,
-        "verdict": honest.word if honest else None,
-        "reason": honest.why if honest else None,
-    }

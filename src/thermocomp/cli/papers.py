@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
     OptionalOutput,
@@ -17,8 +15,10 @@ from thermocomp.cli.options import (
     tell_trouble,
 )
 from thermocomp.cli.progress import by_share
+from thermocomp.cli.terminal import console, marked, print_table
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
+from thermocomp.report.layout import Column, Layout, Toned
 
 if TYPE_CHECKING:
     from thermocomp.papers.study import Claim, Study
@@ -35,8 +35,7 @@ CROSS = "cross"
 #: columns that the tables of cross need
 TABLE_WIDTH = 120
 
-_console = Console(highlight=False)
-_STYLES = {"yes": "green", "no": "bold red", "-": "dim"}
+_TONES = {"yes": "good", "no": "grave", "-": "soft"}
 
 
 def papers(
@@ -90,8 +89,8 @@ def papers(
         raise InputError(f"--seed {seed}: must not be negative")
     if repeats < 1:
         raise InputError(f"--repeats {repeats}: must be at least 1")
-    with needs("study"):
-        from thermocomp.papers.studies import STUDIES
+    from thermocomp.papers.studies import STUDIES
+
     chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
     asked = {"--with": measured, "--mapping": mapping, "--target": target, "--models": models}
     for option in (o for o, value in asked.items() if value):
@@ -114,69 +113,65 @@ def papers(
         if not json:
             _show(*done[-1])
     if output is not None:
-        with needs("study"):
-            from thermocomp.report import papers as pages
+        from thermocomp.report import papers as pages
+
         pages.write([study for study, _ in done], output, seed=seed)
         if not json:
-            _console.print(f"Page: {output}", soft_wrap=True)
+            console.print(f"Page: {output}", soft_wrap=True)
     if json:
-        print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]}, _console)
+        print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]})
     return 0
 
 
 def _run(name: str, seed: int, repeats: int, progress: "Told") -> "Study":
-    with needs("study"):
-        from thermocomp.papers import studies
+    from thermocomp.papers import studies
+
     return studies.repeat(name, seed=seed, repeats=repeats, progress=progress)
 
 
 def _cross(
     seed: int, progress: "Told", tests: "list[Recording]", models: list[str] | None, targets: list[str] | None
 ) -> "Study":
-    with needs("study"):
-        from thermocomp.papers import cross
+    from thermocomp.papers import cross
+
     return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets)
 
 
 def _show(study: "Study", seconds: float) -> None:
-    with needs("study"):
-        from thermocomp.report.papers import headline
-    _console.print(f"\n[bold]{escape(study.title)}[/]")
+    from thermocomp.report.papers import headline
+
+    console.print(f"\n[bold]{escape(study.title)}[/]")
     if study.claims:
-        table = Table()
-        for heading in ("id", "claim", "paper", "ours"):
-            table.add_column(heading, overflow="fold")
-        table.add_column("holds", no_wrap=True)
-        for c in study.claims:
-            cells = (", ".join(c.ids), c.text, c.paper or "-", c.ours or "-")
-            table.add_row(*map(escape, cells), f"[{_style(c)}]{c.verdict}[/]")
-        _console.print(table)
+        columns = (
+            Column("id", lambda c: ", ".join(c.ids)),
+            Column("claim", lambda c: c.text),
+            Column("paper", lambda c: c.paper or "-"),
+            Column("ours", lambda c: c.ours or "-"),
+            Column("holds", _holds, whole=True),
+        )
+        print_table(Layout(columns, study.claims), console)
         for c in study.claims:
             if c.finding:
-                _console.print(f"[{_style(c)}]{escape(', '.join(c.ids))}[/] {escape(c.finding)}")
+                console.print(f"{marked(Toned(', '.join(c.ids), _holds(c).tone))} {escape(c.finding)}")
     if study.name == CROSS:
         # Numbers must not be cut: a narrow terminal wraps whole lines instead.
-        wide = Console(highlight=False, width=max(_console.width, TABLE_WIDTH))
+        wide = Console(highlight=False, width=max(console.width, TABLE_WIDTH))
         for t in study.tables:
-            wide.print(_table(t))
+            print_table(_laid_out(t), wide)
     said = f"{headline(study)}; " if study.claims else ""
-    _console.print(f"{escape(said)}{seconds:.0f} s")
+    console.print(f"{escape(said)}{seconds:.0f} s")
 
 
-def _style(claim: "Claim") -> str:
-    return _STYLES.get(claim.verdict, "yellow")
+def _holds(claim: "Claim") -> Toned:
+    return Toned(claim.verdict, _TONES.get(claim.verdict, "doubtful"))
 
 
-def _table(t: "StudyTable") -> Table:
-    with needs("study"):
-        from thermocomp.report.papers import rows, words
+def _laid_out(t: "StudyTable") -> Layout:
+    from thermocomp.report.papers import rows, words
+
     left = words(t)
-    table = Table(caption=escape(t.caption))
-    for k, heading in enumerate(t.header):
-        table.add_column(escape(heading), justify="left" if k in left else "right", overflow="fold", no_wrap=k == 0)
-    for row in rows(t):
-        table.add_row(*map(escape, row))
-    return table
+    columns = [Column(h, k, "" if k in left else ">", whole=k == 0) for k, h in enumerate(t.header)]
+    return Layout(columns, rows(t), caption=t.caption)
 
 
 def _content(study: "Study", seconds: float) -> dict[str, Any]:

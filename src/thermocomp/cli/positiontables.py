@@ -1,23 +1,35 @@
-"""What ``thermocomp position`` found, as tables for people and as plain numbers for programs."""
+"""What ``thermocomp position`` found, for people."""
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from thermocomp.assessment.position import CycleErrors, PositionStudy
-from thermocomp.cli.exits import mark
+from thermocomp.api.position import Positioned
+from thermocomp.assessment.position import PositionStudy
+from thermocomp.cli.terminal import mark, marked, print_table
 from thermocomp.files.profiles import NOT_TAKEN
 from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles
+from thermocomp.report import records
+from thermocomp.report.layout import Column, Layout, Toned, verdict
 
 #: cycles that are told one by one; of more, the `WORST`
 FEW, WORST = 12, 5
 #: characters of a formula that are told; --json has all
 FORMULA = 300
+
+
+def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
+    """Print what was found of one component, or of several, and where the models are."""
+    if result.several:
+        show_all(result.found, result.tests, result.left_open, console)
+    else:
+        show(result.found[0], result.tests[0], result.left_open, console)
+    if file is not None:
+        console.print(f"Model file: {file}", soft_wrap=True)
 
 
 def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:
@@ -31,14 +43,20 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
         f"along {model.axis}, {low:g} to {high:g} mm"
     )
     if fit.profile.tried:
-        table = Table(title="Cold profile: error at points left out", caption="! = chosen")
-        for heading in ("order", "terms", f"left out, {unit}"):
-            table.add_column(heading, justify="right")
-        for t in fit.profile.tried:
-            name = "spline" if t.through else _order(t.order)
-            mark = "!" if (t.order, t.through) == (fit.profile.order, fit.profile.through) else " "
-            table.add_row(f"{name}{mark}", str(t.n_terms), f"{t.left_out:.3f}")
-        console.print(table)
+        chosen = (fit.profile.order, fit.profile.through)
+        columns = (
+            Column(
+                "order",
+                lambda t: (
+                    ("spline" if t.through else _order(t.order)) + ("!" if (t.order, t.through) == chosen else " ")
+                ),
+                ">",
+            ),
+            Column("terms", lambda t: t.n_terms, ">"),
+            Column("left out", lambda t: f"{t.left_out:.3f}", ">", unit),
+        )
+        title = "Cold profile: error at points left out"
+        print_table(Layout(columns, fit.profile.tried, title, caption="! = chosen"), console)
     kind = f"{model.profile and model.profile.kind} of order {_order(fit.profile.order)}"
     console.print(f"Cold profile: {'natural spline through all points' if fit.profile.through else kind}")
     if fit.profile.words:
@@ -61,8 +79,8 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
             f"{fit.offset_remainder:.2f} {unit} are left; try --offset, or another --reference-position"
         )
     _show_judging(found, left_open, console)
-    console.print(_cycle_table(found))
-    console.print(f"{_verdict(found)} {escape(model.target)}: {escape(judged.reason)}")
+    print_table(_cycle_table(found), console)
+    console.print(f"{marked(_verdict(found))} {escape(model.target)}: {escape(judged.reason)}")
     if found.dropped:
         console.print(f"[yellow]but[/] the cold profile alone; its thermal part is left out: {escape(found.dropped)}")
 
@@ -77,27 +95,22 @@ def show_all(
     _show_notes(tests, console)
     states = sum(len(t) for t in tests[0])
     console.print(f"{len(found)} components, {states} profiles of each in {len(tests[0])} recording(s)")
-    table = Table(
-        caption="order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
+    caption = (
+        "order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
         "RMS over all points of unseen profiles, um or urad: without compensation, less the cold profile, less the "
         "model; profile: the cold profile alone is taken"
     )
-    for heading in ("", "order", "factors", "at", "none", "cold", "model", "verdict"):
-        left = heading in ("", "factors", "verdict")
-        table.add_column(heading, justify="left" if left else "right", no_wrap=heading != "factors")
-    for f in found:
-        model, overall = f.fit.model, f.assessment.overall
-        turn = f"{model.reference_position:g}" if model.slopes else ""
-        errors = (f"{v:.2f}" for v in (overall.none, overall.geometric, overall.model))
-        table.add_row(
-            f"{model.target}, {model.unit}",
-            "spline" if f.fit.profile.through else "+".join(str(o) for o in f.fit.profile.order if o) or "0",
-            " ".join(f"k{k}" for k in model.powers) or "-",
-            turn,
-            *errors,
-            _verdict(f).replace("cold profile", "profile"),
-        )
-    console.print(table)
+    columns = (
+        Column("", lambda f: f"{f.fit.model.target}, {f.fit.model.unit}", whole=True),
+        Column("order", _orders, ">", whole=True),
+        Column("factors", lambda f: " ".join(f"k{k}" for k in f.fit.model.powers) or "-"),
+        Column("at", lambda f: f.fit.model.reference_position if f.fit.model.slopes else "", "g", whole=True),
+        Column("none", lambda f: f.assessment.overall.none, ".2f", whole=True),
+        Column("cold", lambda f: f.assessment.overall.geometric, ".2f", whole=True),
+        Column("model", lambda f: f.assessment.overall.model, ".2f", whole=True),
+        Column("verdict", lambda f: _verdict(f, "profile"), whole=True),
+    )
+    print_table(Layout(columns, found, caption=caption), console)
     _show_judging(found[0], left_open, console)
     for f in found:
         if not f.assessment.accepted:
@@ -106,56 +119,6 @@ def show_all(
             )
         elif f.dropped:
             console.print(f"[yellow]cold profile alone[/] {f.fit.model.target}: thermal part: {escape(f.dropped)}")
-
-
-def content(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any]:
-    """Return all about one component, as plain numbers."""
-    fit, judged = found.fit, found.assessment
-    model = fit.model
-    factors = []
-    for power, factor, errors in zip(model.powers, model.models, fit.coefficient_errors, strict=True):
-        honest = factor.honest_error
-        factors.append(
-            {
-                "power": power,
-                "unit": factor.unit,
-                "formula": factor.formula(),
-                "coefficients": factor.coefficients_by_name(),
-                "standard_errors": errors,
-                "intercept": factor.intercept,
-                "sensors": factor.sensors,
-                "unseen_rms": honest.rms if honest else None,
-                "none_rms": honest.none_rms if honest else None,
-            }
-        )
-    return {
-        "target": model.target,
-        "unit": model.unit,
-        "axis": model.axis,
-        "travel_mm": model.travel,
-        "reference_position_mm": model.reference_position,
-        "chosen_by_profiles": list(left_open),
-        "profile": {
-            "kind": model.profile.kind if model.profile else None,
-            "order": fit.profile.order,
-            "tried": [
-                {"order": t.order, "terms": t.n_terms, "left_out": t.left_out if math.isfinite(t.left_out) else None}
-                for t in fit.profile.tried
-            ],
-        },
-        "factors": factors,
-        "thermal_rms": fit.thermal_rms,
-        "remainders": {str(m): r for m, r in fit.remainders.items()},
-        "enough": fit.enough,
-        "offset_remainder": fit.offset_remainder,
-        "shifts": fit.shifts,
-        "judging": judged.protocol,
-        "cycles": [_cycle(c) for c in judged.cycles],
-        "overall": _cycle(judged.overall),
-        "verdict": judged.verdict.word,
-        "reason": judged.reason,
-        "thermal_part_left_out": found.dropped or None,
-    }
 
 
 def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
@@ -179,20 +142,28 @@ def _chosen(found: PositionStudy, left_open: Sequence[Setting]) -> str:
     return " ".join(told[name] for name in left_open if told[name])
 
 
-def _cycle_table(found: PositionStudy) -> Table:
+def _cycle_table(found: PositionStudy) -> Layout:
     judged = found.assessment
     told, which = judged.cycles, ""
     if len(told) > FEW:
         told = tuple(sorted(told, key=lambda c: c.none and -c.model / c.none)[:WORST])
         which = f"the {WORST} worst of {len(judged.cycles)}; "
-    table = Table(caption=f"{which}RMS over all points in {judged.unit}; max: largest error")
-    table.add_column("unseen")
-    for column in ("profiles", "none", "cold profile", "model", "none max", "model max"):
-        table.add_column(column, justify="right")
-    for c in (*told, judged.overall):
-        numbers = (c.none, c.geometric, c.model, c.none_max, c.model_max)
-        table.add_row(escape(c.cycle), str(c.n_states), *(f"{v:.2f}" for v in numbers))
-    return table
+    columns = (
+        Column("unseen", "cycle"),
+        Column("profiles", "profiles", ">"),
+        Column("none", "none_rms", ".2f"),
+        Column("cold profile", "cold_profile_rms", ".2f"),
+        Column("model", "rms", ".2f"),
+        Column("none max", "none_max", ".2f"),
+        Column("model max", "max", ".2f"),
+    )
+    caption = f"{which}RMS over all points in {judged.unit}; max: largest error"
+    return Layout(columns, [records.cycle(c) for c in (*told, judged.overall)], caption=caption)
+
+
+def _orders(found: PositionStudy) -> str:
+    profile = found.fit.profile
+    return "spline" if profile.through else "+".join(str(o) for o in profile.order if o) or "0"
 
 
 def _shortened(formula: str) -> str:
@@ -204,21 +175,9 @@ def _shortened(formula: str) -> str:
     return f"{formula[:cut]} ... and {more} terms more (--json has them)"
 
 
-def _verdict(found: PositionStudy) -> str:
+def _verdict(found: PositionStudy, alone: str = "cold profile") -> Toned:
     accepted = found.assessment.accepted
-    return "[yellow]cold profile[/]" if accepted and found.dropped else mark(found.assessment.verdict.word)
-
-
-def _cycle(c: CycleErrors) -> dict[str, Any]:
-    return {
-        "cycle": c.cycle,
-        "profiles": c.n_states,
-        "none_rms": c.none,
-        "cold_profile_rms": c.geometric,
-        "rms": c.model,
-        "none_max": c.none_max,
-        "max": c.model_max,
-    }
+    return Toned(alone, "doubtful") if accepted and found.dropped else verdict(found.assessment.verdict.word)
 
 
 def _order(order: tuple[int, int]) -> str:

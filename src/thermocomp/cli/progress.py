@@ -18,6 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from thermocomp.cli import loudness
 from thermocomp.core.shown import shown
 
 #: without a terminal a line is told so often; work that takes less time tells none [s]
@@ -40,7 +41,8 @@ class Share(Protocol):
 
 @contextmanager
 def by_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
-    """Show how many of so many steps are done; nothing if `hidden`."""
+    """Show how many of so many steps are done; nothing if `hidden`, or if the command line wants it quiet."""
+    hidden = hidden or loudness.quiet
     with _bar(MofNCompleteColumn(), hidden) as bar:
         task = bar.add_task("working", total=total)
         line, done = _Lines(hidden), 0
@@ -49,14 +51,18 @@ def by_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
             nonlocal done
             done += steps
             bar.update(task, description=text, advance=steps)
-            line.tell(text, f"{done} of {total}")
+            if loudness.verbose:
+                loudness.tell(f"{text}: {done} of {total}")
+            else:
+                line.tell(text, f"{done} of {total}")
 
         yield tell
 
 
 @contextmanager
 def by_share(name: str, *, hidden: bool) -> Iterator[Share]:
-    """Show the percentage that is done; nothing if `hidden`."""
+    """Show the percentage that is done; nothing if `hidden`, or if the command line wants it quiet."""
+    hidden = hidden or loudness.quiet
     with _bar(TaskProgressColumn(), hidden) as bar:
         task = bar.add_task(name, total=1.0)
         line = _Lines(hidden)

@@ -7,25 +7,25 @@ from functools import partial
 from pathlib import Path
 
 from cyclopts import Group, Parameter
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from thermocomp.api.revision import outcome
 from thermocomp.api.revision.job import Done, Job
 from thermocomp.api.revision.job import revise as revise_program
 from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
 from thermocomp.api.revision.prepare import prepare_job
+from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import by_share
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.shown import shown
 from thermocomp.nc.rewrite.course import Bound
+from thermocomp.report.layout import Column, Layout
 
 #: lines from which on the time that one takes can be told
 MANY = 1000
 
-_console = Console(highlight=False)
 
 _GROUPS = {
     "The drift": Drifting,
@@ -88,10 +88,11 @@ def revise(
         0 done, 1 nothing was taken off and nothing written, 2 the program or something else cannot be used.
     """
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
+    loudness.tell(f"read {job.program}")
     # a pipe gets its lines on stderr, whatever stdout is for
     done = revise_program(job, partial(by_share, hidden=json and sys.stderr.isatty()))
     if json:
-        print_json(outcome.content(job, done, notes), _console)
+        print_json(outcome.content(job, done, notes))
     else:
         _show(job, done, notes)
     return 0 if done.written else 1
@@ -102,9 +103,9 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     revision = job.revision
 
     def say(mark: str, text: str) -> None:
-        _console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
+        console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
 
-    _console.print(
+    console.print(
         f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
         f"{revision.changed if done.written else 'none'} of them changed; "
         f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
@@ -112,7 +113,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
         soft_wrap=True,
     )
     say("", f"Start: {job.begun}; {job.method}")
-    _console.print(_bounds(done.bounds))
+    print_table(_bounds(done.bounds), console)
     if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
@@ -127,29 +128,30 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
         took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
-    _console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
     if done.written:
         say("", f"Written: {', '.join(map(str, job.paths.all()))}")
     else:
         say("[bold yellow]nothing written:[/]", outcome.nothing(job, done))
 
 
-def _bounds(bounds: Sequence[Bound]) -> Table:
-    table = Table(
-        caption="um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+def _bounds(bounds: Sequence[Bound]) -> Layout:
+    columns = (
+        Column("axis", lambda b: b.axis),
+        Column("drift from", lambda b: b.low, "um"),
+        Column("to", lambda b: b.high, "um"),
+        Column("in the cuts", lambda b: b.without, "um"),
+        Column("left in the cuts", lambda b: b.left, "um"),
+        Column("at line", lambda b: b.line or "", ">"),
+        Column("model", lambda b: _known(b, b.model), "um"),
+        Column("bound", lambda b: _known(b, b.most), "um"),
     )
-    table.add_column("axis")
-    for heading in ("drift from", "to", "in the cuts", "left in the cuts", "at line", "model", "bound"):
-        table.add_column(heading, justify="right")
-    for b in bounds:
-        cells = (b.low, b.high, b.without, b.left)
-        rest = ("not known",) * 2 if math.isnan(b.model) else (_um(b.model), _um(b.most))
-        table.add_row(b.axis, *map(_um, cells), str(b.line or ""), *rest)
-    return table
+    caption = "um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    return Layout(columns, bounds, caption=caption)
 
 
-def _um(value: float) -> str:
-    return f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+def _known(bound: Bound, value: float) -> str | float:
+    return "not known" if math.isnan(bound.model) else value
 
 
 def _many(n: int, what: str) -> str:

@@ -3,20 +3,16 @@
 from pathlib import Path
 from typing import Literal
 
-from rich.console import Console
-
 from thermocomp.cli.beginning import Beginning
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     OptionalOutput,
     Selector,
     Study,
 )
 from thermocomp.cli.progress import by_steps
+from thermocomp.cli.terminal import console
 
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
-
-_console = Console(highlight=False)
 
 
 def select(
@@ -61,15 +57,15 @@ def select(
     """
     settings.check(method)
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")
-    with needs("study"):
-        from thermocomp.assessment import selecting
-        from thermocomp.cli import output as out
+    from thermocomp.assessment import selecting
+    from thermocomp.cli import output as out
+
     samples, judging = ready.samples, ready.judging
     with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
         choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
-        with needs("study"):
-            from thermocomp.report import html
+        from thermocomp.report import html
+
         html.write_choices(choices, ready.tests, output)
-    out.show_choices(choices, output, ready.trouble, _console, as_json=json)
+    out.show_choices(choices, output, ready.trouble, console, as_json=json)
     return 0

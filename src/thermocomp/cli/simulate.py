@@ -3,18 +3,15 @@
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
 
-from thermocomp.cli.extras import needs
 from thermocomp.cli.options import (
     OptionalOutput,
     Quiet,
 )
 from thermocomp.cli.progress import by_steps
+from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
-
-_console = Console(highlight=False)
 
 
 def simulate(
@@ -55,12 +52,12 @@ def simulate(
     int
         0 done.
     """
-    with needs("study"):
-        from thermocomp.cli import output as out
-        from thermocomp.datasets import virtual
-        from thermocomp.files import recordings
+    from thermocomp.cli import output as out
+    from thermocomp.datasets import virtual
+    from thermocomp.files import recordings
+
     if list_:
-        out.show_experiments([virtual.find(name) for name in virtual.EXPERIMENTS], _console, as_json=json)
+        out.show_experiments([virtual.find(name) for name in virtual.EXPERIMENTS], console, as_json=json)
         return 0
     if experiment is None or output is None:
         raise InputError("name an experiment and a file: thermocomp simulate demo -o drift.parquet; see --list")
@@ -77,5 +74,5 @@ def simulate(
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)
     if not quiet:
-        out.show_simulated(tests, paths, _console, as_json=json)
+        out.show_simulated(tests, paths, console, as_json=json)
     return 0

@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thermocomp import __version__
 from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
+from thermocomp.report import records
 from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, plain, svg, thinned
-from thermocomp.report.html import environment
+from thermocomp.report.html import page
+from thermocomp.report.layout import Column, Layout
 
 #: what is drawn below each other, in this order
 _PANELS = {"spindle_speed": 1.0, "temperature": 2.4, "displacement": 2.4, "angle": 2.0, "position": 1.2, "feed": 1.0}
@@ -36,13 +37,9 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     -------
     str
     """
-    return (
-        environment()
-        .get_template("check.html")
-        .render(
-            version=__version__,
-            recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
-        )
+    return page(
+        "check.html",
+        recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
     )
 
 
@@ -177,33 +174,23 @@ def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
     kinds: dict[str, list[str]] = {}
     for number, f in enumerate(found, start=1):
         kinds.setdefault(f.channel, []).append(f"{number} {f.kind}")
-    channels = []
-    for c in r.channels:
-        values = r.table[c.name].to_numpy(dtype=np.float64)
-        finite = values[np.isfinite(values)]
-        channels.append(
-            {
-                "name": c.name,
-                "quantity": c.quantity.replace("_", " "),
-                "unit": c.unit,
-                "place": c.place,
-                "low": f"{finite.min():.4g}" if finite.size else "",
-                "high": f"{finite.max():.4g}" if finite.size else "",
-                "missing": len(values) - finite.size,
-                "found": kinds.get(c.name, []),
-            }
-        )
+    told = records.recording(r, found)
+    columns = (
+        Column("channel", "name"),
+        Column("quantity", lambda c: c["quantity"].replace("_", " ")),
+        Column("unit", "unit"),
+        Column("place", "place"),
+        *records.RANGE,
+        Column("found", lambda c: ", ".join(kinds.get(c["name"], []))),
+    )
     return {
-        "name": r.name,
+        **told,
         "file": r.source.replace("\\", "/").rsplit("/", 1)[-1] or r.name,
-        "rows": len(r),
-        "hours": (r.time[-1] - r.time[0]) / 3600,
-        "interval": r.sampling_interval,
         "start": r.start,
-        "cycles": [{"name": c.name, "rows": f"{c.start}-{c.stop - 1}"} for c in r.cycles],
-        "channels": channels,
-        "worst": found[0].severity if found else "",
-        "findings": found,
+        "channels": Layout(columns, told["channels"]),
+        "cycle_table": Layout(
+            (Column("cycle", "name"), Column("rows", lambda c: f"{c['start']}-{c['stop'] - 1}", ">")), told["cycles"]
+        ),
         "counts": {s: sum(f.severity == s for f in found) for s in ("trouble", "warning", "info")},
         "notes": [n for n in r.notes if n not in {f.text for f in found}],
         "figure": draw(r, found),

@@ -1,17 +1,18 @@
 """Numbers, then a dict, then a template, then one offline HTML file."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from thermocomp import __version__
-from thermocomp.assessment.choice import Choice, written
+from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.results import Comparison
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report import figures, selections
+from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
 
 
@@ -30,7 +31,6 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
     -------
     str
     """
-    pages = environment()
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -45,7 +45,8 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             ]
             drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
     stressed = dict.fromkeys(model for model, _ in drawn.values())
-    return pages.get_template("report.html").render(
+    return page(
+        "report.html",
         **summarise(comparison, recordings, samples),
         measured=[figures.measured(r) for r in recordings],
         overview=figures.overview(comparison),
@@ -71,16 +72,12 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
     -------
     str
     """
-    return (
-        environment()
-        .get_template("selection.html")
-        .render(
-            version=__version__,
-            recordings=[r.source or r.name for r in recordings],
-            method=choices[0].method,
-            choices=choices,
-            figures=[selections.draw(c) for c in choices],
-        )
+    return page(
+        "selection.html",
+        recordings=[r.source or r.name for r in recordings],
+        method=choices[0].method,
+        choices=choices,
+        figures=[selections.draw(c) for c in choices],
     )
 
 
@@ -103,6 +100,11 @@ def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, s
     path.write_text(render(comparison, recordings, samples), encoding="utf-8")
 
 
+def page(template: str, **content: Any) -> str:
+    """Return a page of a template; all of them name the version."""
+    return environment().get_template(template).render(version=__version__, **content)
+
+
 def environment() -> Environment:
     """Return what makes the pages: the templates with their filters."""
     pages = Environment(
@@ -112,13 +114,7 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    pages.filters["um"] = _number
+    pages.filters["um"] = in_um
     pages.filters["hours"] = lambda value: f"{value:.1f}"
-    pages.filters["cell"] = written
+    pages.filters["laid_out"] = laid_out
     return pages
-
-
-def _number(value: float | None) -> str:
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # no minus zero

@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from thermocomp import __version__
 from thermocomp.iso230 import tables
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.settling import Settling
 from thermocomp.iso230.thermaltest import TITLES, ThermalTest
 from thermocomp.recording.recording import Recording
 from thermocomp.report import iso230figures as figures
-from thermocomp.report.html import environment
+from thermocomp.report.html import page
 
 #: recordings with the time constants of their channels
 Settlings = Sequence[tuple[Recording, Sequence[Settling]]]
@@ -30,30 +29,26 @@ def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Seq
     str
     """
     names = [t.name for t in thermal] + list(dict.fromkeys(Path(r.test.source).name for r in positioned))
-    return (
-        environment()
-        .get_template("iso230.html")
-        .render(
-            version=__version__,
-            names=names,
-            thermal=[
-                {
-                    "title": TITLES[t.kind],
-                    "test": t,
-                    "figure": figures.thermal(t),
-                    "profiles": [figures.profiles(t, k) for k in range(len(t.targets))],
-                    "tables": tables.thermal_tables(t),
-                }
-                for t in thermal
-            ],
-            settlings=[
-                {"name": r.name, "figure": figures.time_constants(mine), "tables": tables.time_constant_tables(mine)}
-                for r, mine in settlings
-                if mine
-            ],
-            positioned=[(r, figures.positioning(r)) for r in positioned],
-            positioning_tables=tables.positioning_tables(positioned),
-        )
+    return page(
+        "iso230.html",
+        names=names,
+        thermal=[
+            {
+                "title": TITLES[t.kind],
+                "test": t,
+                "figure": figures.thermal(t),
+                "profiles": [figures.profiles(t, k) for k in range(len(t.targets))],
+                "tables": tables.thermal_tables(t),
+            }
+            for t in thermal
+        ],
+        settlings=[
+            {"name": r.name, "figure": figures.time_constants(mine), "tables": tables.time_constant_tables(mine)}
+            for r, mine in settlings
+            if mine
+        ],
+        positioned=[(r, figures.positioning(r)) for r in positioned],
+        positioning_tables=tables.positioning_tables(positioned),
     )
 
 

@@ -1,26 +1,29 @@
 """A comparison as plain numbers and text: what the template prints."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from thermocomp import __version__
 from thermocomp.assessment import coverage, do_no_harm
+from thermocomp.assessment.choice import Table
 from thermocomp.assessment.metrics import METRICS
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.robustness import Robustness
+from thermocomp.core.validity import Validity
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.report import records
 from thermocomp.report.running import told
 
 #: rows that are unlike the training are a caution if their RMS is so many times that of all rows
 WORSE = 1.25
 #: metrics of the big table, in its order
-TABLE = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
+SHOWN = ("mae", "rms", "max_abs", "peak_to_peak", "reduction")
 
 
 def summarise(
@@ -42,12 +45,9 @@ def summarise(
     """
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     return {
-        "version": __version__,
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
-        "covered": None
-        if samples is None
-        else coverage.table({"judged": coverage.cover(samples, comparison.judging, recordings)}),
+        "covered": None if samples is None else _covered(coverage.cover(samples, comparison.judging, recordings)),
         "cautions": cautions(comparison),
         "running": told(comparison.overall()),
         "starts": [start.told(name) for name, start in comparison.starts],
@@ -58,7 +58,7 @@ def summarise(
             {"name": m, "summary": METHODS[m].summary if m in METHODS else "an estimator that was handed in"}
             for m in _models(comparison)
         ],
-        "metrics": [METRICS[name] for name in TABLE],
+        "metrics": [METRICS[name] for name in SHOWN],
         "condition_number": comparison.collinearity.condition_number,
         "vif": sorted(
             zip(comparison.collinearity.names, comparison.collinearity.vif, strict=True), key=lambda v: -v[1]
@@ -131,6 +131,12 @@ def unlike(r: Robustness) -> str:
     )
 
 
+def _covered(judged: Validity) -> Table:
+    table = coverage.table({"judged": judged})
+    for_these = "The errors above speak for these conditions; beyond them nobody has looked."
+    return replace(table, caption=f"{table.caption} {for_these}")
+
+
 def _models(comparison: Comparison) -> list[str]:
     return list(dict.fromkeys(a.model for a in comparison.assessments))
 
@@ -142,8 +148,8 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
     cycles = [u.name for u in max((a.verdict.units for a in overall), key=len)]
     return {
         "name": target,
-        "none": {m: none.none_metric(m) for m in TABLE if m != "reduction"},
-        "rows": [_row(a, best) for a in overall],
+        "none": {m: none.none_metric(m) for m in SHOWN if m != "reduction"},
+        "rows": overall,
         "cycles": cycles,
         "per_cycle": [
             {"model": a.model, "cells": [{u.name: u for u in a.verdict.units}.get(name) for name in cycles]}
@@ -151,28 +157,6 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
         ],
         "best": best.model if best else None,
         "formula": _formula(comparison, best, samples),
-    }
-
-
-def _row(a: Assessment, best: Assessment | None) -> dict[str, Any]:
-    r = a.robustness
-    return {
-        "model": a.model,
-        "values": {m: a.metric(m) for m in TABLE},
-        "word": a.word,
-        "alone": a.alone_metric("rms"),
-        "reason": a.reason,
-        "best": best is not None and a.model == best.model,
-        "sensors": a.sensors,
-        "n_sensors": a.n_sensors,
-        "n_effective": a.n_effective,
-        "rows": len(a.measured),
-        "fit_s": a.fit_s,
-        "noise": {law: mean for law, (mean, _) in r.noise_rms.items()} if r else None,
-        "lost": r.worst_lost if r else None,
-        "harm": r.harm if r else "",
-        "worse_than_none": r.worse_than_none if r else (),
-        "outside": r.outside if r else None,
     }
 
 
@@ -203,21 +187,13 @@ def _formula(comparison: Comparison, best: Assessment | None, samples: Samples |
 
 def _recording(r: Recording) -> dict[str, Any]:
     return {
-        "name": r.name,
+        **records.recording(r, check(r)),
         "file": r.source.replace("\\", "/").rsplit("/", 1)[-1] or r.name,
         "sha256": r.sha256,
         "start": r.start,
-        "rows": len(r),
-        "hours": (r.time[-1] - r.time[0]) / 3600,
-        "interval": r.sampling_interval,
         "temperatures": len(r.temperatures),
         "displacements": [c.name for c in r.displacements],
-        "cycles": [
-            {"name": c.name, "rows": f"{c.start}-{c.stop - 1}", "hours": (r.time[c.stop - 1] - r.time[c.start]) / 3600}
-            for c in r.cycles
-        ],
-        "findings": check(r),
-        "notes": r.notes,
+        "cycle_hours": [(r.time[c.stop - 1] - r.time[c.start]) / 3600 for c in r.cycles],
     }
 
 

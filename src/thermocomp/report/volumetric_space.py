@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib import colormaps
@@ -10,6 +11,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -57,34 +59,7 @@ def boxes(study: Volumetric) -> str:
                 )
             ):
                 ax = axes[row, column]
-                for points, face in _lines(study):
-                    ax.plot(
-                        *_seen(points[[0, -1]]).T,
-                        color="#b5b5b5",
-                        lw=0.4 if face else 0.9,
-                        ls="-" if face else (0, (4, 2)),
-                    )
-                    found = error(points)
-                    bent = _seen(points + 1e-3 * magnified * found)
-                    pieces = np.stack([bent[:-1], bent[1:]], axis=1)
-                    length = np.linalg.norm(found, axis=-1)
-                    colour = MAGNITUDE(norm(0.5 * (length[:-1] + length[1:])))
-                    ax.add_collection(
-                        LineCollection(list(pieces), colors=colour, linewidths=0.6 if face else 1.9, capstyle="round")
-                    )
-                found = error(travels)
-                start, way = _seen(travels), _seen(1e-3 * magnified * found)
-                ax.quiver(
-                    *start.T,
-                    *way.T,
-                    angles="xy",
-                    scale_units="xy",
-                    scale=1,
-                    units="inches",
-                    width=0.014,
-                    color=MEASURED,
-                    zorder=5,
-                )
+                _bent(ax, study, error, magnified, norm)
                 ax.set_title(f"{title}\nRMS {size.rms:.1f} um, largest {size.largest:.1f} um", fontsize=8.5)
                 _bare(ax, room)
                 _triad(ax, study)
@@ -126,36 +101,18 @@ def sections(study: Volumetric, moment: Moment) -> str:
             norm = BoundaryNorm(levels, MAGNITUDE.N)
             key = _nice(largest)
             for ax, plane, error, (first, second, u, v, _, _) in zip(panels, planes, found, drawn, strict=True):
-                ax.contourf(u, v, np.linalg.norm(error, axis=-1), levels, cmap=MAGNITUDE, norm=norm)
-                arrows = ax.quiver(
-                    u[_EVERY],
-                    v[_EVERY],
-                    error[_EVERY, _EVERY, first],
-                    error[_EVERY, _EVERY, second],
-                    angles="xy",
-                    scale_units="xy",
-                    scale=key / (0.18 * min(min(s) for s in spans)),
-                    units="inches",
-                    width=0.022,
-                    color="black",
-                    edgecolor="white",
-                    linewidth=0.4,
-                )
-                ax.set_aspect("equal")
-                ax.grid(visible=False)
+                arrows = _section(ax, error, (u, v), (first, second), key / (0.18 * min(min(s) for s in spans)), levels)
                 ax.set_ylabel(f"{plane[1]} [mm]")
-                ax.xaxis.set_major_locator(MaxNLocator(4))
-                ax.yaxis.set_major_locator(MaxNLocator(4))
                 ax.set_title("after the straight lines" if row else _plane_named(study, plane))
                 if row or len(planes) == 1:
                     ax.set_xlabel(f"{plane[0]} [mm]")
             mappable, shrink = ScalarMappable(norm, MAGNITUDE), 1.0 if len(planes) > 1 else 0.7
             bar = figure.colorbar(mappable, ax=panels, label="length of the error [um]", aspect=18, shrink=shrink)
-            keys.append((arrows, bar.ax, key))
+            keys.append((ax, arrows, bar.ax, key))
         figure.draw_without_rendering()  # where the bars stand is known once the figure is laid out
-        for arrows, beside, key in keys:
+        for ax, arrows, beside, key in keys:
             box = beside.get_position()
-            arrows.axes.quiverkey(
+            ax.quiverkey(
                 arrows,
                 box.x1 + 0.03,
                 box.y0 - 0.2 / figure.get_figheight(),
@@ -165,6 +122,74 @@ def sections(study: Volumetric, moment: Moment) -> str:
                 coordinates="figure",
             )
         return svg(figure)
+
+
+def _bent(
+    ax: Axes, study: Volumetric, error: Callable[[FloatArray], FloatArray], magnified: float, norm: Normalize
+) -> None:
+    """Draw the work volume, how an error bends it, and the error at its corners."""
+    for points, face in _lines(study):
+        ax.plot(
+            *_seen(points[[0, -1]]).T,
+            color="#b5b5b5",
+            lw=0.4 if face else 0.9,
+            ls="-" if face else (0, (4, 2)),
+        )
+        found = error(points)
+        bent = _seen(points + 1e-3 * magnified * found)
+        pieces = np.stack([bent[:-1], bent[1:]], axis=1)
+        length = np.linalg.norm(found, axis=-1)
+        colour = MAGNITUDE(norm(0.5 * (length[:-1] + length[1:])))
+        ax.add_collection(
+            LineCollection(list(pieces), colors=colour, linewidths=0.6 if face else 1.9, capstyle="round")
+        )
+    travels = over_travel(study.machine, 2).reshape(-1, 3)
+    found = error(travels)
+    start, way = _seen(travels), _seen(1e-3 * magnified * found)
+    ax.quiver(
+        *start.T,
+        *way.T,
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        units="inches",
+        width=0.014,
+        color=MEASURED,
+        zorder=5,
+    )
+
+
+def _section(
+    ax: Axes,
+    error: FloatArray,
+    places: tuple[FloatArray, FloatArray],
+    axes: tuple[int, int],
+    scale: float,
+    levels: FloatArray,
+) -> Quiver:
+    """Draw the length of the error in colour and its part in the plane as arrows, which are returned."""
+    (u, v), (first, second) = places, axes
+    norm = BoundaryNorm(levels, MAGNITUDE.N)
+    ax.contourf(u, v, np.linalg.norm(error, axis=-1), levels, cmap=MAGNITUDE, norm=norm)
+    arrows = ax.quiver(
+        u[_EVERY],
+        v[_EVERY],
+        error[_EVERY, _EVERY, first],
+        error[_EVERY, _EVERY, second],
+        angles="xy",
+        scale_units="xy",
+        scale=scale,
+        units="inches",
+        width=0.022,
+        color="black",
+        edgecolor="white",
+        linewidth=0.4,
+    )
+    ax.set_aspect("equal")
+    ax.grid(visible=False)
+    ax.xaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    return arrows
 
 
 def _plane_named(study: Volumetric, plane: str) -> str:

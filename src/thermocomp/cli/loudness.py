@@ -1,0 +1,48 @@
+"""How much stands on stderr: ``--quiet``, ``--verbose``; taken off the command line before a command sees it."""
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.shown import shown
+
+if TYPE_CHECKING:
+    from thermocomp.recording.recording import Recording
+
+FLAGS = {
+    "--quiet": "Nothing on the error stream but errors: no progress, no trouble of recordings.",
+    "--verbose": "More on the error stream: what is read, what is worked on, how long it took; all of an unexpected "
+    "error.",
+}
+
+#: of the command line that is being run
+quiet = verbose = False
+
+
+def taken_off(words: Sequence[str]) -> list[str]:
+    """Return a command line without the flags, wherever they stand; they hold until the next one is run.
+
+    Raises
+    ------
+    InputError
+        Both are there.
+    """
+    global quiet, verbose  # noqa: PLW0603 - one process runs one command line
+    quiet, verbose = (flag in words for flag in FLAGS)
+    if quiet and verbose:
+        quiet = verbose = False
+        raise InputError("--quiet and --verbose exclude each other: choose one")
+    return [word for word in words if word not in FLAGS]
+
+
+def tell(text: str) -> None:
+    """Write a line on stderr, if more is wanted there."""
+    if verbose:
+        print(shown(text), file=sys.stderr, flush=True)
+
+
+def tell_read(recordings: "Sequence[Recording]") -> None:
+    """Write what was read on stderr, if more is wanted there."""
+    for r in recordings:
+        tell(f"read {r.source or r.name}: {len(r)} rows, {len(r.table.columns)} columns")

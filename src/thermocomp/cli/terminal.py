@@ -1,0 +1,53 @@
+"""What a terminal shows: tables, and words that stand out."""
+
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from thermocomp.report.layout import Layout, Toned, verdict
+
+#: of all commands
+console = Console(highlight=False)
+
+_TONES = {"good": "green", "doubtful": "yellow", "bad": "red", "grave": "bold red", "soft": "dim", "strong": "bold"}
+_ROWS = {"best": "bold green", "none": "dim"}
+
+
+def marked(text: str) -> str:
+    """Return text for rich, in its tone if it has one."""
+    return f"[{_TONES[text.tone]}]{escape(text)}[/]" if isinstance(text, Toned) else escape(text)
+
+
+def mark(word: str) -> str:
+    """Return a verdict in its colour."""
+    return marked(verdict(word))
+
+
+def print_table(t: Layout, console: Console, **how: Any) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    t : Layout
+    console : Console
+    **how
+        Of `rich.table.Table`.
+    """
+    table = Table(title=escape(t.title) or None, caption=escape(t.caption) or None, **how)
+    for c in t.columns:
+        # what may be broken is folded, not cut; a number that finds no room shows that it is cut
+        table.add_column(
+            escape(f"{c.heading}, {c.unit}" if c.unit else c.heading),
+            justify="right" if c.form else "left",
+            no_wrap=c.whole,
+            overflow="ellipsis" if c.whole else "fold",
+        )
+    for k, row in enumerate(t.rows):
+        if k in t.sections:
+            table.add_section()
+        table.add_row(*(marked(c.text(row)) for c in t.columns), style=_ROWS.get(t.tone(k)))
+    console.print(table)
+    if t.note:
+        console.print(escape(t.note), style="dim")

@@ -1,0 +1,209 @@
+"""Results as plain numbers and words: what ``--json`` prints, and what tables look at."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from thermocomp.assessment.position import CycleErrors, PositionStudy
+from thermocomp.assessment.results import Assessment
+from thermocomp.core.machine import Channel
+from thermocomp.core.model import ErrorModel
+from thermocomp.models.positionoptions import Setting
+from thermocomp.recording.findings import Finding
+from thermocomp.recording.recording import Recording
+from thermocomp.report.layout import Column
+
+#: of channels: from where to where they went, and what is missing
+RANGE = (
+    Column("smallest", "smallest", ".4g"),
+    Column("largest", "largest", ".4g"),
+    Column("missing", lambda c: c["missing"] or "", ">"),
+)
+
+
+def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
+    """Return a recording and its findings as plain numbers and text."""
+    return {
+        "name": r.name,
+        "source": r.source,
+        "rows": len(r),
+        "hours": float(r.time[-1] - r.time[0]) / 3600,
+        "sampling_interval_s": r.sampling_interval,
+        "channels": [_channel(r, c) for c in r.channels],
+        "cycles": [{"name": c.name, "start": c.start, "stop": c.stop} for c in r.cycles],
+        "notes": list(r.notes),
+        "worst": found[0].severity if found else None,
+        "findings": [
+            {
+                "severity": f.severity,
+                "kind": f.kind,
+                "channel": f.channel,
+                "text": f.text,
+                "row": f.row,
+                "rows": None if f.rows is None else stretches(f.rows),
+            }
+            for f in found
+        ],
+    }
+
+
+def _channel(r: Recording, c: Channel) -> dict[str, Any]:
+    values = r.table[c.name].to_numpy(dtype=np.float64)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
+    return {
+        "name": c.name,
+        "quantity": c.quantity,
+        "unit": c.unit,
+        "place": c.place,
+        "smallest": low,
+        "largest": high,
+        "missing": len(values) - finite.size,
+    }
+
+
+def stretches(rows: Sequence[int] | np.ndarray[Any, Any]) -> list[list[int]]:
+    """Return rows as stretches: first row, and the row after the last."""
+    ordered = np.unique(rows)
+    cuts = [0, *(np.flatnonzero(np.diff(ordered) > 1) + 1).tolist(), len(ordered)]
+    return [[int(ordered[a]), int(ordered[b - 1]) + 1] for a, b in pairwise(cuts)] if len(ordered) else []
+
+
+def assessment(a: Assessment) -> dict[str, Any]:
+    """Return how a model did on a target, in a block or over all."""
+    content: dict[str, Any] = {
+        "model": a.model,
+        "target": a.target,
+        "block": a.block,
+        "mae_um": a.metric("mae"),
+        "rms_um": a.metric("rms"),
+        "max_um": a.metric("max_abs"),
+        "alone_mae_um": a.alone_metric("mae"),
+        "alone_rms_um": a.alone_metric("rms"),
+        "alone_max_um": a.alone_metric("max_abs"),
+        "peak_to_peak_um": a.metric("peak_to_peak"),
+        "none_mae_um": a.none_metric("mae"),
+        "none_rms_um": a.none_metric("rms"),
+        "none_peak_to_peak_um": a.none_metric("peak_to_peak"),
+        "reduction_pct": a.metric("reduction"),
+        "verdict": a.word,
+        "reason": a.reason,
+        "p_value": a.verdict.p_value if a.verdict.units else None,
+        "tried": a.verdict.tried,
+        "units": [
+            {
+                "name": u.name,
+                "rms_um": u.rms,
+                "none_rms_um": u.none_rms,
+                "baselines_rms_um": dict(zip(a.verdict.names, u.baselines, strict=False)),
+                "margin_um": u.margin,
+                "harmful": u.harmful,
+            }
+            for u in a.verdict.units
+        ],
+        "sensors": list(a.sensors),
+        "n_sensors": a.n_sensors[1],
+        "n_sensors_least": a.n_sensors[0],
+        "fit_s": a.fit_s,
+        "n_rows": len(a.measured),
+        "n_rows_learned_from": a.learned,
+        "n_effective": a.n_effective,
+        "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
+        "readings_turned_away": a.rejected,
+        "first_turned_away": a.turned_away,
+    }
+    if a.robustness is not None:
+        r = a.robustness
+        content["robustness"] = {
+            "noise_degC": r.noise,
+            "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
+            "lost_sensor_rms_um": r.lost_rms,
+            "worse_than_none": list(r.worse_than_none),
+            "unlike_training_pct": 100 * r.unlike,
+            "unlike_training_rms_um": r.unlike_rms,
+            "outside_range_pct": 100 * r.outside,
+            "outside_range_rms_um": r.outside_rms,
+        }
+    return content
+
+
+def model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
+    """Return a frozen model with its honest error."""
+    honest = m.honest_error
+    return {
+        "target": m.target,
+        "unit": m.unit,
+        "family": m.family,
+        "formula": m.formula(),
+        "coefficients": m.coefficients_by_name(),
+        "intercept": m.intercept,
+        "r_squared": r_squared,
+        "sensors": list(m.sensors),
+        "unseen_rms_um": honest.rms if honest else None,
+        "none_rms_um": honest.none_rms if honest else None,
+        "verdict": honest.word if honest else None,
+        "reason": honest.why if honest else None,
+    }
+
+
+def position(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, Any]:
+    """Return all about one component, as plain numbers; its choices are those of the settings that were left open."""
+    fit, judged = found.fit, found.assessment
+    model = fit.model
+    factors = []
+    for power, factor, errors in zip(model.powers, model.models, fit.coefficient_errors, strict=True):
+        honest = factor.honest_error
+        factors.append(
+            {
+                "power": power,
+                "unit": factor.unit,
+                "formula": factor.formula(),
+                "coefficients": factor.coefficients_by_name(),
+                "standard_errors": errors,
+                "intercept": factor.intercept,
+                "sensors": factor.sensors,
+                "unseen_rms": honest.rms if honest else None,
+                "none_rms": honest.none_rms if honest else None,
+            }
+        )
+    return {
+        "target": model.target,
+        "unit": model.unit,
+        "axis": model.axis,
+        "travel_mm": model.travel,
+        "reference_position_mm": model.reference_position,
+        "chosen_by_profiles": list(left_open),
+        "profile": {
+            "kind": model.profile.kind if model.profile else None,
+            "order": fit.profile.order,
+            "tried": [{"order": t.order, "terms": t.n_terms, "left_out": t.left_out} for t in fit.profile.tried],
+        },
+        "factors": factors,
+        "thermal_rms": fit.thermal_rms,
+        "remainders": {str(m): r for m, r in fit.remainders.items()},
+        "enough": fit.enough,
+        "offset_remainder": fit.offset_remainder,
+        "shifts": fit.shifts,
+        "judging": judged.protocol,
+        "cycles": [cycle(c) for c in judged.cycles],
+        "overall": cycle(judged.overall),
+        "verdict": judged.verdict.word,
+        "reason": judged.reason,
+        "thermal_part_left_out": found.dropped or None,
+    }
+
+
+def cycle(c: CycleErrors) -> dict[str, Any]:
+    """Return the errors of profiles that were not seen."""
+    return {
+        "cycle": c.cycle,
+        "profiles": c.n_states,
+        "none_rms": c.none,
+        "cold_profile_rms": c.geometric,
+        "rms": c.model,
+        "none_max": c.none_max,
+        "max": c.model_max,
+    }
