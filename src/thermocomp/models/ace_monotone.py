@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import isotonic_regression
 
 from thermocomp.core.additive import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.ace import TransformRegressor
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.base import FloatArray
 
 _SAME = 1e-9  # share of its size by which a channel must vary, else it counts as constant: no sensor has as many digits
 
@@ -74,25 +72,7 @@ class MonotoneACE(TransformRegressor):
         self.max_sweeps = max_sweeps
         self.max_rows = max_rows
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "MonotoneACE":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        MonotoneACE
-
-        Raises
-        ------
-        InputError
-            A setting is out of its range.
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.points < 3 or self.max_sweeps < 1 or self.max_rows < 2:
             raise InputError(
                 f"MonotoneACE: want points >= 3, max_sweeps >= 1 and max_rows >= 2, "
@@ -103,10 +83,8 @@ class MonotoneACE(TransformRegressor):
                 f"MonotoneACE: want smoothing > 0, shrinkage > 0, extend >= 0 and tolerance >= 0, "
                 f"found {self.smoothing}, {self.shrinkage}, {self.extend} and {self.tolerance}"
             )
-        change, deviation = self._read(X, y)
         run = -(-len(deviation) // self.max_rows)
         self._alternate(_averaged(change, run), _averaged(deviation, run))
-        return self
 
     def _alternate(self, X: FloatArray, y: FloatArray) -> None:
         n, k = len(y), self.points

@@ -1,20 +1,18 @@
 """`grouping`: sensors by correlation grouping and successive regression (Hwang, Lee, Yang)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
 from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
 
-FloatArray = NDArray[np.float64]
 
-
-class CorrelationGrouping(TermRegressor):
+class CorrelationGrouping(StaticRegressor, TermRegressor):
     """Linear model of the temperatures that correlation grouping and successive regression choose (H-01).
 
     Temperatures are grouped by their correlation; successive regression makes one of each group its representative; the
@@ -27,6 +25,9 @@ class CorrelationGrouping(TermRegressor):
 
     With a `reference`, the temperatures themselves are grouped, without it, and regressed on are their differences from
     it (section 3.2.1; H-08). A temperature that is constant, or constant but for the reference, is left out.
+
+    A threshold beyond -1 to 1 is an `InputError`, and so is a reference that does not exist; a `FitError` if no
+    temperature varies, there are fewer than three rows (two without intercept), or there is too much to search.
 
     Parameters
     ----------
@@ -88,29 +89,7 @@ class CorrelationGrouping(TermRegressor):
         self.reference = reference
         self.fit_intercept = fit_intercept
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "CorrelationGrouping":
-        """Select and fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Temperatures minus their reference state.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        CorrelationGrouping
-
-        Raises
-        ------
-        InputError
-            A threshold beyond -1 to 1, or no such reference.
-        FitError
-            No temperature varies, there are fewer than three rows (two without intercept), or there is too much to
-            search.
-        """
-        change, deviation, _ = self._read(X, y)
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         names = self._names()
         zero = self._reference_index(names)
         values = change if zero is None else change - change[:, [zero]]
@@ -144,8 +123,7 @@ class CorrelationGrouping(TermRegressor):
             for i in self.selected_
         ]
         found = solve(values[:, self.candidates_], deviation, tri, columns=choice.selected)
-        self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total, self.fit_intercept)
-        return self
+        self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total)
 
     def log_text(self, target: str = "Y") -> str:
         """Return as text the groups, the curve of MSE_p, the model and how far its variables repeat each other.

@@ -5,14 +5,12 @@ from abc import abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import enet_path
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
-
-FloatArray = NDArray[np.float64]
 
 #: shares of the strength at which the last input drops out
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))

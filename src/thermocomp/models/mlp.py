@@ -6,16 +6,13 @@ from typing import Literal
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.network import Affine
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.nets import NetRegressor, thinned
 from thermocomp.models.numerics.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
-from thermocomp.models.numerics.folds import number_folds
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: hidden counts in a row that bring no gain and end a sweep
 PATIENCE = 2
@@ -164,14 +161,11 @@ class SigmoidNet(NetRegressor):
         Raises
         ------
         FitError
-            No row to learn from.
+            Fewer than two rows to learn from.
         InputError
             A setting is out of its range.
         """
-        change, deviation = self._read(X, y)
-        folds, left_out = number_folds(cycle, len(change))
-        learned = folds >= 0
-        change, deviation, folds = change[learned], deviation[learned], folds[learned]
+        change, deviation, folds, left_out = self._learned(X, y, cycle)
         self.sweep_: tuple[HiddenCount, ...] = ()
         if np.ndim(self.hidden):
             self._sweep(change, deviation, folds, left_out, progress)

@@ -1,13 +1,10 @@
 """`ols`: least squares on all inputs."""
 
-from numpy.typing import ArrayLike
-
-from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import solve, triangle
 
 
-class LeastSquares(TermRegressor):
+class LeastSquares(StaticRegressor, TermRegressor):
     """Linear least squares on all inputs: the method others are compared with (T-08).
 
     Inputs that depend on others get the coefficient 0 and are told in ``dependent_``; how this is decided says
@@ -31,23 +28,5 @@ class LeastSquares(TermRegressor):
     def __init__(self, *, fit_intercept: bool = True) -> None:
         self.fit_intercept = fit_intercept
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "LeastSquares":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        LeastSquares
-        """
-        change, deviation, both = self._read(X, y)
-        tri = triangle(both, intercept=self.fit_intercept)
-        found = solve(change, deviation, tri)
-        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
-        self._keep(found, variables, [(i,) for i in range(len(variables))], tri.total, self.fit_intercept)
-        return self
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
+        self._regress(change, deviation, range(self.n_features_in_))

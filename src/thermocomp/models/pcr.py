@@ -1,12 +1,10 @@
 """`pcr`: regression on the first principal components of the inputs."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
+from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
-
-FloatArray = NDArray[np.float64]
 
 
 class PrincipalComponents(ShrunkRegressor):

@@ -3,12 +3,10 @@
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.cross_decomposition import PLSRegression
 
+from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
-
-FloatArray = NDArray[np.float64]
 
 
 class PartialLeastSquares(ShrunkRegressor):

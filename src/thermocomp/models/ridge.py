@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.linear_model import ridge_regression
 
+from thermocomp.models.base import FloatArray
 from thermocomp.models.dynamic import STRENGTHS
 from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
-
-FloatArray = NDArray[np.float64]
 
 
 class Ridge(ShrunkRegressor):

@@ -8,14 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
 from thermocomp.models.selection.subsets import Subsets, best_subsets
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
 
@@ -148,7 +144,7 @@ class BestSubset(TermRegressor):
         Raises
         ------
         FitError
-            No row to learn from.
+            Fewer than two rows to learn from.
         InputError
             A setting makes no sense, or there are too many columns that depend on each other (see `max_size`).
         KeyboardInterrupt
@@ -159,13 +155,7 @@ class BestSubset(TermRegressor):
             raise InputError(
                 f"criterion {criterion!r}, size {self.size}: want mse, adjr2, cp, bic or cycles, and a size from 1 on"
             )
-        change, deviation, both = self._read(X, y)
-        folds, left_out = number_folds(cycle, len(change))
-        if (folds < 0).any():
-            learned = folds >= 0
-            change, deviation, folds = change[learned], deviation[learned], folds[learned]
-            both = table(change, deviation)
-            self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        change, deviation, folds, left_out = self._learned(X, y, cycle)
         sizes = self.size or self.max_size
         self.selected_: tuple[int, ...] = ()
         self.proven_, self.criterion_, self.chosen_by_ = True, "none", ""
@@ -187,10 +177,7 @@ class BestSubset(TermRegressor):
                 place = int(np.nanargmin(score)) if not np.isnan(score).all() else 0
             chosen = self.subsets_.best[place]
             self.selected_, self.proven_ = chosen.columns, chosen.proven
-        tri = triangle(both, intercept=self.fit_intercept)
-        found = solve(change, deviation, tri, columns=self.selected_)
-        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
-        self._keep(found, variables, [(i,) for i in self.selected_], tri.total, self.fit_intercept)
+        self._regress(change, deviation, self.selected_)
         return self
 
     def _search(self, X: FloatArray, y: FloatArray, sizes: int | None) -> Subsets:
