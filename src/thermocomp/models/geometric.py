@@ -154,20 +154,7 @@ def fit_profile(
     """
     there = np.isfinite(values)
     points, values = points[there], values[there]
-    varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
-    used = varying if coordinates is None else coordinates
-    if axis not in varying:
-        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
-    if kind not in ("polynomial", "spline"):
-        raise InputError(f"profile {kind!r}: choose polynomial or spline")
-    if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
-        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
-    others = "".join(a for a in used if a != axis and a in varying)
-    if kind == "spline" and others and coordinates is not None:
-        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
-    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
-    if n_own < MIN_POSITIONS:
-        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
+    others, n_own = _suited(points, axis, kind, coordinates)
     place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
     shape = _Spline(points, axis) if kind == "spline" else _Polynomial(points, axis, others)
     tried: list[Tried] = []
@@ -203,6 +190,25 @@ def fit_profile(
         misfit=_misfit(left, values, place, n_terms),
         through=through,
     )
+
+
+def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) -> tuple[str, int]:
+    """Refuse what no profile can be fitted to; return the other axes it depends on, and its positions along its own."""
+    varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
+    used = varying if coordinates is None else coordinates
+    if axis not in varying:
+        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
+    if kind not in ("polynomial", "spline"):
+        raise InputError(f"profile {kind!r}: choose polynomial or spline")
+    if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
+        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
+    others = "".join(a for a in used if a != axis and a in varying)
+    if kind == "spline" and others and coordinates is not None:
+        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
+    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
+    if n_own < MIN_POSITIONS:
+        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
+    return others, n_own
 
 
 def _choose(tried: Sequence[Tried], n_own: int) -> Tried:

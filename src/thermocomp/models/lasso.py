@@ -10,17 +10,15 @@ from sklearn.linear_model import enet_path
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import FloatArray
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
+from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
 #: shares of the strength at which the last input drops out
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
 _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; a change of either moves no figure
 
 
-class _Sparse(ShrunkRegressor):
+class _Sparse(PenalisedRegressor):
     """Linear regression with a penalty on the coefficients' absolute values."""
-
-    strengths: Sequence[float]
 
     @abstractmethod
     def _ratios(self) -> tuple[float, ...]:
@@ -42,8 +40,8 @@ class _Sparse(ShrunkRegressor):
         return paths
 
     def _note(self, which: int, setting: int) -> None:
+        super()._note(which, setting)
         self.l1_ratio_ = self._ratios()[which]
-        self.strength_ = float(sorted_strengths(self.strengths)[setting])
 
     @property
     def selected_(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils import Tags
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Network, Perceptron
 from thermocomp.models.base import FloatArray, IntArray, MemorylessRegressor
 from thermocomp.models.numerics.leastsquares import effective_sample_size
@@ -40,32 +40,17 @@ class NetRegressor(MemorylessRegressor):
         deviation = self.output_scaling_(self.net_.evaluate(self.input_scaling_(change)))
         return deviation[:, 0] if self._one_dimensional else deviation
 
-    def freeze(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-        output: int | None = None,
-    ) -> Network:
+    def freeze(self, *, inputs: Sequence[Input] | None = None, output: int | None = None, **header: Any) -> Network:
         """Return one output of the fitted net as plain numbers, without the inputs that never changed in training.
 
         Parameters
         ----------
-        target : str
-            Displacement channel (or error component) it predicts.
-        unit : str
-            Unit of the deviation it gives.
         inputs : sequence of Input, optional
-            One per feature; see `ThermalRegressor.freeze`.
-        support : Support
-            What the model does outside its trained range.
-        provenance : Provenance, optional
-            Where it comes from.
+            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         output : int, optional
             Column of y; must be given if y had several. Each column makes a model of its own.
+        **header
+            As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
         Returns
         -------
@@ -76,8 +61,7 @@ class NetRegressor(MemorylessRegressor):
         InputError
             `inputs` are not as many as the features, or there is no such output.
         """
-        header = {"target": target, "unit": unit, "support": support, "provenance": provenance}
-        return self._frozen(self._inputs(inputs), header, output)
+        return self._frozen(self._inputs(inputs), {"unit": "um", **header}, output)
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any], output: int | None = None) -> Network:
         net, into, out_of = self.net_, self.input_scaling_, self.output_scaling_

@@ -4,10 +4,10 @@ import numpy as np
 from scipy import linalg
 
 from thermocomp.models.base import FloatArray
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
+from thermocomp.models.shrinkage import ComponentRegressor
 
 
-class PrincipalComponents(ShrunkRegressor):
+class PrincipalComponents(ComponentRegressor):
     """Principal component regression, which Miao et al. use against collinear temperatures (T-10).
 
     Least squares on the first principal components of the standardised inputs, in the order of their variance; how
@@ -32,29 +32,9 @@ class PrincipalComponents(ShrunkRegressor):
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-
-    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        most = most_components(self.components or self.max_components, Z.shape[1])
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
         left, values, right = linalg.svd(Z, full_matrices=False, lapack_driver="gesvd")  # whatever the input, it ends
         steps = np.zeros((most, Z.shape[1]))
         for k in np.flatnonzero(values[:most] > 1e-10 * values.max(initial=0.0)):
             steps[k] = right[k] * ((left[:, k] @ y) / values[k])
-        paths = np.cumsum(steps, axis=0)
-        return paths[None] if self.components is None else paths[None, -1:]
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.n_components_ = (
-            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
-        )
+        return np.asarray(np.cumsum(steps, axis=0))

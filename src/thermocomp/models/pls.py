@@ -6,10 +6,10 @@ import numpy as np
 from sklearn.cross_decomposition import PLSRegression
 
 from thermocomp.models.base import FloatArray
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
+from thermocomp.models.shrinkage import ComponentRegressor
 
 
-class PartialLeastSquares(ShrunkRegressor):
+class PartialLeastSquares(ComponentRegressor):
     """Partial least squares (Wold): components that follow the deviation, not only the inputs' own variance.
 
     scikit-learn's `PLSRegression` on standardised inputs. Its components come one after the other, so one fit serves
@@ -34,21 +34,7 @@ class PartialLeastSquares(ShrunkRegressor):
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-
-    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        most = most_components(self.components or self.max_components, Z.shape[1])
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
         paths = np.zeros((most, Z.shape[1]))
         # beyond the rank, components would be made of rounding errors
         used = min(most, int(np.linalg.matrix_rank(Z, rtol=1e-8)))
@@ -60,9 +46,4 @@ class PartialLeastSquares(ShrunkRegressor):
                 model.fit(np.vstack([Z, -Z]), np.concatenate([y, -y]))
             paths[:used] = np.cumsum(model.x_rotations_ * model.y_loadings_[0], axis=1).T
             paths[used:] = paths[used - 1]
-        return paths[None] if self.components is None else paths[None, -1:]
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.n_components_ = (
-            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
-        )
+        return paths

@@ -7,10 +7,10 @@ from sklearn.linear_model import ridge_regression
 
 from thermocomp.models.base import FloatArray
 from thermocomp.models.dynamic import STRENGTHS
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
+from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
 
-class Ridge(ShrunkRegressor):
+class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: what `dynamic` is without its memory.
 
     scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving thermal cycles out.
@@ -48,6 +48,3 @@ class Ridge(ShrunkRegressor):
         copies = np.repeat(y[:, None], strengths.size, axis=1)
         weights: FloatArray = ridge_regression(Z, copies, alpha=len(y) * strengths, solver="svd")
         return weights.reshape(1, strengths.size, -1)
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.strength_ = float(sorted_strengths(self.strengths)[setting])

@@ -1,6 +1,7 @@
 """What linear regressions share that are chosen from a path of ever richer ones by leaving thermal cycles out."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -131,6 +132,68 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
         )
         total = float(np.sum((y - (y.mean() if self.fit_intercept else 0.0)) ** 2))
         self._keep(found, self._inputs_alone(), [(i,) for i in range(len(weights))], total)
+
+
+class PenalisedRegressor(ShrunkRegressor):
+    """Linear regression with a penalty on the coefficients, whose strength is chosen.
+
+    Attributes
+    ----------
+    strength_ : float
+        Chosen strength.
+    """
+
+    strengths: Sequence[float]
+
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - one set has the same strengths as another
+        self.strength_ = float(sorted_strengths(self.strengths)[setting])
+
+
+class ComponentRegressor(ShrunkRegressor):
+    """Linear regression on the first of some components of the inputs, whose number is chosen.
+
+    Parameters
+    ----------
+    components : int, optional
+        Do not choose: so many components, or as many as can be.
+    max_components : int, optional
+        Most to choose from; as many as inputs if not given.
+    rule : {'one-standard-error', 'minimum'}
+        How the number of components is chosen.
+    fit_intercept : bool
+        False: the model gives zero in the reference state, and the components are those about zero.
+
+    Attributes
+    ----------
+    n_components_ : int
+        Chosen number.
+    """
+
+    def __init__(
+        self,
+        *,
+        components: int | None = None,
+        max_components: int | None = None,
+        rule: Rule = "one-standard-error",
+        fit_intercept: bool = True,
+    ) -> None:
+        self.components = components
+        self.max_components = max_components
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+
+    @abstractmethod
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
+        """Return the weights on standardised inputs with 1, 2, ... components, (most, n_features)."""
+
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        path = self._path(Z, y, most_components(self.components or self.max_components, Z.shape[1]))
+        return path[None] if self.components is None else path[None, -1:]
+
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
+        self.n_components_ = (
+            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
+        )
 
 
 def sorted_strengths(strengths: ArrayLike) -> FloatArray:

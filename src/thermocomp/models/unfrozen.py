@@ -12,7 +12,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.expression import Node
-from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.core.model import ErrorModel, Input
 from thermocomp.models.base import FloatArray, StaticRegressor
 
 
@@ -27,23 +27,18 @@ class UnfrozenRegressor(StaticRegressor):
         """Return why it cannot be frozen, in words."""
 
     def unfrozen(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-        rows: FloatArray | None = None,
+        self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
     ) -> "EstimatorModel":
         """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
 
         Parameters
         ----------
-        target, unit, inputs, support, provenance
-            As in `thermocomp.models.base.ThermalRegressor.freeze`.
+        inputs : sequence of Input, optional
+            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         rows : ndarray of shape (n_rows, n_features), optional
             Inputs minus their reference that it will be asked for: predicted at once, which is much faster.
+        **header
+            As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
         Returns
         -------
@@ -57,11 +52,8 @@ class UnfrozenRegressor(StaticRegressor):
         except PicklingError:  # a class from inside a function: its predictions stand for it
             fingerprint = str(joblib.hash((self.name, self.data_min_, self.data_max_, made)))
         return EstimatorModel(
-            target=target,
-            unit=unit,
+            **{"unit": "um", **header},
             inputs=given,
-            support=support,
-            provenance=provenance,
             estimator=self,
             fingerprint=fingerprint,
             known={} if made is None or rows is None else {r.tobytes(): v for r, v in zip(rows, made, strict=True)},
