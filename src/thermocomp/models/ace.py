@@ -149,6 +149,23 @@ class ACE(TransformRegressor):
         See `TransformRegressor`.
     half_window_ : int
         N, as used.
+
+    References
+    ----------
+    Breiman, L., Friedman, J. H.: Estimating optimal transformations for multiple regression and correlation. Journal
+    of the American Statistical Association 80(391), 1985, 580-598. doi:10.1080/01621459.1985.10478157
+
+    Wessel, N., Konvicka, J., Weidemann, F., Nestmann, S., Neugebauer, R., Schwarz, U., Wessel, A., Kurths, J.:
+    Predicting thermal displacements in modular tool systems. Chaos 14, 2004. doi:10.1063/1.1622351
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ACE
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (300, 2))  # of two temperatures [degC]
+    >>> model = ACE().fit(rises, (rises[:, 0] + np.sqrt(rises[:, 1])) ** 2)
+    >>> print(round(model.psi_, 2), f"{model.predict([[5.0, 4.0]])[0]:.0f} um instead of {(5 + 2) ** 2} um")
+    1.0 49 um instead of 49 um
     """
 
     def __init__(

@@ -51,6 +51,26 @@ class MonotoneACE(TransformRegressor):
     ----------
     psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
         See `TransformRegressor`; of the averaged rows, except for the trained range. ``falling_theta_`` is 0.
+
+    References
+    ----------
+    Breiman, L., Friedman, J. H.: Estimating optimal transformations for multiple regression and correlation. Journal
+    of the American Statistical Association 80(391), 1985, 580-598. doi:10.1080/01621459.1985.10478157
+
+    Wessel, N., Konvicka, J., Weidemann, F., Nestmann, S., Neugebauer, R., Schwarz, U., Wessel, A., Kurths, J.:
+    Predicting thermal displacements in modular tool systems. Chaos 14, 2004. doi:10.1063/1.1622351
+
+    Eilers, P. H. C., Marx, B. D.: Flexible smoothing with B-splines and penalties. Statistical Science 11(2), 1996,
+    89-121.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import MonotoneACE
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (300, 2))  # of two temperatures [degC]
+    >>> model = MonotoneACE().fit(rises, (rises[:, 0] + np.sqrt(rises[:, 1])) ** 2)
+    >>> print(round(model.psi_, 2), f"{model.predict([[5.0, 4.0]])[0]:.0f} um instead of {(5 + 2) ** 2} um")
+    1.0 49 um instead of 49 um
     """
 
     def __init__(

@@ -89,6 +89,28 @@ class ARX(ClockedRegressor):
         In the training data: the first is trivially small, the second is the model's [unit of y].
     caution_ : str
         What the model cannot know (E-P6).
+
+    References
+    ----------
+    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+
+    Akaike, H.: Fitting autoregressive models for prediction. Annals of the Institute of Statistical Mathematics 21,
+    1969, 243-247.
+
+    Ljung, L.: System Identification: Theory for the User. 2nd edition, Prentice Hall, 1999.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ARX
+    >>> dt = np.r_[np.inf, np.full(119, 600.0)]  # a row every 10 min [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 20)[:, None]  # [1000/min]
+    >>> y = np.zeros(120)
+    >>> for t in range(1, 120):
+    ...     y[t] = 0.9 * y[t - 1] + 0.8 * speed[t, 0]
+    >>> model = ARX(k=1, m=0, time="routed").fit(speed, y, dt=dt)
+    >>> print(model.a_.round(3).tolist(), model.b_.round(3).tolist())
+    [0.9] [[0.8]]
     """
 
     def __init__(

@@ -113,6 +113,29 @@ class NetARX(ClockedRegressor):
         In the training data [unit of y].
     caution_ : str
         What the model cannot know (E-P6).
+
+    References
+    ----------
+    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+
+    Narendra, K. S., Parthasarathy, K.: Identification and control of dynamical systems using neural networks. IEEE
+    Transactions on Neural Networks 1(1), 1990, 4-27. doi:10.1109/72.80202
+
+    Rumelhart, D. E., Hinton, G. E., Williams, R. J.: Learning representations by back-propagating errors. Nature 323,
+    1986, 533-536. doi:10.1038/323533a0
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import NetARX
+    >>> dt = np.r_[np.inf, np.full(119, 600.0)]  # a row every 10 min [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 20)[:, None]  # [1000/min]
+    >>> y = np.zeros(120)
+    >>> for t in range(1, 120):
+    ...     y[t] = 0.9 * y[t - 1] + 0.8 * speed[t, 0]
+    >>> model = NetARX(hidden=4, epochs=10_000, time="routed").fit(speed, y, dt=dt)
+    >>> print(model.hidden_, f"{model.free_run_rms_:.0f} of {np.ptp(y):.0f} um")
+    4 2 of 29 um
     """
 
     def __init__(

@@ -99,6 +99,30 @@ class DynamicRidge(TimedRegressor):
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
         What was left out to choose.
+
+    References
+    ----------
+    Hoerl, A. E., Kennard, R. W.: Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12(1),
+    1970, 55-67. doi:10.1080/00401706.1970.10488634
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Brecher, C., Hirsch, P., Weck, M.: Compensation of thermo-elastic machine tool deformation based on control internal
+    data. CIRP Annals 53(1), 2004, 299-304 (lags of the spindle speed).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import DynamicRidge
+    >>> dt = np.r_[np.inf, np.full(299, 60.0)]  # a row a minute [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 50)[:, None]  # [1000/min]
+    >>> y = np.zeros(300)  # 8 um per 1000/min, reached with a time constant of 30 min
+    >>> for t in range(1, 300):
+    ...     y[t] = y[t - 1] + (8 * speed[t, 0] - y[t - 1]) * (1 - np.exp(-1 / 30))
+    >>> model = DynamicRidge(speed=[0], speed_lags=([600.0], [1800.0]), speed_powers=(1,), time="routed")
+    >>> print(model.fit(speed, y, dt=dt).speed_lags_, model.coef_.round(1).tolist())
+    (1800.0,) [8.0]
     """
 
     columns: ClassVar[str] = "speed"

@@ -299,8 +299,7 @@ class _Polynomial:
     """Terms u^i v^j w^k: i up to the own degree, j + k up to the others', i + j + k up to the larger of the two."""
 
     def __init__(self, points: FloatArray, axis: str, others: str) -> None:
-        low, high = points.min(axis=0), points.max(axis=0)
-        self.low, self.high = low, high
+        low, high = self.low, self.high = points.min(axis=0), points.max(axis=0)
         self.centre = (low + high) / 2
         self.scale = np.where(high > low, (high - low) / 2, 1.0)
         self.scaled = (points - self.centre) / self.scale
@@ -320,15 +319,12 @@ class _Polynomial:
                     yield i, j
 
     def exponents(self, order: Order) -> list[tuple[int, int, int]]:
-        found = []
         limits = [0, 0, 0]
         limits[self.own] = order[0]
         for a in self.others:
             limits[a] = min(order[1], self.distinct[a] - 1)
-        for e in np.ndindex(*(n + 1 for n in limits)):
-            if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order):
-                found.append((e[0], e[1], e[2]))
-        return found
+        possible = np.ndindex(limits[0] + 1, limits[1] + 1, limits[2] + 1)
+        return [e for e in possible if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order)]
 
     def columns(self, order: Order) -> FloatArray:
         return np.stack([np.prod(self.scaled ** np.array(e), axis=1) for e in self.exponents(order)], axis=1)
@@ -347,13 +343,17 @@ class _Polynomial:
         )
 
 
-class _Spline:
-    """Cubic spline whose inner knots part the positions into equal numbers."""
+class _Along:
+    """A profile along its own axis alone."""
 
     def __init__(self, points: FloatArray, axis: str) -> None:
         self.axis = axis
         self.position = points[:, "XYZ".index(axis)]
         self.places = np.unique(self.position)
+
+
+class _Spline(_Along):
+    """Cubic spline whose inner knots part the positions into equal numbers."""
 
     def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis count
         """Give the numbers of knots that leave two positions to spare."""
@@ -373,13 +373,8 @@ class _Spline:
         return _pieces(self.axis, knots[3:-3], pieces.c[:, 3:-3])
 
 
-class _Through:
+class _Through(_Along):
     """Natural cubic spline through the means of all positions."""
-
-    def __init__(self, points: FloatArray, axis: str) -> None:
-        self.axis = axis
-        self.position = points[:, "XYZ".index(axis)]
-        self.places = np.unique(self.position)
 
     def through(self, values: FloatArray, rows: NDArray[np.bool_] | slice = slice(None)) -> CubicSpline:
         """Return the spline through the means of some rows."""

@@ -37,6 +37,19 @@ class GaussianProcess(UnfrozenRegressor):
         Rows that were learned from.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range: of all rows given to `fit`.
+
+    References
+    ----------
+    Rasmussen, C. E., Williams, C. K. I.: Gaussian Processes for Machine Learning. MIT Press, 2006.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import GaussianProcess
+    >>> rise = np.linspace(0, 10, 60)[:, None]  # [degC]
+    >>> model = GaussianProcess().fit(rise, 20 * np.sin(rise[:, 0] / 4))
+    >>> print(f"{model.predict([[5.0]])[0]:.1f} um instead of {20 * np.sin(5.0 / 4):.1f} um")
+    19.0 um instead of 19.0 um
     """
 
     name: ClassVar[str] = "gp"

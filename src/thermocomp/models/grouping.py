@@ -74,6 +74,22 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
         Eigenvalues of X'X of the selected variables, as in Table 3 (H-16).
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Hwang, S.-H., Lee, J.-H., Yang, S.-H.: Optimal Variable Selection in a Thermal Error Model for Real Time Error
+    Compensation (in Korean). From a study that was funded in 1997.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import CorrelationGrouping
+    >>> rng = np.random.default_rng(0)
+    >>> places = rng.normal(size=(100, 2)).cumsum(axis=0)  # two places, two sensors at each [degC]
+    >>> rises = places[:, [0, 0, 1, 1]] + 0.1 * rng.normal(size=(100, 4))
+    >>> model = CorrelationGrouping(threshold=0.95).fit(rises, 4 * rises[:, 0] - 2 * rises[:, 3])
+    >>> print(model.groups_, model.selected_, model.coef_.round(3).tolist())
+    ((1, 0), (3, 2)) (0, 3) [4.0, -2.0]
     """
 
     def __init__(

@@ -98,6 +98,24 @@ class SigmoidNet(NetRegressor):
         What was left out to choose.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
+
+    References
+    ----------
+    Chen, J. S., Yuan, J., Ni, J.: Thermal Error Modelling for Real-Time Error Compensation. The International Journal
+    of Advanced Manufacturing Technology 12, 1996.
+
+    Rumelhart, D. E., Hinton, G. E., Williams, R. J.: Learning representations by back-propagating errors. Nature 323,
+    1986, 533-536. doi:10.1038/323533a0
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SigmoidNet
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (100, 2))  # of two temperatures [degC]
+    >>> y = 20 * np.sin(rises[:, 0] / 4) + rises[:, 1]
+    >>> model = SigmoidNet(hidden=6, n_epochs=2000).fit(rises, y)
+    >>> print(model.n_parameters_, round(model.score(rises, y), 2))
+    25 0.98
     """
 
     def __init__(

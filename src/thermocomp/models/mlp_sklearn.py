@@ -44,6 +44,21 @@ class SklearnNet(StaticRegressor, NetRegressor):
         Iterations of the solver.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
+
+    References
+    ----------
+    Pedregosa, F., et al.: Scikit-learn: machine learning in Python. Journal of Machine Learning Research 12, 2011,
+    2825-2830.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SklearnNet
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (100, 2))  # of two temperatures [degC]
+    >>> y = 20 * np.sin(rises[:, 0] / 4) + rises[:, 1]
+    >>> model = SklearnNet(hidden=6).fit(rises, y)
+    >>> print(model.n_parameters_, round(model.score(rises, y), 2))
+    25 1.0
     """
 
     def __init__(

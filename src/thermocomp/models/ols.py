@@ -23,6 +23,19 @@ class LeastSquares(StaticRegressor, TermRegressor):
         Names of the inputs that were left out.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Golub, G. H., Van Loan, C. F.: Matrix Computations. 4th edition, Johns Hopkins University Press, 2013, section 5.3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import LeastSquares
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (50, 3))  # of three temperatures [degC]
+    >>> model = LeastSquares().fit(rises, 2 + 5 * rises[:, 0] - 3 * rises[:, 2])
+    >>> print(round(model.intercept_, 3), (model.coef_.round(3) + 0.0).tolist())
+    2.0 [5.0, 0.0, -3.0]
     """
 
     def __init__(self, *, fit_intercept: bool = True) -> None:

@@ -39,6 +39,21 @@ class PartialF(StepwiseRegressor):
         True if the selection was stopped because it went round in a circle.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    The Open Mechanical Engineering Journal 11, 2017: the study of temperature measurement points by stepwise regression
+    that is called stepwise2017 here.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import PartialF
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> model = PartialF().fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4] + rng.normal(size=200))
+    >>> print(model.terms_, round(model.standard_error_, 2), "um")
+    ('x1', 'x4') 1.05 um
     """
 
     def __init__(self, *, f_enter: float = 100.0, f_delete: float = 50.0, fit_intercept: bool = True) -> None:

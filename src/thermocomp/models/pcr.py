@@ -30,6 +30,25 @@ class PrincipalComponents(ComponentRegressor):
         Chosen number; components without variance (dependent inputs) add nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Massy, W. F.: Principal components regression in exploratory statistical research. Journal of the American
+    Statistical Association 60(309), 1965, 234-256.
+
+    The Open Mechanical Engineering Journal 11, 2017: the study of temperature measurement points by stepwise regression
+    that is called stepwise2017 here.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import PrincipalComponents
+    >>> rng = np.random.default_rng(0)
+    >>> heat = rng.normal(size=(200, 2)).cumsum(axis=0)  # two sources, six sensors [degC]
+    >>> rises = heat @ rng.uniform(size=(2, 6)) + 0.01 * rng.normal(size=(200, 6))
+    >>> model = PrincipalComponents().fit(rises, 3 * heat[:, 0] - heat[:, 1] + rng.normal(size=200))
+    >>> print(model.n_components_, round(model.r_squared_, 3))
+    2 0.998
     """
 
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:

@@ -58,6 +58,18 @@ def freeze(
     ------
     FitError
         It cannot be frozen.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from thermocomp import LeastSquares, SensorSelector, freeze
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> pipeline = make_pipeline(SensorSelector("partial-f"), LeastSquares(fit_intercept=False))
+    >>> model = freeze(pipeline.fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4]), target="z_um")
+    >>> print({name: round(value, 3) for name, value in model.coefficients_by_name().items()})
+    {'x1': 5.0, 'x4': -3.0}
     """
     header: dict[str, Any] = {"target": target, "unit": unit, "support": support, "provenance": provenance}
     if not isinstance(estimator, Pipeline):

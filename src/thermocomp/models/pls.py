@@ -32,6 +32,23 @@ class PartialLeastSquares(ComponentRegressor):
         Chosen number; beyond the rank of the inputs further ones add nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Wold, S., Ruhe, A., Wold, H., Dunn, W. J.: The collinearity problem in linear regression. The partial least squares
+    (PLS) approach to generalized inverses. SIAM Journal on Scientific and Statistical Computing 5(3), 1984, 735-743.
+    doi:10.1137/0905052
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import PartialLeastSquares
+    >>> rng = np.random.default_rng(0)
+    >>> heat = rng.normal(size=(200, 2)).cumsum(axis=0)  # two sources, six sensors [degC]
+    >>> rises = heat @ rng.uniform(size=(2, 6)) + 0.01 * rng.normal(size=(200, 6))
+    >>> model = PartialLeastSquares().fit(rises, 3 * heat[:, 0] - heat[:, 1] + rng.normal(size=200))
+    >>> print(model.n_components_, round(model.r_squared_, 3))
+    2 0.998
     """
 
     def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:

@@ -61,6 +61,26 @@ class ProjectionPursuit(CycledRegressor):
         What was left out to choose.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
+
+    References
+    ----------
+    Friedman, J. H., Stuetzle, W.: Projection pursuit regression. Journal of the American Statistical Association
+    76(376), 1981, 817-823. doi:10.1080/01621459.1981.10477729
+
+    Friedman, J. H.: SMART user's guide. Stanford University, Laboratory for Computational Statistics, report 1, 1984.
+
+    Li, K.-C.: On principal Hessian directions for data visualization and dimension reduction: another application of
+    Stein's lemma. Journal of the American Statistical Association 87(420), 1992, 1025-1039.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ProjectionPursuit
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (120, 3))  # of three temperatures [degC]
+    >>> model = ProjectionPursuit(max_terms=1, degrees=(6.0,)).fit(rises, (rises[:, 0] - rises[:, 1]) ** 2)
+    >>> along = model.directions_[0] / model.directions_[0, 0]
+    >>> print((along.round(2) + 0.0).tolist(), round(model.r_squared_, 3))
+    [1.0, -1.0, 0.0] 0.999
     """
 
     def __init__(

@@ -30,6 +30,28 @@ class Ridge(PenalisedRegressor):
         Chosen strength.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Hoerl, A. E., Kennard, R. W.: Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12(1),
+    1970, 55-67. doi:10.1080/00401706.1970.10488634
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Liu, H., Miao, E. M., Wei, X. Y., et al.: Robust modeling method for thermal error of CNC machine tools based on
+    ridge regression algorithm. International Journal of Machine Tools and Manufacture 113, 2017, 35-48.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import Ridge
+    >>> rng = np.random.default_rng(0)
+    >>> rise = rng.uniform(0, 10, 200)
+    >>> rises = rise[:, None] + 0.01 * rng.normal(size=(200, 2))  # two sensors at one place [degC]
+    >>> model = Ridge().fit(rises, 4 * rise + rng.normal(size=200))
+    >>> print(model.coef_.round(1).tolist(), f"{model.cv_rms_:.1f} um")
+    [2.0, 2.0] 1.0 um
     """
 
     def __init__(

@@ -59,6 +59,22 @@ class SecondOrderRegression(StepwiseRegressor):
         True if the selection was stopped because it went round in a circle.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Chen, J. S., Yuan, J., Ni, J.: Thermal Error Modelling for Real-Time Error Compensation. The International Journal
+    of Advanced Manufacturing Technology 12, 1996.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SecondOrderRegression
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 3))  # [degC]
+    >>> y = 2 * rises[:, 0] + 0.5 * rises[:, 0] * rises[:, 2] + 0.1 * rng.normal(size=200)
+    >>> model = SecondOrderRegression().fit(rises, y)
+    >>> print(model.terms_, model.coef_.round(2).tolist())
+    ('x0', 'x0*x2') [2.0, 0.5]
     """
 
     def __init__(

@@ -46,6 +46,24 @@ class SensorSelector(SelectorMixin, BaseEstimator):
     estimator_ : ThermalRegressor
         The method, fitted to the candidates.
     n_features_in_ : int
+
+    References
+    ----------
+    Guyon, I., Elisseeff, A.: An introduction to variable and feature selection. Journal of Machine Learning Research 3,
+    2003, 1157-1182.
+
+    Pedregosa, F., et al.: Scikit-learn: machine learning in Python. Journal of Machine Learning Research 12, 2011,
+    2825-2830.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SensorSelector
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> selector = SensorSelector("partial-f").fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4] + rng.normal(size=200))
+    >>> print(selector.get_support(indices=True).tolist(), selector.transform(rises).shape)
+    [1, 4] (200, 2)
     """
 
     def __init__(

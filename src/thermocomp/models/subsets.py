@@ -100,6 +100,28 @@ class BestSubset(TermRegressor):
         What was left out to choose; empty if nothing was.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Furnival, G. M., Wilson, R. W.: Regressions by leaps and bounds. Technometrics 16(4), 1974, 499-511.
+    doi:10.1080/00401706.1974.10489231
+
+    Gatu, C., Kontoghiorghes, E. J.: Branch-and-bound algorithms for computing the best-subset regression models.
+    Journal of Computational and Graphical Statistics 15(1), 2006, 139-156.
+
+    Hwang, S.-H., Lee, J.-H., Yang, S.-H.: Optimal Variable Selection in a Thermal Error Model for Real Time Error
+    Compensation (in Korean). From a study that was funded in 1997.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import BestSubset
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (100, 8))  # of eight temperatures, two of which matter [degC]
+    >>> y = 5 * rises[:, 1] - 3 * rises[:, 6] + rng.normal(size=100)
+    >>> model = BestSubset(rule="one-standard-error").fit(rises, y, cycle=np.arange(100) // 20)
+    >>> print(model.selected_, model.proven_, model.coef_.round(1).tolist())
+    (1, 6) True [5.0, -3.0]
     """
 
     def __init__(
