@@ -181,14 +181,7 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
             f"EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",
             "",
         ]
-        wide = max([len("VARIABLE"), *(len(t) for t in self.terms_)])
-        lines.append(f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}  CONTRIBUTION")
-        if self.fit_intercept:
-            lines.append(f"{'CONSTANT':<{wide}}  {self.intercept_:14.6g}")
-        lines += [
-            f"{name:<{wide}}  {value:14.6g}  {share:12.4f}"
-            for name, value, share in zip(self.terms_, self.coef_, self.contributions_, strict=True)
-        ]
+        lines += self._coefficient_lines("  CONTRIBUTION", [f"  {share:12.4f}" for share in self.contributions_])
         s = self.spectrum_
         lines += [
             "",

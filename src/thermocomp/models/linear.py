@@ -93,3 +93,12 @@ class TermRegressor(MemorylessRegressor):
         self.adjusted_r_squared_ = 1 - (1 - self.r_squared_) * per_row
         self.standard_error_ = float(np.sqrt(found.rss / left)) if left > 0 else float("nan")
         self.n_effective_ = effective_sample_size(found.residual)
+
+    def _coefficient_lines(self, title: str = "", beside: Sequence[str] = ()) -> list[str]:
+        """Return a table of the coefficients as text, the constant first; `beside` is a further column of them."""
+        wide = max(len(name) for name in ("VARIABLE", *self.terms_))
+        lines = [f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}{title}"]
+        if self.fit_intercept:
+            lines.append(f"{'CONSTANT':<{wide}}  {self.intercept_:14.6g}")
+        rows = zip(self.terms_, self.coef_, beside or [""] * len(self.terms_), strict=True)
+        return [*lines, *(f"{name:<{wide}}  {value:14.6g}{more}" for name, value, more in rows)]

@@ -63,12 +63,7 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
             f"R-SQUARES ARE {self.r_squared_kind_.upper()}   EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",
             "",
         ]
-        rows = [*zip(self.terms_, self.coef_, strict=True)]
-        if self.fit_intercept:
-            rows.insert(0, ("CONSTANT", self.intercept_))
-        wide = max([len("VARIABLE"), *(len(name) for name, _ in rows)])
-        lines.append(f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}")
-        lines += [f"{name:<{wide}}  {value:>14.6g}" for name, value in rows]
+        lines += self._coefficient_lines()
         return "\n".join(lines) + "\n"
 
     @abstractmethod
