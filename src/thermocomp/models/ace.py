@@ -6,16 +6,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input
 from thermocomp.core.terms import Variable
-from thermocomp.models.base import ThermalRegressor
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+from thermocomp.models.base import FloatArray, StaticRegressor
 
 _NOTHING = Curve((), (0.0,), "step")
 
@@ -35,7 +31,7 @@ class Table:
     y: FloatArray
 
 
-class TransformRegressor(ThermalRegressor):
+class TransformRegressor(StaticRegressor):
     """Both sides transformed: theta(y) = phi_1(x_1) + phi_2(x_2) + ... (Wessel 2004, Eq. 2; W-01).
 
     theta has zero mean and unit variance, each phi has zero mean (E-W3). A constant input has phi = 0. If nothing
@@ -60,20 +56,7 @@ class TransformRegressor(ThermalRegressor):
         Trained range; beyond it all curves are constant (W-07).
     """
 
-    def predict(self, X: ArrayLike) -> FloatArray:
-        """Predict the deviation, theta^-1 of the sum of phi.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        check_is_fitted(self)
-        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+    def _predict(self, change: FloatArray) -> FloatArray:
         total = np.zeros(len(change))
         for j, curve in enumerate(self._curves):
             total = total + curve(change[:, j])
@@ -90,8 +73,7 @@ class TransformRegressor(ThermalRegressor):
         -------
         ndarray of bool of shape (n_rows, n_features)
         """
-        check_is_fitted(self)
-        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        change = self._checked(X)
         return np.asarray((change < self.data_min_) | (change > self.data_max_))
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Additive:
@@ -103,12 +85,6 @@ class TransformRegressor(ThermalRegressor):
             curves=tuple(self._curves[j] for j in active),
             response=self._inverse,
         )
-
-    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Check the training data and note their range."""
-        change, deviation = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
-        return change, np.asarray(deviation, dtype=np.float64)
 
     def _keep(
         self,
@@ -173,6 +149,23 @@ class ACE(TransformRegressor):
         See `TransformRegressor`.
     half_window_ : int
         N, as used.
+
+    References
+    ----------
+    Breiman, L., Friedman, J. H.: Estimating optimal transformations for multiple regression and correlation. Journal
+    of the American Statistical Association 80(391), 1985, 580-598. doi:10.1080/01621459.1985.10478157
+
+    Wessel, N., Konvicka, J., Weidemann, F., Nestmann, S., Neugebauer, R., Schwarz, U., Wessel, A., Kurths, J.:
+    Predicting thermal displacements in modular tool systems. Chaos 14, 2004. doi:10.1063/1.1622351
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ACE
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (300, 2))  # of two temperatures [degC]
+    >>> model = ACE().fit(rises, (rises[:, 0] + np.sqrt(rises[:, 1])) ** 2)
+    >>> print(round(model.psi_, 2), f"{model.predict([[5.0, 4.0]])[0]:.0f} um instead of {(5 + 2) ** 2} um")
+    1.0 49 um instead of 49 um
     """
 
     def __init__(
@@ -192,34 +185,14 @@ class ACE(TransformRegressor):
         self.max_sweeps = max_sweeps
         self.converged = converged
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "ACE":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        ACE
-
-        Raises
-        ------
-        InputError
-            A setting is out of its range.
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.neighbours < 1 or self.max_sweeps < 1 or not self.tolerance >= 0:
             raise InputError(
                 f"ACE: want neighbours >= 1, max_sweeps >= 1 and tolerance >= 0, "
                 f"found {self.neighbours}, {self.max_sweeps} and {self.tolerance}"
             )
-        change, deviation = self._read(X, y)
         self.half_window_ = half_window(len(deviation), self.half_window, self.window_share)
         self._alternate(change, deviation)
-        return self
 
     def _alternate(self, X: FloatArray, y: FloatArray) -> None:
         from thermocomp.models.kernels import ace as kernel  # numba takes its time

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import isotonic_regression
 
 from thermocomp.core.additive import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.ace import TransformRegressor
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.base import FloatArray
 
 _SAME = 1e-9  # share of its size by which a channel must vary, else it counts as constant: no sensor has as many digits
 
@@ -53,6 +51,26 @@ class MonotoneACE(TransformRegressor):
     ----------
     psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
         See `TransformRegressor`; of the averaged rows, except for the trained range. ``falling_theta_`` is 0.
+
+    References
+    ----------
+    Breiman, L., Friedman, J. H.: Estimating optimal transformations for multiple regression and correlation. Journal
+    of the American Statistical Association 80(391), 1985, 580-598. doi:10.1080/01621459.1985.10478157
+
+    Wessel, N., Konvicka, J., Weidemann, F., Nestmann, S., Neugebauer, R., Schwarz, U., Wessel, A., Kurths, J.:
+    Predicting thermal displacements in modular tool systems. Chaos 14, 2004. doi:10.1063/1.1622351
+
+    Eilers, P. H. C., Marx, B. D.: Flexible smoothing with B-splines and penalties. Statistical Science 11(2), 1996,
+    89-121.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import MonotoneACE
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (300, 2))  # of two temperatures [degC]
+    >>> model = MonotoneACE().fit(rises, (rises[:, 0] + np.sqrt(rises[:, 1])) ** 2)
+    >>> print(round(model.psi_, 2), f"{model.predict([[5.0, 4.0]])[0]:.0f} um instead of {(5 + 2) ** 2} um")
+    1.0 49 um instead of 49 um
     """
 
     def __init__(
@@ -74,25 +92,7 @@ class MonotoneACE(TransformRegressor):
         self.max_sweeps = max_sweeps
         self.max_rows = max_rows
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "MonotoneACE":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        MonotoneACE
-
-        Raises
-        ------
-        InputError
-            A setting is out of its range.
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.points < 3 or self.max_sweeps < 1 or self.max_rows < 2:
             raise InputError(
                 f"MonotoneACE: want points >= 3, max_sweeps >= 1 and max_rows >= 2, "
@@ -103,10 +103,8 @@ class MonotoneACE(TransformRegressor):
                 f"MonotoneACE: want smoothing > 0, shrinkage > 0, extend >= 0 and tolerance >= 0, "
                 f"found {self.smoothing}, {self.shrinkage}, {self.extend} and {self.tolerance}"
             )
-        change, deviation = self._read(X, y)
         run = -(-len(deviation) // self.max_rows)
         self._alternate(_averaged(change, run), _averaged(deviation, run))
-        return self
 
     def _alternate(self, X: FloatArray, y: FloatArray) -> None:
         n, k = len(y), self.points

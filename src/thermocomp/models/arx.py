@@ -6,21 +6,18 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
 from thermocomp.models.selection import orders
 from thermocomp.models.timed import Time
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +44,8 @@ class ARX(ClockedRegressor):
     that leave the smallest free-run error on thermal cycles left out. Several intervals are always judged by that.
 
     Rows with cycle -1 are not learned from, but their inputs drive the model. Inputs that depend on others, or never
-    leave zero, get no coefficient of their own.
+    leave zero, get no coefficient of their own. A `FitError` if there is no input, too few rows, or the free run of the
+    orders asked for does not decay.
 
     With ``time="none"`` every row is a machine at rest: k = m = 0 is all that can be learned, and `predict` gives the
     deviation at which the model settles.
@@ -91,6 +89,28 @@ class ARX(ClockedRegressor):
         In the training data: the first is trivially small, the second is the model's [unit of y].
     caution_ : str
         What the model cannot know (E-P6).
+
+    References
+    ----------
+    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+
+    Akaike, H.: Fitting autoregressive models for prediction. Annals of the Institute of Statistical Mathematics 21,
+    1969, 243-247.
+
+    Ljung, L.: System Identification: Theory for the User. 2nd edition, Prentice Hall, 1999.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ARX
+    >>> dt = np.r_[np.inf, np.full(119, 600.0)]  # a row every 10 min [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 20)[:, None]  # [1000/min]
+    >>> y = np.zeros(120)
+    >>> for t in range(1, 120):
+    ...     y[t] = 0.9 * y[t - 1] + 0.8 * speed[t, 0]
+    >>> model = ARX(k=1, m=0, time="routed").fit(speed, y, dt=dt)
+    >>> print(model.a_.round(3).tolist(), model.b_.round(3).tolist())
+    [0.9] [[0.8]]
     """
 
     def __init__(
@@ -116,35 +136,10 @@ class ARX(ClockedRegressor):
         self.fit_intercept = fit_intercept
         self.time = time
 
-    def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> "ARX":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
-        y : array-like of shape (n_rows,)
-            Deviation; without meaning where `cycle` is -1.
-        dt : array-like of shape (n_rows,), optional
-            Time since the row before [s]; inf in the first row of each test.
-        cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, -1 for rows that are not learned from.
-
-        Returns
-        -------
-        ARX
-
-        Raises
-        ------
-        FitError
-            No input, too few rows, or the free run of the orders asked for does not decay.
-        InputError
-            A setting, `dt` or `cycle` cannot be used.
-        """
+    def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         if self.criterion not in ("fpe", "aic", "bic", "free-run"):
             raise InputError(f"criterion {self.criterion!r}: want fpe, aic, bic or free-run")
         ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
-        inputs, deviation, step, folds = self._start(X, y, dt, cycle)
         data = [
             Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
             for h in self._intervals(self.interval, step)
@@ -155,23 +150,13 @@ class ARX(ClockedRegressor):
         # one-step criteria choose among all orders by themselves
         groups = [((k,), (m,)) for k in ks for m in ms] if self.criterion == "free-run" else [(ks, ms)]
         tried = [_Setting(d, k, m, c) for d in data for k, m in groups for c in constants]
-        self.trials_: tuple[Trial, ...] = ()
-        best = 0
-        if len(tried) > 1:
-            errors = [self._judge(t) for t in tried]
-            self.trials_ = tuple(
-                Trial(t.data.interval, max(t.ks), max(t.ms), t.intercept, 0, e)
-                for t, e in zip(tried, errors, strict=True)
-            )
-            best = int(np.argmin(errors))
-        self.cv_rms_ = self.trials_[best].cv_rms if self.trials_ else math.nan
+        best = self._chosen([self._judge(t) for t in tried] if len(tried) > 1 else [])
         clocked = tried[best].data
         self._coefficients, self.orders_, self.one_step_rms_ = self._solve(tried[best], clocked.targets())
         self.interval_ = clocked.interval
         self.a_, self.b_, self.intercept_ = (c := self._coefficients).a, c.b, c.intercept
         self.k_, self.m_ = len(c.a), len(c.b) - 1
-        self.free_run_rms_ = rms(self._free_error(clocked, c, folds >= 0)) if self.time != "none" else math.nan
-        return self
+        self._note_free_run(clocked)
 
     @property
     def _recursion(self) -> Recursion:
@@ -193,7 +178,8 @@ class ARX(ClockedRegressor):
         ndarray of shape (n_predicted, 2)
             Measured and predicted deviation at all ticks that have enough past.
         """
-        inputs, step = self._given(X, dt)
+        rows, step = self._given(X, dt)
+        inputs = self._used(rows)
         runs = ticks.on_clock(inputs, step, self.interval_)
         measured = np.asarray(y, dtype=np.float64)
         data = Clocked(self.interval_, runs, measured, step, np.zeros(len(inputs), dtype=np.intp))
@@ -210,13 +196,10 @@ class ARX(ClockedRegressor):
             intercept=self.intercept_,
         )
 
-    def _wanted(self) -> Sequence[str | int] | None:
-        return self.inputs
-
     # -- choice --------------------------------------------------------------------------------------------------------
 
     def _solve(
-        self, setting: "_Setting", targets: Sequence[FloatArray]
+        self, setting: _Setting, targets: Sequence[FloatArray]
     ) -> tuple[Coefficients, tuple[orders.Order, ...], float]:
         """Return the coefficients of the best of the orders of a setting, the table, and the RMS of one-step errors."""
         data, ks, ms, constant = setting.data, setting.ks, setting.ms, setting.intercept
@@ -249,18 +232,15 @@ class ARX(ClockedRegressor):
         found_at = Coefficients(weights[:k], weights[k:].reshape(m + 1, J), intercept)
         return found_at, found, math.sqrt(chosen.sse / chosen.n_rows)
 
-    def _judge(self, setting: "_Setting") -> float:
-        """Return the mean RMS in free run over the folds, each left out in turn."""
+    def _judge(self, setting: _Setting) -> Trial:
+        """Judge a setting by its free run over the folds, each left out in turn."""
         data, errors = setting.data, []
         for fold in range(int(data.folds.max()) + 1):
             try:
                 c, *_ = self._solve(setting, data.targets(fold))
             except FitError:
-                return math.inf
-            errors.append(rms(self._free_error(data, c, data.folds == fold)))
-        return float(np.mean(errors))
-
-    @staticmethod
-    def _free_error(data: Clocked, c: Coefficients, rows: BoolArray) -> FloatArray:
-        free = np.concatenate([c.at_rows(r) for r in data.runs])
-        return np.asarray(data.y[rows] - free[rows])
+                errors = [math.inf]
+                break
+            errors.append(data.free_run_rms(c, data.folds == fold))
+        ks, ms = setting.ks, setting.ms
+        return Trial(data.interval, max(ks), max(ms), setting.intercept, 0, float(np.mean(errors)))

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
 from sklearn import config_context
 from sklearn.utils import check_random_state
 
@@ -15,15 +14,12 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.models.arx import ARX
-from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, rms, too_few
+from thermocomp.models.base import FloatArray, IntArray
+from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
 from thermocomp.models.numerics.ticks import Run
 from thermocomp.models.timed import Time
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-BoolArray = NDArray[np.bool_]
 
 #: ticks after which a row without time is taken to have settled
 SETTLED = 2000
@@ -76,7 +72,7 @@ class NetARX(ClockedRegressor):
     The net is trained on measured displacements one step ahead, as in the paper, on the same clock as `ARX`; the number
     of hidden nodes is the one that leaves the smallest error in free run on thermal cycles left out, in place of the
     paper's trial and error. Its sigmoid output keeps the free run within the trained displacements and an eighth more
-    on either side: it cannot run away.
+    on either side: it cannot run away. A `FitError` if there is no input, or too few rows.
 
     With ``time="none"`` every row is a machine at rest in that state: the net is trained with k = m = 0.
 
@@ -117,6 +113,29 @@ class NetARX(ClockedRegressor):
         In the training data [unit of y].
     caution_ : str
         What the model cannot know (E-P6).
+
+    References
+    ----------
+    The study of pre-compensation by revised NC programs, of which P-01 to P-07 tell in the requirements.
+
+    Narendra, K. S., Parthasarathy, K.: Identification and control of dynamical systems using neural networks. IEEE
+    Transactions on Neural Networks 1(1), 1990, 4-27. doi:10.1109/72.80202
+
+    Rumelhart, D. E., Hinton, G. E., Williams, R. J.: Learning representations by back-propagating errors. Nature 323,
+    1986, 533-536. doi:10.1038/323533a0
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import NetARX
+    >>> dt = np.r_[np.inf, np.full(119, 600.0)]  # a row every 10 min [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 20)[:, None]  # [1000/min]
+    >>> y = np.zeros(120)
+    >>> for t in range(1, 120):
+    ...     y[t] = 0.9 * y[t - 1] + 0.8 * speed[t, 0]
+    >>> model = NetARX(hidden=4, epochs=10_000, time="routed").fit(speed, y, dt=dt)
+    >>> print(model.hidden_, f"{model.free_run_rms_:.0f} of {np.ptp(y):.0f} um")
+    4 2 of 29 um
     """
 
     def __init__(
@@ -148,56 +167,23 @@ class NetARX(ClockedRegressor):
         self.jobs = jobs
         self.time = time
 
-    def fit(
-        self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
-    ) -> "NetARX":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
-        y : array-like of shape (n_rows,)
-            Deviation; without meaning where `cycle` is -1.
-        dt : array-like of shape (n_rows,), optional
-            Time since the row before [s]; inf in the first row of each test.
-        cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, -1 for rows that are not learned from.
-
-        Returns
-        -------
-        NetARX
-
-        Raises
-        ------
-        FitError
-            No input, or too few rows.
-        InputError
-            A setting, `dt` or `cycle` cannot be used.
-        """
+    def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         sizes = tuple(int(h) for h in np.atleast_1d(self.hidden))
         if not sizes or min(sizes) < 1:
             raise InputError(f"hidden = {self.hidden}: want numbers of nodes, at least 1")
-        inputs, deviation, step, folds = self._start(X, y, dt, cycle)
         h = self._intervals(self.interval, step)[0]
         data = Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
-        best = 0
-        self.trials_: tuple[Trial, ...] = ()
+        judged: list[Trial] = []
         if len(sizes) > 1 and self.time != "none":
             jobs = [(size, fold) for size in sizes for fold in range(int(folds.max()) + 1)]
             errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
             means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
-            self.trials_ = tuple(
-                Trial(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
-            )
-            best = int(np.argmin(means))
-        self.cv_rms_ = self.trials_[best].cv_rms if self.trials_ else math.nan
-        self.hidden_, self.interval_ = sizes[best], h
+            judged = [Trial(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)]
+        self.hidden_, self.interval_ = sizes[self._chosen(judged)], h
         self._net = self._train(data, self.hidden_, None)
         self.net_ = self._net.net
-        self.free_run_rms_ = rms(self._free_error(data, self._net, folds >= 0)) if self.time != "none" else math.nan
-        return self
+        self._note_free_run(data)
 
     @property
     def _recursion(self) -> Recursion:
@@ -214,9 +200,6 @@ class NetARX(ClockedRegressor):
             input_scaling=self._net.scale_in,
             output_scaling=self._net.scale_out,
         )
-
-    def _wanted(self) -> Sequence[str | int] | None:
-        return self.inputs
 
     # -- choice --------------------------------------------------------------------------------------------------------
 
@@ -253,9 +236,4 @@ class NetARX(ClockedRegressor):
             net = self._train(data, size, fold)
         except FitError:
             return math.inf
-        return rms(self._free_error(data, net, data.folds == fold))
-
-    @staticmethod
-    def _free_error(data: Clocked, net: _Net, rows: BoolArray) -> FloatArray:
-        free = np.concatenate([net.at_rows(r) for r in data.runs])
-        return np.asarray(data.y[rows] - free[rows])
+        return data.free_run_rms(net, data.folds == fold)

@@ -2,13 +2,19 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted
+from sklearn.utils.validation import check_is_fitted, validate_data
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.models.numerics.folds import number_folds
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 
 class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
@@ -84,3 +90,137 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
                 f"{len(inputs)} inputs given, but the model was fitted to {len(names)}: {', '.join(names)}"
             )
         return tuple(inputs)
+
+    # -- for the methods -----------------------------------------------------------------------------------------------
+
+    def _read(self, X: ArrayLike, y: ArrayLike, *, multi_output: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Check the training data; return X by column in memory, and y."""
+        change, deviation = validate_data(
+            self, X, y, y_numeric=True, multi_output=multi_output, dtype=np.float64, order="F", ensure_min_samples=2
+        )
+        return change, np.asarray(deviation, dtype=np.float64)
+
+    def _note_range(self, change: FloatArray) -> None:
+        """Note the trained range; ten times as fast by column in memory as by row."""
+        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+
+
+class MemorylessRegressor(ThermalRegressor):
+    """A regressor to which a row is a state of its own, whatever came before."""
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Predict the deviation.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+            A net that was fitted to several columns of y gives as many: (n_rows, n_outputs).
+        """
+        return self._predict(self._checked(X))
+
+    @abstractmethod
+    def _predict(self, change: FloatArray) -> FloatArray:
+        """Predict for rows that were checked, (n_rows, n_features)."""
+
+    def _checked(self, X: ArrayLike) -> FloatArray:
+        """Check rows against what was fitted."""
+        check_is_fitted(self)
+        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+        return change
+
+    def _learned(
+        self, X: ArrayLike, y: ArrayLike, cycle: ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray, IntArray, str]:
+        """Check the training data, note the range of the rows that may be learned from, and return these alone.
+
+        Beside X and y come the fold of each row and, in words, what is left out in turn.
+        """
+        change, deviation = self._read(X, y)
+        folds, description = number_folds(cycle, len(change))
+        if folds.min() < 0:
+            learned = folds >= 0
+            if learned.sum() < 2:
+                raise FitError("a single row to learn from: at least 2 are needed")
+            # by column again: rows left out must not change a single digit
+            change, deviation, folds = np.asfortranarray(change[learned]), deviation[learned], folds[learned]
+        self._note_range(change)
+        return change, deviation, folds, description
+
+
+class StaticRegressor(MemorylessRegressor):
+    """A memoryless regressor whose fit wants X and y and nothing else."""
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit; what a method refuses beside data that are none, its class tells.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation; a net takes several columns, (n_rows, n_outputs).
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        InputError
+            A setting is out of its range.
+        """
+        change, deviation = self._read(X, y)
+        self._note_range(change)
+        self._fit(change, deviation)
+        return self
+
+    @abstractmethod
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
+        """Fit to data that were checked, (n_rows, n_features) and (n_rows,)."""
+
+
+class CycledRegressor(MemorylessRegressor):
+    """A memoryless regressor that chooses its settings by leaving out thermal cycles.
+
+    Attributes
+    ----------
+    chosen_by_ : str
+        What was left out to choose.
+    """
+
+    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
+        """Fit; what a method refuses beside data that are none, its class tells.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time.
+        y : array-like of shape (n_rows,)
+            Deviation.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
+            take the place of the cycles.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        FitError
+            Fewer than two rows to learn from.
+        InputError
+            A setting is out of its range.
+        """
+        change, deviation, folds, self.chosen_by_ = self._learned(X, y, cycle)
+        self._fit(change, deviation, folds)
+        return self
+
+    @abstractmethod
+    def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
+        """Fit to data that were checked; `folds` of shape (n_rows,), 0, 1, ..., are left out in turn."""

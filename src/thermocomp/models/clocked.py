@@ -4,20 +4,18 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeGuard
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import ticks
-from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.ticks import Run
 from thermocomp.models.timed import TimedRegressor
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
 
 #: a memory much longer than the recording cannot be known from it: the free run must decay by e within this many times
 #: the longest test
@@ -101,6 +99,11 @@ class Clocked:
             blocks.append(block)
         return blocks[0] if len(blocks) == 1 else np.asfortranarray(np.vstack(blocks))
 
+    def free_run_rms(self, model: "Recursion", rows: BoolArray) -> float:
+        """Return the RMS of a model's free run in some of the rows [unit of y]; nan if there are none."""
+        free = np.concatenate([model.at_rows(r) for r in self.runs])
+        return rms(self.y[rows] - free[rows])
+
     @property
     def largest_root(self) -> float:
         """Bound on the roots of the polynomial."""
@@ -121,6 +124,7 @@ class Recursion(Protocol):
 class ClockedRegressor(TimedRegressor):
     """What the autoregressive estimators share: which inputs, on which clock, chosen by which cycles."""
 
+    inputs: Sequence[str | int] | None
     interval_: float
 
     @property
@@ -128,39 +132,11 @@ class ClockedRegressor(TimedRegressor):
     def _recursion(self) -> Recursion:
         """What was fitted."""
 
-    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict the deviation in free run from a cold start, never one step ahead (P-05).
+    @abstractmethod
+    def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
+        """Fit to the columns of the inputs."""
 
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-        dt : array-like of shape (n_rows,), optional
-            As in `fit`. With ``time="none"``, the deviation at which each row would settle is given.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        inputs, step = self._given(X, dt)
-        if self.time == "none":
-            return self._recursion.settled(inputs)
-        runs = ticks.on_clock(inputs, step, self.interval_)
-        parts = [self._recursion.at_rows(r) for r in runs]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-    def _start(
-        self, X: ArrayLike, y: ArrayLike, dt: ArrayLike | None, cycle: ArrayLike | None
-    ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-        """Check the training data; return inputs, y, time steps and folds."""
-        self._time = self.time
-        self._declared()
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        rows, step = self._clock(X, checked[0], dt, fitting=True)
-        folds, self.chosen_by_ = number_folds(self._cycles(cycle, step), len(rows))
-        learned = np.ascontiguousarray(rows.T)  # by column in memory: the next two are ten times as fast
-        if folds.min() < 0:
-            learned = learned[:, folds >= 0]
-        self.data_min_, self.data_max_ = learned.min(axis=1), learned.max(axis=1)
+    def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._columns = self._resolve()
         self._some = not np.array_equal(self._columns, np.arange(rows.shape[1]))
         names = ", ".join(self._names()[j] for j in self._columns)
@@ -169,37 +145,41 @@ class ClockedRegressor(TimedRegressor):
             "temperature, is outside this model (E-P6). Judge it in free run on other conditions, never one step "
             "ahead (E-P3)."
         )
-        return self._used(rows), np.asarray(checked[1], dtype=np.float64), step, folds
+        self._learn(self._used(rows), deviation, step, folds)
+
+    def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
+        inputs = self._used(rows)
+        if self.time == "none":
+            return self._recursion.settled(inputs)
+        runs = ticks.on_clock(inputs, step, self.interval_)
+        parts = [self._recursion.at_rows(r) for r in runs]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _resolve(self) -> IntArray:
-        wanted = self._wanted()
-        if wanted is None:
+        """Return the columns it predicts from."""
+        if self.inputs is None:
             return np.arange(len(self._names()))
-        if not len(wanted):
+        if not len(self.inputs):
             raise FitError(NO_SPEED)
-        found = [self._place(s, "input") for s in wanted]
+        found = [self._place(s, "input") for s in self.inputs]
         if len(set(found)) < len(found):
-            raise InputError(f"inputs {list(wanted)}: one is given twice")
+            raise InputError(f"inputs {list(self.inputs)}: one is given twice")
         return np.array(found, dtype=np.intp)
-
-    @abstractmethod
-    def _wanted(self) -> Sequence[str | int] | None:
-        """Return the inputs asked for."""
-
-    def _given(self, X: ArrayLike, dt: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
-        """Check X and time against what was fitted; return the columns of the inputs, and the time steps."""
-        self._declared()
-        check_is_fitted(self)
-        if _is_plain(X, self.n_features_in_) and not hasattr(self, "feature_names_in_"):
-            rows = X
-        else:
-            rows = validate_data(self, X, dtype=np.float64, reset=False)
-        inputs, step = self._clock(X, rows, dt)
-        return self._used(inputs), step
 
     def _used(self, rows: FloatArray) -> FloatArray:
         """Return the columns of the inputs; no copy if that is all: it takes as long as the rest."""
         return rows[:, self._columns] if self._some else rows
+
+    def _chosen(self, trials: Sequence[Trial]) -> int:
+        """Note what was judged; return the place of the best, the first if nothing was."""
+        self.trials_ = tuple(trials)
+        best = int(np.argmin([t.cv_rms for t in trials])) if trials else 0
+        self.cv_rms_ = trials[best].cv_rms if trials else math.nan
+        return best
+
+    def _note_free_run(self, data: Clocked) -> None:
+        """Note how the free run fits the training data; with ``time="none"`` there is none."""
+        self.free_run_rms_ = math.nan if self.time == "none" else data.free_run_rms(self._recursion, data.folds >= 0)
 
     @staticmethod
     def _intervals(interval: float | Sequence[float] | None, dt: FloatArray) -> list[float]:
@@ -217,14 +197,6 @@ class ClockedRegressor(TimedRegressor):
         if given is None or given < 0:
             raise InputError(f"order {name}: {most if given is None else given} must not be negative")
         return (given,)
-
-
-def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
-    """Return True for an array that scikit-learn would let pass as it is; asking it takes as long as a free run."""
-    if not (type(X) is np.ndarray and X.dtype == np.float64 and X.ndim == 2 and len(X) and X.shape[1] == n_columns):
-        return False
-    with np.errstate(over="ignore", invalid="ignore"):
-        return math.isfinite(X.sum())
 
 
 def rms(error: FloatArray) -> float:

@@ -5,19 +5,15 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core import lagbank
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import Input
 from thermocomp.core.terms import Term
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import moments as ridge
-from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.shrinkage import Rule, choose
 from thermocomp.models.timed import Time, TimedRegressor
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 MINUTE = 60.0
 
@@ -103,6 +99,30 @@ class DynamicRidge(TimedRegressor):
         Mean over the cycles left out of their RMS, at the choice [unit of y].
     chosen_by_ : str
         What was left out to choose.
+
+    References
+    ----------
+    Hoerl, A. E., Kennard, R. W.: Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12(1),
+    1970, 55-67. doi:10.1080/00401706.1970.10488634
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Brecher, C., Hirsch, P., Weck, M.: Compensation of thermo-elastic machine tool deformation based on control internal
+    data. CIRP Annals 53(1), 2004, 299-304 (lags of the spindle speed).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import DynamicRidge
+    >>> dt = np.r_[np.inf, np.full(299, 60.0)]  # a row a minute [s]
+    >>> speed = np.repeat([0.0, 3.0, 1.0, 4.0, 0.0, 2.0], 50)[:, None]  # [1000/min]
+    >>> y = np.zeros(300)  # 8 um per 1000/min, reached with a time constant of 30 min
+    >>> for t in range(1, 300):
+    ...     y[t] = y[t - 1] + (8 * speed[t, 0] - y[t - 1]) * (1 - np.exp(-1 / 30))
+    >>> model = DynamicRidge(speed=[0], speed_lags=([600.0], [1800.0]), speed_powers=(1,), time="routed")
+    >>> print(model.fit(speed, y, dt=dt).speed_lags_, model.coef_.round(1).tolist())
+    (1800.0,) [8.0]
     """
 
     columns: ClassVar[str] = "speed"
@@ -116,7 +136,7 @@ class DynamicRidge(TimedRegressor):
         speed_powers: Sequence[int] = (1, 2),
         copies: Literal["high-passed", "lagged"] = "high-passed",
         strengths: Sequence[float] = STRENGTHS,
-        rule: Literal["one-standard-error", "minimum"] = "one-standard-error",
+        rule: Rule = "one-standard-error",
         fit_intercept: bool = False,
         time: Time | None = None,
     ) -> None:
@@ -130,69 +150,19 @@ class DynamicRidge(TimedRegressor):
         self.fit_intercept = fit_intercept
         self.time = time
 
-    def fit(
-        self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None
-    ) -> "DynamicRidge":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time; with ``time="column"`` behind the time.
-        y : array-like of shape (n_rows,)
-            Deviation.
-        dt : array-like of shape (n_rows,), optional
-            With ``time="routed"``: time since the previous row [s], ``inf`` in the first row of each test.
-        cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row. Rows with -1 drive the lags but are not learned from. Without it each test of
-            several is one (``time="column"``), or five stretches of equal length take the place of the cycles.
-
-        Returns
-        -------
-        DynamicRidge
-
-        Raises
-        ------
-        FitError
-            No row to learn from.
-        InputError
-            The time was not declared, or the rows are not those of whole tests.
-        """
-        self._time = self.time
-        self._declared()
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        rows, steps = self._clock(X, checked[0], dt, fitting=True)
-        folds, self.chosen_by_ = number_folds(self._cycles(cycle, steps), len(rows))
-        learned = rows[folds >= 0]
-        self.data_min_, self.data_max_ = learned.min(axis=0), learned.max(axis=0)
+    def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._split_columns()
-        candidates = self._candidates(steps)
-        moments = self._moments(rows, checked[1], steps, folds)
+        candidates = self._candidates(step)
+        moments = self._moments(rows, deviation, step, folds)
         chosen, self.strength_, self.cv_rms_ = self._choose(candidates, moments)
         self.temperature_lags_, self.speed_lags_ = chosen.temperature_lags, chosen.speed_lags
         self._columns = chosen.columns
         total = ridge.part(moments.sum(axis=0), chosen.columns)
         weights, intercepts = ridge.solve(total, (self.strength_,), self.fit_intercept)
         self.coef_, self.intercept_ = weights[:, 0], float(intercepts[0])
-        return self
 
-    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
-        """Predict the deviation.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-        dt : array-like of shape (n_rows,), optional
-            As in `fit`.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        self._declared()
-        check_is_fitted(self)
-        rows, steps = self._clock(X, validate_data(self, X, dtype=np.float64, reset=False), dt)
-        table = self._features(rows, steps)
+    def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
+        table = self._features(rows, step)
         parts = [features[:, self._columns] @ self.coef_ + self.intercept_ for features in table]
         return np.concatenate(parts)
 
@@ -303,9 +273,9 @@ class DynamicRidge(TimedRegressor):
     # -- choice --------------------------------------------------------------------------------------------------------
 
     def _choose(self, candidates: list[_Candidate], moments: FloatArray) -> tuple[_Candidate, float, float]:
-        strengths = tuple(sorted(float(s) for s in self.strengths))
+        strengths = tuple(sorted((float(s) for s in self.strengths), reverse=True))
         if len(candidates) * len(strengths) == 1 or len(moments) == 1:
-            return candidates[0], strengths[len(strengths) // 2], float("nan")
+            return candidates[0], strengths[(len(strengths) - 1) // 2], float("nan")
         total = moments.sum(axis=0)
         rms = np.empty((len(candidates), len(strengths), len(moments)))
         for i, candidate in enumerate(candidates):
@@ -317,9 +287,5 @@ class DynamicRidge(TimedRegressor):
                 full = np.vstack([weights, intercepts, -np.ones(len(strengths))])
                 squares = (full * (left_out @ full)).sum(axis=0)
                 rms[i, :, k] = np.sqrt(np.maximum(squares, 0.0) / left_out[-2, -2])
-        mean = rms.mean(axis=2)
-        i, j = (int(k) for k in np.unravel_index(np.argmin(mean), mean.shape))
-        if self.rule == "one-standard-error":
-            limit = mean[i, j] + rms[i, j].std(ddof=1) / np.sqrt(len(moments))
-            j = int(np.flatnonzero(mean[i] <= limit).max())
-        return candidates[i], strengths[j], float(mean[i, j])
+        i, j = choose(rms, self.rule)
+        return candidates[i], strengths[j], float(rms[i, j].mean())

@@ -6,22 +6,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, clone, is_regressor
 from sklearn.pipeline import Pipeline
-from sklearn.utils.validation import validate_data
 
 from thermocomp.core.exceptions import FitError, InputError, ThermocompError
-from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.base import FloatArray, ThermalRegressor
 from thermocomp.models.pipelines import PipelineRegressor, freezes
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 
-FloatArray = NDArray[np.float64]
-
 
 class ForeignRegressor(UnfrozenRegressor):
     """A regressor without `freeze`: replayed and judged like the others, never deployed.
+
+    A `FitError` where its prediction raises, or is not a finite number per row.
 
     Parameters
     ----------
@@ -44,42 +42,10 @@ class ForeignRegressor(UnfrozenRegressor):
         """Name of the class, or of the steps of a Pipeline."""
         return title(self.estimator)
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "ForeignRegressor":
-        """Fit a copy of the estimator.
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
+        self.estimator_ = clone(self.estimator).fit(self._table(change), deviation)
 
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        ForeignRegressor
-        """
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        change: FloatArray = checked[0]
-        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
-        self.estimator_ = clone(self.estimator).fit(self._table(change), checked[1])
-        return self
-
-    def evaluate(self, change: FloatArray) -> FloatArray:
-        """Predict for rows that were checked before.
-
-        Parameters
-        ----------
-        change : ndarray of shape (n_rows, n_features)
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-
-        Raises
-        ------
-        FitError
-            It raises, or does not give a finite number per row.
-        """
+    def _predict(self, change: FloatArray) -> FloatArray:
         with refused(f"{self.name} cannot predict"):
             found = self.estimator_.predict(self._table(change))
         return numbers(found, len(change), self.name)

@@ -154,20 +154,7 @@ def fit_profile(
     """
     there = np.isfinite(values)
     points, values = points[there], values[there]
-    varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
-    used = varying if coordinates is None else coordinates
-    if axis not in varying:
-        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
-    if kind not in ("polynomial", "spline"):
-        raise InputError(f"profile {kind!r}: choose polynomial or spline")
-    if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
-        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
-    others = "".join(a for a in used if a != axis and a in varying)
-    if kind == "spline" and others and coordinates is not None:
-        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
-    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
-    if n_own < MIN_POSITIONS:
-        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
+    others, n_own = _suited(points, axis, kind, coordinates)
     place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
     shape = _Spline(points, axis) if kind == "spline" else _Polynomial(points, axis, others)
     tried: list[Tried] = []
@@ -203,6 +190,25 @@ def fit_profile(
         misfit=_misfit(left, values, place, n_terms),
         through=through,
     )
+
+
+def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) -> tuple[str, int]:
+    """Refuse what no profile can be fitted to; return the other axes it depends on, and its positions along its own."""
+    varying = "".join(a for k, a in enumerate("XYZ") if points.size and np.ptp(points[:, k]) > 0)
+    used = varying if coordinates is None else coordinates
+    if axis not in varying:
+        raise FitError(f"profile along {axis}: all positions along {axis} are the same")
+    if kind not in ("polynomial", "spline"):
+        raise InputError(f"profile {kind!r}: choose polynomial or spline")
+    if any(a not in "XYZ" for a in used) or (coordinates is not None and axis not in used):
+        raise InputError(f"coordinates {used!r}: name the own axis {axis} and, if wanted, others of X, Y, Z")
+    others = "".join(a for a in used if a != axis and a in varying)
+    if kind == "spline" and others and coordinates is not None:
+        raise InputError(f"a spline is one along {axis} alone: for {used} choose a polynomial")
+    n_own = len(np.unique(points[:, "XYZ".index(axis)]))
+    if n_own < MIN_POSITIONS:
+        raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")
+    return others, n_own
 
 
 def _choose(tried: Sequence[Tried], n_own: int) -> Tried:
@@ -293,8 +299,7 @@ class _Polynomial:
     """Terms u^i v^j w^k: i up to the own degree, j + k up to the others', i + j + k up to the larger of the two."""
 
     def __init__(self, points: FloatArray, axis: str, others: str) -> None:
-        low, high = points.min(axis=0), points.max(axis=0)
-        self.low, self.high = low, high
+        low, high = self.low, self.high = points.min(axis=0), points.max(axis=0)
         self.centre = (low + high) / 2
         self.scale = np.where(high > low, (high - low) / 2, 1.0)
         self.scaled = (points - self.centre) / self.scale
@@ -314,15 +319,12 @@ class _Polynomial:
                     yield i, j
 
     def exponents(self, order: Order) -> list[tuple[int, int, int]]:
-        found = []
         limits = [0, 0, 0]
         limits[self.own] = order[0]
         for a in self.others:
             limits[a] = min(order[1], self.distinct[a] - 1)
-        for e in np.ndindex(*(n + 1 for n in limits)):
-            if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order):
-                found.append((e[0], e[1], e[2]))
-        return found
+        possible = np.ndindex(limits[0] + 1, limits[1] + 1, limits[2] + 1)
+        return [e for e in possible if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order)]
 
     def columns(self, order: Order) -> FloatArray:
         return np.stack([np.prod(self.scaled ** np.array(e), axis=1) for e in self.exponents(order)], axis=1)
@@ -341,13 +343,17 @@ class _Polynomial:
         )
 
 
-class _Spline:
-    """Cubic spline whose inner knots part the positions into equal numbers."""
+class _Along:
+    """A profile along its own axis alone."""
 
     def __init__(self, points: FloatArray, axis: str) -> None:
         self.axis = axis
         self.position = points[:, "XYZ".index(axis)]
         self.places = np.unique(self.position)
+
+
+class _Spline(_Along):
+    """Cubic spline whose inner knots part the positions into equal numbers."""
 
     def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis count
         """Give the numbers of knots that leave two positions to spare."""
@@ -367,13 +373,8 @@ class _Spline:
         return _pieces(self.axis, knots[3:-3], pieces.c[:, 3:-3])
 
 
-class _Through:
+class _Through(_Along):
     """Natural cubic spline through the means of all positions."""
-
-    def __init__(self, points: FloatArray, axis: str) -> None:
-        self.axis = axis
-        self.position = points[:, "XYZ".index(axis)]
-        self.places = np.unique(self.position)
 
     def through(self, values: FloatArray, rows: NDArray[np.bool_] | slice = slice(None)) -> CubicSpline:
         """Return the spline through the means of some rows."""

@@ -4,17 +4,14 @@ import warnings
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
-from sklearn.utils.validation import validate_data
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import scaling
 from thermocomp.models.unfrozen import UnfrozenRegressor
-
-FloatArray = NDArray[np.float64]
 
 _CHUNK = 2_000  # rows predicted at once: bounds the memory
 
@@ -30,7 +27,7 @@ class GaussianProcess(UnfrozenRegressor):
     Parameters
     ----------
     max_rows : int
-        Rows that are learned from, thinned evenly: the fit grows with their cube.
+        Rows that are learned from, at least 2, thinned evenly: the fit grows with their cube.
 
     Attributes
     ----------
@@ -40,6 +37,19 @@ class GaussianProcess(UnfrozenRegressor):
         Rows that were learned from.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range: of all rows given to `fit`.
+
+    References
+    ----------
+    Rasmussen, C. E., Williams, C. K. I.: Gaussian Processes for Machine Learning. MIT Press, 2006.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import GaussianProcess
+    >>> rise = np.linspace(0, 10, 60)[:, None]  # [degC]
+    >>> model = GaussianProcess().fit(rise, 20 * np.sin(rise[:, 0] / 4))
+    >>> print(f"{model.predict([[5.0]])[0]:.1f} um instead of {20 * np.sin(5.0 / 4):.1f} um")
+    19.0 um instead of 19.0 um
     """
 
     name: ClassVar[str] = "gp"
@@ -47,31 +57,9 @@ class GaussianProcess(UnfrozenRegressor):
     def __init__(self, *, max_rows: int = 500) -> None:
         self.max_rows = max_rows
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "GaussianProcess":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        GaussianProcess
-
-        Raises
-        ------
-        InputError
-            `max_rows` is less than 2.
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         if self.max_rows < 2:
             raise InputError(f"max_rows {self.max_rows}: want at least 2")
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        change: FloatArray = checked[0]
-        deviation = np.asarray(checked[1], dtype=np.float64)
-        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
         rows = np.linspace(0, len(change) - 1, min(self.max_rows, len(change))).round().astype(np.intp)
         self.n_rows_ = len(rows)
         self._centre, self._scale = scaling(change[rows])
@@ -87,7 +75,6 @@ class GaussianProcess(UnfrozenRegressor):
             process.fit((change[rows] - self._centre) / self._scale, (deviation[rows] - mean) / spread)
         self.kernel_ = process.kernel_
         self._prepare(process, mean, spread)
-        return self
 
     def _prepare(self, process: GaussianProcessRegressor, mean: float, spread: float) -> None:
         """Collect what a prediction needs: the plane as coefficients, the rest as a sum over the training rows."""
@@ -101,17 +88,7 @@ class GaussianProcess(UnfrozenRegressor):
         self._rows = rows / self._length
         self._weights = smooth.k1.constant_value * alpha
 
-    def evaluate(self, change: FloatArray) -> FloatArray:
-        """Predict for rows that were checked before.
-
-        Parameters
-        ----------
-        change : ndarray of shape (n_rows, n_features)
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
+    def _predict(self, change: FloatArray) -> FloatArray:
         Z = (change - self._centre) / self._scale
         deviation = Z @ self._plane + self._level
         half = 0.5 * np.einsum("ij,ij->i", self._rows, self._rows)

@@ -1,20 +1,18 @@
 """`grouping`: sensors by correlation grouping and successive regression (Hwang, Lee, Yang)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
 from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
 
-FloatArray = NDArray[np.float64]
 
-
-class CorrelationGrouping(TermRegressor):
+class CorrelationGrouping(StaticRegressor, TermRegressor):
     """Linear model of the temperatures that correlation grouping and successive regression choose (H-01).
 
     Temperatures are grouped by their correlation; successive regression makes one of each group its representative; the
@@ -27,6 +25,9 @@ class CorrelationGrouping(TermRegressor):
 
     With a `reference`, the temperatures themselves are grouped, without it, and regressed on are their differences from
     it (section 3.2.1; H-08). A temperature that is constant, or constant but for the reference, is left out.
+
+    A threshold beyond -1 to 1 is an `InputError`, and so is a reference that does not exist; a `FitError` if no
+    temperature varies, there are fewer than three rows (two without intercept), or there is too much to search.
 
     Parameters
     ----------
@@ -73,6 +74,22 @@ class CorrelationGrouping(TermRegressor):
         Eigenvalues of X'X of the selected variables, as in Table 3 (H-16).
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Hwang, S.-H., Lee, J.-H., Yang, S.-H.: Optimal Variable Selection in a Thermal Error Model for Real Time Error
+    Compensation (in Korean). From a study that was funded in 1997.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import CorrelationGrouping
+    >>> rng = np.random.default_rng(0)
+    >>> places = rng.normal(size=(100, 2)).cumsum(axis=0)  # two places, two sensors at each [degC]
+    >>> rises = places[:, [0, 0, 1, 1]] + 0.1 * rng.normal(size=(100, 4))
+    >>> model = CorrelationGrouping(threshold=0.95).fit(rises, 4 * rises[:, 0] - 2 * rises[:, 3])
+    >>> print(model.groups_, model.selected_, model.coef_.round(3).tolist())
+    ((1, 0), (3, 2)) (0, 3) [4.0, -2.0]
     """
 
     def __init__(
@@ -88,29 +105,7 @@ class CorrelationGrouping(TermRegressor):
         self.reference = reference
         self.fit_intercept = fit_intercept
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "CorrelationGrouping":
-        """Select and fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Temperatures minus their reference state.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        CorrelationGrouping
-
-        Raises
-        ------
-        InputError
-            A threshold beyond -1 to 1, or no such reference.
-        FitError
-            No temperature varies, there are fewer than three rows (two without intercept), or there is too much to
-            search.
-        """
-        change, deviation, _ = self._read(X, y)
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         names = self._names()
         zero = self._reference_index(names)
         values = change if zero is None else change - change[:, [zero]]
@@ -144,8 +139,7 @@ class CorrelationGrouping(TermRegressor):
             for i in self.selected_
         ]
         found = solve(values[:, self.candidates_], deviation, tri, columns=choice.selected)
-        self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total, self.fit_intercept)
-        return self
+        self._keep(found, variables, [(k,) for k in range(len(variables))], tri.total)
 
     def log_text(self, target: str = "Y") -> str:
         """Return as text the groups, the curve of MSE_p, the model and how far its variables repeat each other.
@@ -187,14 +181,7 @@ class CorrelationGrouping(TermRegressor):
             f"EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",
             "",
         ]
-        wide = max([len("VARIABLE"), *(len(t) for t in self.terms_)])
-        lines.append(f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}  CONTRIBUTION")
-        if self.fit_intercept:
-            lines.append(f"{'CONSTANT':<{wide}}  {self.intercept_:14.6g}")
-        lines += [
-            f"{name:<{wide}}  {value:14.6g}  {share:12.4f}"
-            for name, value, share in zip(self.terms_, self.coef_, self.contributions_, strict=True)
-        ]
+        lines += self._coefficient_lines("  CONTRIBUTION", [f"  {share:12.4f}" for share in self.contributions_])
         s = self.spectrum_
         lines += [
             "",

@@ -5,24 +5,20 @@ from abc import abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import enet_path
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.base import FloatArray
+from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
 #: shares of the strength at which the last input drops out
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
 _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; a change of either moves no figure
 
 
-class _Sparse(ShrunkRegressor):
+class _Sparse(PenalisedRegressor):
     """Linear regression with a penalty on the coefficients' absolute values."""
-
-    strengths: Sequence[float]
 
     @abstractmethod
     def _ratios(self) -> tuple[float, ...]:
@@ -44,8 +40,8 @@ class _Sparse(ShrunkRegressor):
         return paths
 
     def _note(self, which: int, setting: int) -> None:
+        super()._note(which, setting)
         self.l1_ratio_ = self._ratios()[which]
-        self.strength_ = float(sorted_strengths(self.strengths)[setting])
 
     @property
     def selected_(self) -> tuple[str, ...]:
@@ -75,6 +71,24 @@ class Lasso(_Sparse):
         Names of the inputs that were not dropped.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Tibshirani, R.: Regression shrinkage and selection via the lasso. Journal of the Royal Statistical Society B 58(1),
+    1996, 267-288. doi:10.1111/j.2517-6161.1996.tb02080.x
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import Lasso
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> model = Lasso().fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4] + rng.normal(size=200))
+    >>> print(model.selected_, model.coef_.round(1)[[1, 4]].tolist())
+    ('x1', 'x4') [4.9, -2.9]
     """
 
     def __init__(
@@ -118,6 +132,24 @@ class ElasticNet(_Sparse):
         Names of the inputs that were not dropped.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Zou, H., Hastie, T.: Regularization and variable selection via the elastic net. Journal of the Royal Statistical
+    Society B 67(2), 2005, 301-320. doi:10.1111/j.1467-9868.2005.00503.x
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ElasticNet
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 3))[:, [0, 1, 1, 2]]  # two sensors at one place [degC]
+    >>> model = ElasticNet(l1_ratios=(0.7,)).fit(rises, 5 * rises[:, 1] + rng.normal(size=200))
+    >>> print(model.selected_, model.coef_.round(1)[[1, 2]].tolist())
+    ('x1', 'x2') [2.4, 2.4]
     """
 
     def __init__(

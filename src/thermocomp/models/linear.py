@@ -4,19 +4,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
-from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.numerics.leastsquares import Solution, effective_sample_size, table
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.base import FloatArray, MemorylessRegressor
+from thermocomp.models.numerics.leastsquares import Solution, Triangle, effective_sample_size, solve, table, triangle
 
 
-class TermRegressor(ThermalRegressor):
+class TermRegressor(MemorylessRegressor):
     """Linear combination of terms of the inputs.
 
     Attributes
@@ -44,20 +40,9 @@ class TermRegressor(ThermalRegressor):
         Trained range.
     """
 
-    def predict(self, X: ArrayLike) -> FloatArray:
-        """Predict the deviation.
+    fit_intercept: bool
 
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        check_is_fitted(self)
-        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+    def _predict(self, change: FloatArray) -> FloatArray:
         return np.asarray(self._table.evaluate(change) @ self.coef_ + self.intercept_)
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Polynomial:
@@ -79,19 +64,21 @@ class TermRegressor(ThermalRegressor):
 
     # -- for the methods ---------------------------------------------------------------------------------------------
 
-    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Check the training data and note their range; return X, y, and a copy of both as `table`."""
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        change, deviation = checked[0], np.asarray(checked[1], dtype=np.float64)
-        both = table(change, deviation)
-        # by column in memory, which makes these ten times as fast
-        self.data_min_, self.data_max_ = both[:, :-1].min(axis=0), both[:, :-1].max(axis=0)
-        return change, deviation, both
-
-    def _keep(
-        self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float, intercept: bool
+    def _regress(
+        self, change: FloatArray, deviation: FloatArray, columns: Sequence[int], tri: Triangle | None = None
     ) -> None:
+        """Note the least squares on some of the inputs; `tri` is that of all, if it is there already."""
+        tri = tri or triangle(table(change, deviation), intercept=self.fit_intercept)
+        found = solve(change, deviation, tri, columns=columns)
+        self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
+
+    def _inputs_alone(self) -> list[Variable]:
+        """Return each input as a variable of its own."""
+        return [Variable.single(name, i) for i, name in enumerate(self._names())]
+
+    def _keep(self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float) -> None:
         """Note the coefficients of `terms`, and how well they fit; `total` is the sum of squares of y."""
+        one = int(self.fit_intercept)
         self._table = TermTable(self.n_features_in_, tuple(variables), tuple(terms))
         n_rows = len(found.residual)
         self.coef_, self.intercept_ = found.coefficients, found.intercept
@@ -99,10 +86,19 @@ class TermRegressor(ThermalRegressor):
         self.dependent_ = tuple(self.terms_[k] for k in found.dependent)
         self.condition_ = found.condition
         self.n_rows_ = n_rows
-        self.r_squared_kind_ = "centred" if intercept else "uncentred"
-        left = n_rows - found.rank - int(intercept)
+        self.r_squared_kind_ = "centred" if one else "uncentred"
+        left = n_rows - found.rank - one
         self.r_squared_ = 1 - found.rss / total if total > 0 else float("nan")
-        per_row = (n_rows - int(intercept)) / left if left > 0 else float("nan")
+        per_row = (n_rows - one) / left if left > 0 else float("nan")
         self.adjusted_r_squared_ = 1 - (1 - self.r_squared_) * per_row
         self.standard_error_ = float(np.sqrt(found.rss / left)) if left > 0 else float("nan")
         self.n_effective_ = effective_sample_size(found.residual)
+
+    def _coefficient_lines(self, title: str = "", beside: Sequence[str] = ()) -> list[str]:
+        """Return a table of the coefficients as text, the constant first; `beside` is a further column of them."""
+        wide = max(len(name) for name in ("VARIABLE", *self.terms_))
+        lines = [f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}{title}"]
+        if self.fit_intercept:
+            lines.append(f"{'CONSTANT':<{wide}}  {self.intercept_:14.6g}")
+        rows = zip(self.terms_, self.coef_, beside or [""] * len(self.terms_), strict=True)
+        return [*lines, *(f"{name:<{wide}}  {value:14.6g}{more}" for name, value, more in rows)]

@@ -6,16 +6,13 @@ from typing import Literal
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.network import Affine
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.nets import NetRegressor, thinned
 from thermocomp.models.numerics.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
-from thermocomp.models.numerics.folds import number_folds
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 #: hidden counts in a row that bring no gain and end a sweep
 PATIENCE = 2
@@ -101,6 +98,24 @@ class SigmoidNet(NetRegressor):
         What was left out to choose.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
+
+    References
+    ----------
+    Chen, J. S., Yuan, J., Ni, J.: Thermal Error Modelling for Real-Time Error Compensation. The International Journal
+    of Advanced Manufacturing Technology 12, 1996.
+
+    Rumelhart, D. E., Hinton, G. E., Williams, R. J.: Learning representations by back-propagating errors. Nature 323,
+    1986, 533-536. doi:10.1038/323533a0
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SigmoidNet
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (100, 2))  # of two temperatures [degC]
+    >>> y = 20 * np.sin(rises[:, 0] / 4) + rises[:, 1]
+    >>> model = SigmoidNet(hidden=6, n_epochs=2000).fit(rises, y)
+    >>> print(model.n_parameters_, round(model.score(rises, y), 2))
+    25 0.98
     """
 
     def __init__(
@@ -164,14 +179,11 @@ class SigmoidNet(NetRegressor):
         Raises
         ------
         FitError
-            No row to learn from.
+            Fewer than two rows to learn from.
         InputError
             A setting is out of its range.
         """
-        change, deviation = self._read(X, y)
-        folds, left_out = number_folds(cycle, len(change))
-        learned = folds >= 0
-        change, deviation, folds = change[learned], deviation[learned], folds[learned]
+        change, deviation, folds, left_out = self._learned(X, y, cycle)
         self.sweep_: tuple[HiddenCount, ...] = ()
         if np.ndim(self.hidden):
             self._sweep(change, deviation, folds, left_out, progress)

@@ -4,17 +4,17 @@ import warnings
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from sklearn.exceptions import ConvergenceWarning
 
 from thermocomp.core.network import Activation, Affine, Perceptron
-from thermocomp.models.nets import FloatArray, NetRegressor, thinned
+from thermocomp.models.base import FloatArray, StaticRegressor
+from thermocomp.models.nets import NetRegressor, thinned
 from thermocomp.models.numerics.backprop import constant
 
 _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
 
 
-class SklearnNet(NetRegressor):
+class SklearnNet(StaticRegressor, NetRegressor):
     """`sklearn.neural_network.MLPRegressor` with one hidden layer, inputs and targets standardised.
 
     Its output is linear: beyond the trained range it goes on where Chen's net saturates. A channel that does not
@@ -44,6 +44,21 @@ class SklearnNet(NetRegressor):
         Iterations of the solver.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
+
+    References
+    ----------
+    Pedregosa, F., et al.: Scikit-learn: machine learning in Python. Journal of Machine Learning Research 12, 2011,
+    2825-2830.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SklearnNet
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (100, 2))  # of two temperatures [degC]
+    >>> y = 20 * np.sin(rises[:, 0] / 4) + rises[:, 1]
+    >>> model = SklearnNet(hidden=6).fit(rises, y)
+    >>> print(model.n_parameters_, round(model.score(rises, y), 2))
+    25 1.0
     """
 
     def __init__(
@@ -65,23 +80,9 @@ class SklearnNet(NetRegressor):
         self.max_patterns = max_patterns
         self.seed = seed
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "SklearnNet":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,) or (n_rows, n_outputs)
-            Deviation.
-
-        Returns
-        -------
-        SklearnNet
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         from sklearn.neural_network import MLPRegressor  # not needed by the other methods, and slow to import
 
-        change, deviation = self._read(X, y)
         (gain, offset, _), (out_gain, out_offset, unit) = _standard(change), _standard(deviation)
         into = Affine(tuple(gain.tolist()), tuple(offset.tolist()))
         rows = thinned(len(change), self.max_patterns)
@@ -111,7 +112,6 @@ class SklearnNet(NetRegressor):
         if unfinished:
             first_line = str(unfinished[0].message).splitlines()[0].rstrip(":.")
             self.caution_ = "; ".join(filter(None, [f"scikit-learn's solver gave up: {first_line}", self.caution_]))
-        return self
 
 
 def _standard(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

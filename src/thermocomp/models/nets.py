@@ -4,21 +4,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.utils import Tags
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input, Provenance, Support
+from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Network, Perceptron
-from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.base import FloatArray, IntArray, MemorylessRegressor
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
-
-class NetRegressor(ThermalRegressor):
+class NetRegressor(MemorylessRegressor):
     """A net with one hidden layer; one for several outputs at once, if y has several columns.
 
     Attributes
@@ -40,50 +36,21 @@ class NetRegressor(ThermalRegressor):
         Trained range.
     """
 
-    def predict(self, X: ArrayLike) -> FloatArray:
-        """Predict the deviation.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,) or (n_rows, n_outputs)
-            As y in `fit`.
-        """
-        check_is_fitted(self)
-        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+    def _predict(self, change: FloatArray) -> FloatArray:
         deviation = self.output_scaling_(self.net_.evaluate(self.input_scaling_(change)))
         return deviation[:, 0] if self._one_dimensional else deviation
 
-    def freeze(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-        output: int | None = None,
-    ) -> Network:
+    def freeze(self, *, inputs: Sequence[Input] | None = None, output: int | None = None, **header: Any) -> Network:
         """Return one output of the fitted net as plain numbers, without the inputs that never changed in training.
 
         Parameters
         ----------
-        target : str
-            Displacement channel (or error component) it predicts.
-        unit : str
-            Unit of the deviation it gives.
         inputs : sequence of Input, optional
-            One per feature; see `ThermalRegressor.freeze`.
-        support : Support
-            What the model does outside its trained range.
-        provenance : Provenance, optional
-            Where it comes from.
+            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         output : int, optional
             Column of y; must be given if y had several. Each column makes a model of its own.
+        **header
+            As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
         Returns
         -------
@@ -94,8 +61,7 @@ class NetRegressor(ThermalRegressor):
         InputError
             `inputs` are not as many as the features, or there is no such output.
         """
-        header = {"target": target, "unit": unit, "support": support, "provenance": provenance}
-        return self._frozen(self._inputs(inputs), header, output)
+        return self._frozen(self._inputs(inputs), {"unit": "um", **header}, output)
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any], output: int | None = None) -> Network:
         net, into, out_of = self.net_, self.input_scaling_, self.output_scaling_
@@ -132,17 +98,15 @@ class NetRegressor(ThermalRegressor):
 
     # -- for those who train -----------------------------------------------------------------------------------------
 
-    def _read(self, X: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _read(self, X: ArrayLike, y: ArrayLike, *, multi_output: bool = True) -> tuple[FloatArray, FloatArray]:
         """Check the training data; return X, and y as a table of shape (n_rows, n_outputs)."""
-        checked = validate_data(self, X, y, multi_output=True, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        deviation = np.asarray(checked[1], dtype=np.float64)
+        change, deviation = super()._read(X, y, multi_output=multi_output)
         self._one_dimensional = deviation.ndim == 1
-        return checked[0], deviation.reshape(len(deviation), -1)
+        return change, deviation.reshape(len(deviation), -1)
 
     def _keep(self, net: Perceptron, into: Affine, out_of: Affine, X: FloatArray, y: FloatArray, n_rows: int) -> None:
         """Note the net, and how it stands to the `n_rows` patterns taken from X and y."""
         self.net_, self.input_scaling_, self.output_scaling_ = net, into, out_of
-        self.data_min_, self.data_max_ = X.min(axis=0), X.max(axis=0)
         self.n_parameters_, self.n_patterns_ = net.n_parameters, n_rows
         residual = y - out_of(net.evaluate(into(X)))
         self.n_effective_ = min(float(n_rows), *(effective_sample_size(r) for r in residual.T))

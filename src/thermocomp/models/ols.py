@@ -1,13 +1,10 @@
 """`ols`: least squares on all inputs."""
 
-from numpy.typing import ArrayLike
-
-from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import solve, triangle
 
 
-class LeastSquares(TermRegressor):
+class LeastSquares(StaticRegressor, TermRegressor):
     """Linear least squares on all inputs: the method others are compared with (T-08).
 
     Inputs that depend on others get the coefficient 0 and are told in ``dependent_``; how this is decided says
@@ -26,28 +23,23 @@ class LeastSquares(TermRegressor):
         Names of the inputs that were left out.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Golub, G. H., Van Loan, C. F.: Matrix Computations. 4th edition, Johns Hopkins University Press, 2013, section 5.3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import LeastSquares
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (50, 3))  # of three temperatures [degC]
+    >>> model = LeastSquares().fit(rises, 2 + 5 * rises[:, 0] - 3 * rises[:, 2])
+    >>> print(round(model.intercept_, 3), (model.coef_.round(3) + 0.0).tolist())
+    2.0 [5.0, 0.0, -3.0]
     """
 
     def __init__(self, *, fit_intercept: bool = True) -> None:
         self.fit_intercept = fit_intercept
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "LeastSquares":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        LeastSquares
-        """
-        change, deviation, both = self._read(X, y)
-        tri = triangle(both, intercept=self.fit_intercept)
-        found = solve(change, deviation, tri)
-        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
-        self._keep(found, variables, [(i,) for i in range(len(variables))], tri.total, self.fit_intercept)
-        return self
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
+        self._regress(change, deviation, range(self.n_features_in_))

@@ -1,15 +1,13 @@
 """`pcr`: regression on the first principal components of the inputs."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
+from thermocomp.models.base import FloatArray
+from thermocomp.models.shrinkage import ComponentRegressor
 
-FloatArray = NDArray[np.float64]
 
-
-class PrincipalComponents(ShrunkRegressor):
+class PrincipalComponents(ComponentRegressor):
     """Principal component regression, which Miao et al. use against collinear temperatures (T-10).
 
     Least squares on the first principal components of the standardised inputs, in the order of their variance; how
@@ -32,31 +30,30 @@ class PrincipalComponents(ShrunkRegressor):
         Chosen number; components without variance (dependent inputs) add nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Massy, W. F.: Principal components regression in exploratory statistical research. Journal of the American
+    Statistical Association 60(309), 1965, 234-256.
+
+    The Open Mechanical Engineering Journal 11, 2017: the study of temperature measurement points by stepwise regression
+    that is called stepwise2017 here.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import PrincipalComponents
+    >>> rng = np.random.default_rng(0)
+    >>> heat = rng.normal(size=(200, 2)).cumsum(axis=0)  # two sources, six sensors [degC]
+    >>> rises = heat @ rng.uniform(size=(2, 6)) + 0.01 * rng.normal(size=(200, 6))
+    >>> model = PrincipalComponents().fit(rises, 3 * heat[:, 0] - heat[:, 1] + rng.normal(size=200))
+    >>> print(model.n_components_, round(model.r_squared_, 3))
+    2 0.998
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-
-    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        most = most_components(self.components or self.max_components, Z.shape[1])
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
         left, values, right = linalg.svd(Z, full_matrices=False, lapack_driver="gesvd")  # whatever the input, it ends
         steps = np.zeros((most, Z.shape[1]))
         for k in np.flatnonzero(values[:most] > 1e-10 * values.max(initial=0.0)):
             steps[k] = right[k] * ((left[:, k] @ y) / values[k])
-        paths = np.cumsum(steps, axis=0)
-        return paths[None] if self.components is None else paths[None, -1:]
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.n_components_ = (
-            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
-        )
+        return np.asarray(np.cumsum(steps, axis=0))

@@ -5,22 +5,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import clone
 from sklearn.feature_selection import SelectorMixin
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel, Input, Provenance, Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
 from thermocomp.models.timed import TimedRegressor
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 
 def freezes(pipeline: Pipeline) -> bool:
@@ -61,6 +58,18 @@ def freeze(
     ------
     FitError
         It cannot be frozen.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from thermocomp import LeastSquares, SensorSelector, freeze
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> pipeline = make_pipeline(SensorSelector("partial-f"), LeastSquares(fit_intercept=False))
+    >>> model = freeze(pipeline.fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4]), target="z_um")
+    >>> print({name: round(value, 3) for name, value in model.coefficients_by_name().items()})
+    {'x1': 5.0, 'x4': -3.0}
     """
     header: dict[str, Any] = {"target": target, "unit": unit, "support": support, "provenance": provenance}
     if not isinstance(estimator, Pipeline):
@@ -133,11 +142,10 @@ class PipelineRegressor(ThermalRegressor):
         -------
         PipelineRegressor
         """
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        deviation = np.asarray(checked[1])
+        change, deviation = self._read(X, y)
         folds = np.zeros(len(deviation), dtype=np.intp) if cycle is None else np.asarray(cycle)
         learned = folds >= 0
-        self.data_min_, self.data_max_ = checked[0][learned].min(axis=0), checked[0][learned].max(axis=0)
+        self._note_range(change[learned])
         *before, last = (clone(s) for s in _steps(self.pipeline))
         table: Any = X
         for step in before:

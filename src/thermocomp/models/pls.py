@@ -3,15 +3,13 @@
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.cross_decomposition import PLSRegression
 
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, most_components
+from thermocomp.models.base import FloatArray
+from thermocomp.models.shrinkage import ComponentRegressor
 
-FloatArray = NDArray[np.float64]
 
-
-class PartialLeastSquares(ShrunkRegressor):
+class PartialLeastSquares(ComponentRegressor):
     """Partial least squares (Wold): components that follow the deviation, not only the inputs' own variance.
 
     scikit-learn's `PLSRegression` on standardised inputs. Its components come one after the other, so one fit serves
@@ -34,23 +32,26 @@ class PartialLeastSquares(ShrunkRegressor):
         Chosen number; beyond the rank of the inputs further ones add nothing.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Wold, S., Ruhe, A., Wold, H., Dunn, W. J.: The collinearity problem in linear regression. The partial least squares
+    (PLS) approach to generalized inverses. SIAM Journal on Scientific and Statistical Computing 5(3), 1984, 735-743.
+    doi:10.1137/0905052
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import PartialLeastSquares
+    >>> rng = np.random.default_rng(0)
+    >>> heat = rng.normal(size=(200, 2)).cumsum(axis=0)  # two sources, six sensors [degC]
+    >>> rises = heat @ rng.uniform(size=(2, 6)) + 0.01 * rng.normal(size=(200, 6))
+    >>> model = PartialLeastSquares().fit(rises, 3 * heat[:, 0] - heat[:, 1] + rng.normal(size=200))
+    >>> print(model.n_components_, round(model.r_squared_, 3))
+    2 0.998
     """
 
-    def __init__(
-        self,
-        *,
-        components: int | None = None,
-        max_components: int | None = None,
-        rule: Rule = "one-standard-error",
-        fit_intercept: bool = True,
-    ) -> None:
-        self.components = components
-        self.max_components = max_components
-        self.rule = rule
-        self.fit_intercept = fit_intercept
-
-    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
-        most = most_components(self.components or self.max_components, Z.shape[1])
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
         paths = np.zeros((most, Z.shape[1]))
         # beyond the rank, components would be made of rounding errors
         used = min(most, int(np.linalg.matrix_rank(Z, rtol=1e-8)))
@@ -62,9 +63,4 @@ class PartialLeastSquares(ShrunkRegressor):
                 model.fit(np.vstack([Z, -Z]), np.concatenate([y, -y]))
             paths[:used] = np.cumsum(model.x_rotations_ * model.y_loadings_[0], axis=1).T
             paths[used:] = paths[used - 1]
-        return paths[None] if self.components is None else paths[None, -1:]
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.n_components_ = (
-            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
-        )
+        return paths

@@ -5,18 +5,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import linalg
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input
 from thermocomp.core.terms import Variable
-from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.shrinkage import Rule, choose, learned_rows, scaling
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.base import CycledRegressor, FloatArray, IntArray
+from thermocomp.models.shrinkage import Rule, choose, scaling
 
 _KNOTS = 25  # of a curve, evenly over its projection; the penalty, not their number, makes it smooth
 _DAMPING = 1e-4  # of a Gauss-Newton step, in units of the mean curvature: collinear inputs leave some at nearly none
@@ -26,7 +23,7 @@ _SWEEPS = 20  # of backfitting after each new term
 _GAIN = 1e-3  # less of the residual sum of squares per step or sweep is not worth another one
 
 
-class ProjectionPursuit(ThermalRegressor):
+class ProjectionPursuit(CycledRegressor):
     """Projection pursuit regression (Friedman and Stuetzle 1981), the comparison of stepwise2017 (T-08).
 
     Deviation = intercept + f1(a1 . x) + f2(a2 . x) + ... One term after the other is added to what the others leave:
@@ -64,6 +61,26 @@ class ProjectionPursuit(ThermalRegressor):
         What was left out to choose.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
+
+    References
+    ----------
+    Friedman, J. H., Stuetzle, W.: Projection pursuit regression. Journal of the American Statistical Association
+    76(376), 1981, 817-823. doi:10.1080/01621459.1981.10477729
+
+    Friedman, J. H.: SMART user's guide. Stanford University, Laboratory for Computational Statistics, report 1, 1984.
+
+    Li, K.-C.: On principal Hessian directions for data visualization and dimension reduction: another application of
+    Stein's lemma. Journal of the American Statistical Association 87(420), 1992, 1025-1039.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import ProjectionPursuit
+    >>> rises = np.random.default_rng(0).uniform(0, 10, (120, 3))  # of three temperatures [degC]
+    >>> model = ProjectionPursuit(max_terms=1, degrees=(6.0,)).fit(rises, (rises[:, 0] - rises[:, 1]) ** 2)
+    >>> along = model.directions_[0] / model.directions_[0, 0]
+    >>> print((along.round(2) + 0.0).tolist(), round(model.r_squared_, 3))
+    [1.0, -1.0, 0.0] 0.999
     """
 
     def __init__(
@@ -73,36 +90,8 @@ class ProjectionPursuit(ThermalRegressor):
         self.degrees = degrees
         self.rule = rule
 
-    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "ProjectionPursuit":
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
-        y : array-like of shape (n_rows,)
-            Deviation.
-        cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
-            take the place of the cycles.
-
-        Returns
-        -------
-        ProjectionPursuit
-
-        Raises
-        ------
-        FitError
-            Fewer than two rows to learn from.
-        InputError
-            A setting that is none.
-        """
+    def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
         degrees = self._settings()
-        checked = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        change, deviation, folds, self.chosen_by_ = learned_rows(
-            checked[0], np.asarray(checked[1], dtype=np.float64), cycle
-        )
-        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
         rms = np.empty((len(degrees), self.max_terms, int(folds.max()) + 1))
         for k in range(rms.shape[2]):
             out = folds == k
@@ -118,22 +107,8 @@ class ProjectionPursuit(ThermalRegressor):
         total = float(np.sum((deviation - deviation.mean()) ** 2))
         residual = deviation - found.predict(change)
         self.r_squared_ = 1 - float(residual @ residual) / total if total > 0 else float("nan")
-        return self
 
-    def predict(self, X: ArrayLike) -> FloatArray:
-        """Predict the deviation.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        check_is_fitted(self)
-        change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
+    def _predict(self, change: FloatArray) -> FloatArray:
         return _Model(self.intercept_, self.directions_, self.curves_).predict(change)
 
     def _settings(self) -> tuple[float, ...]:

@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.linear_model import ridge_regression
 
+from thermocomp.models.base import FloatArray
 from thermocomp.models.dynamic import STRENGTHS
-from thermocomp.models.shrinkage import Rule, ShrunkRegressor, sorted_strengths
-
-FloatArray = NDArray[np.float64]
+from thermocomp.models.shrinkage import PenalisedRegressor, Rule, sorted_strengths
 
 
-class Ridge(ShrunkRegressor):
+class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: what `dynamic` is without its memory.
 
     scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving thermal cycles out.
@@ -32,6 +30,28 @@ class Ridge(ShrunkRegressor):
         Chosen strength.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
+
+    References
+    ----------
+    Hoerl, A. E., Kennard, R. W.: Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12(1),
+    1970, 55-67. doi:10.1080/00401706.1970.10488634
+
+    Breiman, L., Friedman, J. H., Olshen, R. A., Stone, C. J.: Classification and Regression Trees. Wadsworth, 1984
+    (the one-standard-error rule).
+
+    Liu, H., Miao, E. M., Wei, X. Y., et al.: Robust modeling method for thermal error of CNC machine tools based on
+    ridge regression algorithm. International Journal of Machine Tools and Manufacture 113, 2017, 35-48.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import Ridge
+    >>> rng = np.random.default_rng(0)
+    >>> rise = rng.uniform(0, 10, 200)
+    >>> rises = rise[:, None] + 0.01 * rng.normal(size=(200, 2))  # two sensors at one place [degC]
+    >>> model = Ridge().fit(rises, 4 * rise + rng.normal(size=200))
+    >>> print(model.coef_.round(1).tolist(), f"{model.cv_rms_:.1f} um")
+    [2.0, 2.0] 1.0 um
     """
 
     def __init__(
@@ -50,6 +70,3 @@ class Ridge(ShrunkRegressor):
         copies = np.repeat(y[:, None], strengths.size, axis=1)
         weights: FloatArray = ridge_regression(Z, copies, alpha=len(y) * strengths, solver="svd")
         return weights.reshape(1, strengths.size, -1)
-
-    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
-        self.strength_ = float(sorted_strengths(self.strengths)[setting])

@@ -3,26 +3,24 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.terms import Term, TermTable, Variable, second_order_terms
-from thermocomp.models import steplog
-from thermocomp.models.linear import TermRegressor
+from thermocomp.models.base import FloatArray
 from thermocomp.models.numerics.leastsquares import solve, triangle
-from thermocomp.models.numerics.stepwise import AlphaThresholds, stepwise
+from thermocomp.models.numerics.stepwise import AlphaThresholds
+from thermocomp.models.steplog import StepwiseRegressor
 
-FloatArray = NDArray[np.float64]
 
-
-class SecondOrderRegression(TermRegressor):
+class SecondOrderRegression(StepwiseRegressor):
     """Chen's multiple regression analysis: linear terms, squares and products, chosen by significance.
 
     The form is ``A1' dT + dT' A2 dT`` without constant (Chen 1996, Eq. 4; C-09), over variables which are inputs or
     differences of inputs (C-12). SYSTAT's stepwise rule chooses among its n + n(n+1)/2 terms (C-10): one action a
     step, removal before entering, by default with alpha-to-enter .001 and alpha-to-remove .015 (C-15). The
     significances take the rows as independent, which those of a time series are not: see `n_effective_` (E-C12). A term
-    of which those inside leave less than 1e-8 of its norm does not enter.
+    of which those inside leave less than 1e-8 of its norm does not enter. Bad significance levels are an `InputError`,
+    and so is a variable that does not exist.
 
     Parameters
     ----------
@@ -61,6 +59,22 @@ class SecondOrderRegression(TermRegressor):
         True if the selection was stopped because it went round in a circle.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Chen, J. S., Yuan, J., Ni, J.: Thermal Error Modelling for Real-Time Error Compensation. The International Journal
+    of Advanced Manufacturing Technology 12, 1996.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SecondOrderRegression
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 3))  # [degC]
+    >>> y = 2 * rises[:, 0] + 0.5 * rises[:, 0] * rises[:, 2] + 0.1 * rng.normal(size=200)
+    >>> model = SecondOrderRegression().fit(rises, y)
+    >>> print(model.terms_, model.coef_.round(2).tolist())
+    ('x0', 'x0*x2') [2.0, 0.5]
     """
 
     def __init__(
@@ -82,54 +96,20 @@ class SecondOrderRegression(TermRegressor):
         self.second_order = second_order
         self.hierarchy = hierarchy
 
-    def fit(self, X: ArrayLike, y: ArrayLike) -> "SecondOrderRegression":
-        """Select and fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Temperatures minus their reference.
-        y : array-like of shape (n_rows,)
-            Deviation.
-
-        Returns
-        -------
-        SecondOrderRegression
-
-        Raises
-        ------
-        InputError
-            Bad significance levels, or a variable that does not exist.
-        """
-        rule = AlphaThresholds(self.alpha_enter, self.alpha_remove)
-        _, deviation, both = self._read(X, y)
+    def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
         variables = self._variables()
         self.variables_ = tuple(v.name for v in variables)
         terms = second_order_terms(len(variables)) if self.second_order else tuple((i,) for i in range(len(variables)))
         self.candidates_ = TermTable(self.n_features_in_, variables, terms).names()
-        values = _values(both[:, :-1], variables)
+        values = _values(change, variables)
         tri = triangle(_columns(values, terms, deviation), intercept=self.fit_intercept)
-        chosen = stepwise(tri, rule, self.candidates_, needs=_factors(terms) if self.hierarchy else None)
-        self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
-        inside = [terms[k] for k in self.selected_]
+        chosen = self._select(tri, self.candidates_, _factors(terms) if self.hierarchy else None)
+        inside = [terms[k] for k in chosen]
         columns = _columns(values, inside, deviation)[:, :-1]
-        found = solve(columns, deviation, tri.part(self.selected_))
-        self._keep(found, variables, inside, tri.total, self.fit_intercept)
-        return self
+        self._keep(solve(columns, deviation, tri.part(chosen)), variables, inside, tri.total)
 
-    def log_text(self, target: str = "Y") -> str:
-        """Return the steps and the model as text in the style of SYSTAT 5.0 (Chen 1996, Fig. 2; C-16).
-
-        Parameters
-        ----------
-        target : str
-            Name of what is predicted.
-
-        Returns
-        -------
-        str
-        """
-        return steplog.log_text(self, str(AlphaThresholds(self.alpha_enter, self.alpha_remove)), target)
+    def _rule(self) -> AlphaThresholds:
+        return AlphaThresholds(self.alpha_enter, self.alpha_remove)
 
     def _variables(self) -> tuple[Variable, ...]:
         names = self._names()

@@ -1,6 +1,7 @@
 """`SensorSelector`: any way to choose sensors as a step of a scikit-learn Pipeline."""
 
 from collections.abc import Sequence
+from inspect import signature
 from typing import Any, Literal
 
 import numpy as np
@@ -46,6 +47,24 @@ class SensorSelector(SelectorMixin, BaseEstimator):
     estimator_ : ThermalRegressor
         The method, fitted to the candidates.
     n_features_in_ : int
+
+    References
+    ----------
+    Guyon, I., Elisseeff, A.: An introduction to variable and feature selection. Journal of Machine Learning Research 3,
+    2003, 1157-1182.
+
+    Pedregosa, F., et al.: Scikit-learn: machine learning in Python. Journal of Machine Learning Research 12, 2011,
+    2825-2830.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import SensorSelector
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (200, 6))  # of six temperatures, two of which matter [degC]
+    >>> selector = SensorSelector("partial-f").fit(rises, 5 * rises[:, 1] - 3 * rises[:, 4] + rng.normal(size=200))
+    >>> print(selector.get_support(indices=True).tolist(), selector.transform(rises).shape)
+    [1, 4] (200, 2)
     """
 
     def __init__(
@@ -81,16 +100,17 @@ class SensorSelector(SelectorMixin, BaseEstimator):
             The method or a column is unknown, or there is nothing to choose from.
         """
         values, deviation = validate_data(self, X, y, y_numeric=True, dtype=np.float64, ensure_min_samples=2)
-        given = self._kept()
+        names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
+        given = self._kept(names)
         if self.time not in (None, "column"):
             raise InputError(f"SensorSelector: time={self.time!r}: give 'column' or None")
         free = np.flatnonzero(~given)
         if not free.size:
             raise InputError("SensorSelector: every column is kept, so there is none to choose from")
-        cycles = {} if cycle is None or not self._takes_cycle() else {"cycle": cycle}
-        names = [str(n) for n in getattr(self, "feature_names_in_", range(self.n_features_in_))]
+        method = self._method()
+        cycles = {} if cycle is None or "cycle" not in signature(method.fit).parameters else {"cycle": cycle}
         candidates = pd.DataFrame(values[:, free], columns=[names[j] for j in free])
-        self.estimator_ = self._method().fit(candidates, deviation, **cycles)
+        self.estimator_ = method.fit(candidates, deviation, **cycles)
         chosen = self.estimator_.freeze(target="y").sensors
         self._support = given | np.isin(names, chosen)
         return self
@@ -99,9 +119,9 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         check_is_fitted(self)
         return self._support
 
-    def _kept(self) -> NDArray[np.bool_]:
-        names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
-        mask = np.zeros(self.n_features_in_, dtype=np.bool_)
+    def _kept(self, names: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which columns are kept without being asked about."""
+        mask = np.zeros(len(names), dtype=np.bool_)
         mask[:1] = self.time == "column"
         for column in self.keep:
             if isinstance(column, str) and column not in names:
@@ -118,11 +138,6 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         if self.method not in SELECTORS:
             raise InputError(f"SensorSelector: method {self.method!r}: want one of {', '.join(SELECTORS)}")
         return SELECTORS[self.method]()
-
-    def _takes_cycle(self) -> bool:
-        from inspect import signature
-
-        return "cycle" in signature(self._method().fit).parameters
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

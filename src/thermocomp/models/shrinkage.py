@@ -1,20 +1,18 @@
 """What linear regressions share that are chosen from a path of ever richer ones by leaving thermal cycles out."""
 
 from abc import abstractmethod
-from typing import Literal, Self
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import linalg
 
-from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.terms import Variable
+from thermocomp.core.exceptions import InputError
+from thermocomp.models.base import CycledRegressor, FloatArray, IntArray
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.leastsquares import Solution
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 Rule = Literal["one-standard-error", "minimum"]
 
 
@@ -37,21 +35,6 @@ def scaling(X: FloatArray, *, centred: bool = True) -> tuple[FloatArray, FloatAr
     scale = np.sqrt(np.mean((X - centre) ** 2, axis=0))
     scale[scale <= 1e-12 * np.abs(X).max(axis=0)] = np.inf
     return centre, scale
-
-
-def learned_rows(X: FloatArray, y: FloatArray, cycle: ArrayLike | None) -> tuple[FloatArray, FloatArray, IntArray, str]:
-    """Return the rows that may be learned from, the fold of each, and what is left out in turn, in words.
-
-    Raises
-    ------
-    FitError
-        Fewer than two such rows.
-    """
-    folds, description = number_folds(cycle, len(X))
-    learned = folds >= 0
-    if learned.sum() < 2:
-        raise FitError("a single row to learn from: at least 2 are needed")
-    return X[learned], y[learned], folds[learned], description
 
 
 def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
@@ -79,7 +62,7 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
     return i, j
 
 
-class ShrunkRegressor(TermRegressor):
+class ShrunkRegressor(CycledRegressor, TermRegressor):
     """Linear regression on standardised inputs; how rich it is, is chosen by leaving thermal cycles out.
 
     Each thermal cycle among the training rows is left out in turn, the whole path of models is fitted to the others and
@@ -98,35 +81,8 @@ class ShrunkRegressor(TermRegressor):
     """
 
     rule: Rule
-    fit_intercept: bool
 
-    def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:
-        """Fit.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference, in the order of time.
-        y : array-like of shape (n_rows,)
-            Deviation.
-        cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row; rows with -1 are not learned from. Without it, five stretches of equal length
-            take the place of the cycles.
-
-        Returns
-        -------
-        self
-
-        Raises
-        ------
-        FitError
-            Fewer than two rows to learn from.
-        InputError
-            A setting that is none.
-        """
-        change, deviation, _ = self._read(X, y)
-        change, deviation, folds, self.chosen_by_ = learned_rows(change, deviation, cycle)
-        self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+    def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
         errors = []
         for k in range(int(folds.max()) + 1):
             left_out = folds == k
@@ -140,7 +96,6 @@ class ShrunkRegressor(TermRegressor):
         weights, intercepts = self._fitted(change, deviation)
         self._note(which, setting)
         self._conclude(change, deviation, weights[which, setting], float(intercepts[which, setting]))
-        return self
 
     @abstractmethod
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
@@ -175,9 +130,70 @@ class ShrunkRegressor(TermRegressor):
             residual=residual,
             rss=float(residual @ residual),
         )
-        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
         total = float(np.sum((y - (y.mean() if self.fit_intercept else 0.0)) ** 2))
-        self._keep(found, variables, [(i,) for i in range(len(variables))], total, self.fit_intercept)
+        self._keep(found, self._inputs_alone(), [(i,) for i in range(len(weights))], total)
+
+
+class PenalisedRegressor(ShrunkRegressor):
+    """Linear regression with a penalty on the coefficients, whose strength is chosen.
+
+    Attributes
+    ----------
+    strength_ : float
+        Chosen strength.
+    """
+
+    strengths: Sequence[float]
+
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - one set has the same strengths as another
+        self.strength_ = float(sorted_strengths(self.strengths)[setting])
+
+
+class ComponentRegressor(ShrunkRegressor):
+    """Linear regression on the first of some components of the inputs, whose number is chosen.
+
+    Parameters
+    ----------
+    components : int, optional
+        Do not choose: so many components, or as many as can be.
+    max_components : int, optional
+        Most to choose from; as many as inputs if not given.
+    rule : {'one-standard-error', 'minimum'}
+        How the number of components is chosen.
+    fit_intercept : bool
+        False: the model gives zero in the reference state, and the components are those about zero.
+
+    Attributes
+    ----------
+    n_components_ : int
+        Chosen number.
+    """
+
+    def __init__(
+        self,
+        *,
+        components: int | None = None,
+        max_components: int | None = None,
+        rule: Rule = "one-standard-error",
+        fit_intercept: bool = True,
+    ) -> None:
+        self.components = components
+        self.max_components = max_components
+        self.rule = rule
+        self.fit_intercept = fit_intercept
+
+    @abstractmethod
+    def _path(self, Z: FloatArray, y: FloatArray, most: int) -> FloatArray:
+        """Return the weights on standardised inputs with 1, 2, ... components, (most, n_features)."""
+
+    def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
+        path = self._path(Z, y, most_components(self.components or self.max_components, Z.shape[1]))
+        return path[None] if self.components is None else path[None, -1:]
+
+    def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - there is one set
+        self.n_components_ = (
+            setting + 1 if self.components is None else most_components(self.components, self.n_features_in_)
+        )
 
 
 def sorted_strengths(strengths: ArrayLike) -> FloatArray:

@@ -1,76 +1,86 @@
-"""The log of a stepwise regression as text, in the style of SYSTAT 5.0 (Chen 1996, Fig. 2; C-16)."""
+"""What the stepwise regressions share: the selection, and its log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from textwrap import fill
-from typing import Protocol
 
-from thermocomp.models.numerics.stepwise import Step
-
-
-class Stepped(Protocol):
-    """A regression whose terms were selected step by step."""
-
-    log_: tuple[Step, ...]
-    cycled_: bool
-    terms_: tuple[str, ...]
-    coef_: Sequence[float]
-    intercept_: float
-    fit_intercept: bool
-    n_rows_: int
-    n_effective_: float
-    r_squared_: float
-    adjusted_r_squared_: float
-    standard_error_: float
-    r_squared_kind_: str
+from thermocomp.models.base import StaticRegressor
+from thermocomp.models.linear import TermRegressor
+from thermocomp.models.numerics.leastsquares import Triangle
+from thermocomp.models.numerics.stepwise import Rule, Step, stepwise
 
 
-def log_text(model: Stepped, rule: str, target: str) -> str:
-    """Return header, steps, fit and coefficients.
+class StepwiseRegressor(StaticRegressor, TermRegressor):
+    """Linear regression whose terms are selected step by step.
 
-    To SYSTAT's columns are added the partial F, the significance it corresponds to, the change of R2 (E-T3), the kind
-    of R2 (E-C10) and the effective sample size (E-C12).
-
-    Parameters
+    Attributes
     ----------
-    model : Stepped
-        A fitted regression.
-    rule : str
-        The thresholds.
-    target : str
-        Name of what is predicted.
-
-    Returns
-    -------
-    str
+    selected_ : tuple of int
+        Terms in the model, in rising order.
+    log_ : tuple of Step
+        Each entering and leaving.
+    cycled_ : bool
+        True if the selection was stopped because it went round in a circle.
     """
-    wide = max((len(s.term) for s in model.log_), default=0)
-    lines = [f"STEPWISE REGRESSION WITH {rule}", ""]
-    lines += [
-        f"STEP={s.number:3d}  {s.action.upper():<6}  {s.term:<{wide}}  R= {_three(s.r)}  RSQUARE= {_three(s.r_squared)}"
-        f"  F= {s.f:<9.4g}  ALPHA= {s.alpha:<8.2g}  CHANGE OF RSQUARE= {s.r_squared_step:+.2e}"
-        for s in model.log_
-    ]
-    if model.cycled_:
-        lines.append("STOPPED: THIS MODEL HAS BEEN THERE BEFORE")
-    lines += ["", "THE SUBSET MODEL INCLUDES THE FOLLOWING PREDICTORS:", ""]
-    lines.append(fill(", ".join(model.terms_) or "NONE", 100, break_long_words=False, break_on_hyphens=False))
-    lines += [
-        "",
-        f"DEP VAR: {target}   N: {model.n_rows_}   MULTIPLE R: {_three(math.sqrt(max(model.r_squared_, 0.0)))}"
-        f"   SQUARED MULTIPLE R: {_three(model.r_squared_)}",
-        f"ADJUSTED SQUARED MULTIPLE R: {_three(model.adjusted_r_squared_)}"
-        f"   STANDARD ERROR OF ESTIMATE: {model.standard_error_:.3f}",
-        f"R-SQUARES ARE {model.r_squared_kind_.upper()}   EFFECTIVE SAMPLE SIZE: {model.n_effective_:.1f}",
-        "",
-    ]
-    rows = [*zip(model.terms_, model.coef_, strict=True)]
-    if model.fit_intercept:
-        rows.insert(0, ("CONSTANT", model.intercept_))
-    wide = max([len("VARIABLE"), *(len(name) for name, _ in rows)])
-    lines.append(f"{'VARIABLE':<{wide}}  {'COEFFICIENT':>14}")
-    lines += [f"{name:<{wide}}  {value:>14.6g}" for name, value in rows]
-    return "\n".join(lines) + "\n"
+
+    selected_: tuple[int, ...]
+    log_: tuple[Step, ...]
+
+    def log_text(self, target: str = "Y") -> str:
+        """Return the rule, the steps, the fit and the coefficients as text (C-16).
+
+        To SYSTAT's columns are added the partial F, the significance it corresponds to, the change of R2 (E-T3), the
+        kind of R2 (E-C10) and the effective sample size (E-C12).
+
+        Parameters
+        ----------
+        target : str
+            Name of what is predicted.
+
+        Returns
+        -------
+        str
+        """
+        wide = max((len(s.term) for s in self.log_), default=0)
+        lines = [f"STEPWISE REGRESSION WITH {self._rule_text()}", ""]
+        lines += [
+            f"STEP={s.number:3d}  {s.action.upper():<6}  {s.term:<{wide}}  R= {_three(s.r)}"
+            f"  RSQUARE= {_three(s.r_squared)}  F= {s.f:<9.4g}  ALPHA= {s.alpha:<8.2g}"
+            f"  CHANGE OF RSQUARE= {s.r_squared_step:+.2e}"
+            for s in self.log_
+        ]
+        if self.cycled_:
+            lines.append("STOPPED: THIS MODEL HAS BEEN THERE BEFORE")
+        lines += ["", "THE SUBSET MODEL INCLUDES THE FOLLOWING PREDICTORS:", ""]
+        lines.append(fill(", ".join(self.terms_) or "NONE", 100, break_long_words=False, break_on_hyphens=False))
+        lines += [
+            "",
+            f"DEP VAR: {target}   N: {self.n_rows_}   MULTIPLE R: {_three(math.sqrt(max(self.r_squared_, 0.0)))}"
+            f"   SQUARED MULTIPLE R: {_three(self.r_squared_)}",
+            f"ADJUSTED SQUARED MULTIPLE R: {_three(self.adjusted_r_squared_)}"
+            f"   STANDARD ERROR OF ESTIMATE: {self.standard_error_:.3f}",
+            f"R-SQUARES ARE {self.r_squared_kind_.upper()}   EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",
+            "",
+        ]
+        lines += self._coefficient_lines()
+        return "\n".join(lines) + "\n"
+
+    @abstractmethod
+    def _rule(self) -> Rule:
+        """Return the thresholds."""
+
+    def _rule_text(self) -> str:
+        """Return the thresholds in words."""
+        return str(self._rule())
+
+    def _select(
+        self, tri: Triangle, names: Sequence[str], needs: Sequence[frozenset[int]] | None = None
+    ) -> tuple[int, ...]:
+        """Note the selection and its steps; return the selected columns of `tri`."""
+        chosen = stepwise(tri, self._rule(), names, needs=needs)
+        self.selected_, self.log_, self.cycled_ = chosen.selected, chosen.steps, chosen.cycled
+        return self.selected_
 
 
 def _three(value: float) -> str:

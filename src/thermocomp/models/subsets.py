@@ -8,14 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.terms import Variable
+from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.leastsquares import solve, table, triangle
 from thermocomp.models.selection.subsets import Subsets, best_subsets
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
 
@@ -104,6 +100,28 @@ class BestSubset(TermRegressor):
         What was left out to choose; empty if nothing was.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
+
+    References
+    ----------
+    Furnival, G. M., Wilson, R. W.: Regressions by leaps and bounds. Technometrics 16(4), 1974, 499-511.
+    doi:10.1080/00401706.1974.10489231
+
+    Gatu, C., Kontoghiorghes, E. J.: Branch-and-bound algorithms for computing the best-subset regression models.
+    Journal of Computational and Graphical Statistics 15(1), 2006, 139-156.
+
+    Hwang, S.-H., Lee, J.-H., Yang, S.-H.: Optimal Variable Selection in a Thermal Error Model for Real Time Error
+    Compensation (in Korean). From a study that was funded in 1997.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from thermocomp import BestSubset
+    >>> rng = np.random.default_rng(0)
+    >>> rises = rng.uniform(0, 10, (100, 8))  # of eight temperatures, two of which matter [degC]
+    >>> y = 5 * rises[:, 1] - 3 * rises[:, 6] + rng.normal(size=100)
+    >>> model = BestSubset(rule="one-standard-error").fit(rises, y, cycle=np.arange(100) // 20)
+    >>> print(model.selected_, model.proven_, model.coef_.round(1).tolist())
+    (1, 6) True [5.0, -3.0]
     """
 
     def __init__(
@@ -148,7 +166,7 @@ class BestSubset(TermRegressor):
         Raises
         ------
         FitError
-            No row to learn from.
+            Fewer than two rows to learn from.
         InputError
             A setting makes no sense, or there are too many columns that depend on each other (see `max_size`).
         KeyboardInterrupt
@@ -159,13 +177,7 @@ class BestSubset(TermRegressor):
             raise InputError(
                 f"criterion {criterion!r}, size {self.size}: want mse, adjr2, cp, bic or cycles, and a size from 1 on"
             )
-        change, deviation, both = self._read(X, y)
-        folds, left_out = number_folds(cycle, len(change))
-        if (folds < 0).any():
-            learned = folds >= 0
-            change, deviation, folds = change[learned], deviation[learned], folds[learned]
-            both = table(change, deviation)
-            self.data_min_, self.data_max_ = change.min(axis=0), change.max(axis=0)
+        change, deviation, folds, left_out = self._learned(X, y, cycle)
         sizes = self.size or self.max_size
         self.selected_: tuple[int, ...] = ()
         self.proven_, self.criterion_, self.chosen_by_ = True, "none", ""
@@ -187,10 +199,7 @@ class BestSubset(TermRegressor):
                 place = int(np.nanargmin(score)) if not np.isnan(score).all() else 0
             chosen = self.subsets_.best[place]
             self.selected_, self.proven_ = chosen.columns, chosen.proven
-        tri = triangle(both, intercept=self.fit_intercept)
-        found = solve(change, deviation, tri, columns=self.selected_)
-        variables = [Variable.single(name, i) for i, name in enumerate(self._names())]
-        self._keep(found, variables, [(i,) for i in self.selected_], tri.total, self.fit_intercept)
+        self._regress(change, deviation, self.selected_)
         return self
 
     def _search(self, X: FloatArray, y: FloatArray, sizes: int | None) -> Subsets:

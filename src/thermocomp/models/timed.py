@@ -5,20 +5,22 @@ without its past predicts something else and no warning comes; so it demands a d
 the start of each test.
 """
 
-from typing import Any, ClassVar, Literal, Self
+import math
+from abc import abstractmethod
+from typing import Any, ClassVar, Literal, Self, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn import get_config
 from sklearn.base import clone
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.models.base import ThermalRegressor
+from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
+from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.ticks import steps as checked_steps
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
 Time = Literal["column", "routed", "none"]
 
 #: a step this many times the usual one is no pause of the logger: rows are missing
@@ -71,6 +73,66 @@ class TimedRegressor(ThermalRegressor):
         copy: Self = clone(self).set_params(time="routed", **{self.columns: named})
         return copy
 
+    def fit(self, X: ArrayLike, y: ArrayLike, *, dt: ArrayLike | None = None, cycle: ArrayLike | None = None) -> Self:
+        """Fit; what a method refuses beside data that are none, its class tells.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            Inputs minus their reference, in the order of time; with ``time="column"`` behind the time.
+        y : array-like of shape (n_rows,)
+            Deviation; without meaning where `cycle` is -1.
+        dt : array-like of shape (n_rows,), optional
+            With ``time="routed"``: time since the row before [s], ``inf`` in the first row of each test.
+        cycle : array-like of int of shape (n_rows,), optional
+            Thermal cycle of each row, by which settings are chosen. Rows with -1 drive the memory but are not learned
+            from. Without it each test of several is one (``time="column"``), or five stretches of equal length take the
+            place of the cycles.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        FitError
+            No row to learn from.
+        InputError
+            The time was not declared, the rows are not those of whole tests, or a setting is out of its range.
+        """
+        self._time = self.time
+        self._declared()
+        given, deviation = self._read(X, y)
+        rows, step = self._clock(X, given, dt, fitting=True)
+        folds, self.chosen_by_ = number_folds(self._cycles(cycle, step), len(rows))
+        self._note_range(rows if folds.min() >= 0 else rows[folds >= 0])
+        self._fit(rows, deviation, step, folds)
+        return self
+
+    @abstractmethod
+    def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
+        """Fit to data that were checked: inputs without the time, y, time steps [s], and folds (-1: not learned)."""
+
+    def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
+        """Predict the deviation from a cold start of each test; never from measured ones (P-05).
+
+        Parameters
+        ----------
+        X : array-like of shape (n_rows, n_features)
+            As in `fit`.
+        dt : array-like of shape (n_rows,), optional
+            As in `fit`. With ``time="none"``, what is predicted is where the machine would settle in each row.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+        """
+        return self._predict(*self._given(X, dt))
+
+    @abstractmethod
+    def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
+        """Predict from inputs without the time, and time steps [s]."""
+
     def score(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, *, dt: ArrayLike | None = None
     ) -> float:
@@ -90,8 +152,7 @@ class TimedRegressor(ThermalRegressor):
         """
         from sklearn.metrics import r2_score
 
-        timed: Any = self
-        return float(r2_score(y, timed.predict(X, dt=dt), sample_weight=sample_weight))
+        return float(r2_score(y, self.predict(X, dt=dt), sample_weight=sample_weight))
 
     def freeze(self, **header: Any) -> ErrorModel:
         """Return the fitted model as plain numbers; see `thermocomp.models.base.ThermalRegressor.freeze`.
@@ -128,6 +189,16 @@ class TimedRegressor(ThermalRegressor):
         fitted = getattr(self, "_time", self.time)
         if fitted != self.time:
             raise InputError(f"{name} was fitted with time={fitted!r} and has time={self.time!r} now: fit it again")
+
+    def _given(self, X: ArrayLike, dt: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
+        """Check X and time against what was fitted; return the inputs without the time, and the time steps."""
+        self._declared()
+        check_is_fitted(self)
+        if _is_plain(X, self.n_features_in_) and not hasattr(self, "feature_names_in_"):
+            rows = X
+        else:
+            rows = validate_data(self, X, dtype=np.float64, reset=False)
+        return self._clock(X, rows, dt)
 
     def _clock(
         self, X: ArrayLike, rows: FloatArray, dt: ArrayLike | None, *, fitting: bool = False
@@ -178,6 +249,14 @@ class TimedRegressor(ThermalRegressor):
     def _hidden(self) -> int:
         """Columns of X in front of the inputs."""
         return int(self.time == "column")
+
+
+def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
+    """Return True for an array that scikit-learn would let pass as it is; asking it takes as long as a free run."""
+    if not (type(X) is np.ndarray and X.dtype == np.float64 and X.ndim == 2 and len(X) and X.shape[1] == n_columns):
+        return False
+    with np.errstate(over="ignore", invalid="ignore"):
+        return math.isfinite(X.sum())
 
 
 def from_column(time: FloatArray, index: object = None, *, fitting: bool = False) -> FloatArray:

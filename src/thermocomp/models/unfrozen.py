@@ -8,64 +8,37 @@ from typing import Any, ClassVar, NoReturn
 
 import joblib
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.expression import Node
-from thermocomp.core.model import ErrorModel, Input, Provenance, Support
-from thermocomp.models.base import ThermalRegressor
-
-FloatArray = NDArray[np.float64]
+from thermocomp.core.model import ErrorModel, Input
+from thermocomp.models.base import FloatArray, StaticRegressor
 
 
-class UnfrozenRegressor(ThermalRegressor):
+class UnfrozenRegressor(StaticRegressor):
     """A regressor that cannot be frozen; `unfrozen` gives what the replay of a comparison needs instead."""
 
     freezable: ClassVar[bool] = False
     name: ClassVar[str]  #: of the method
 
     @abstractmethod
-    def evaluate(self, change: FloatArray) -> FloatArray:
-        """Predict for rows that were checked before, (n_rows, n_features): `predict` without its overhead."""
-
-    @abstractmethod
     def _bulk(self) -> str:
         """Return why it cannot be frozen, in words."""
 
-    def predict(self, X: ArrayLike) -> FloatArray:
-        """Predict the deviation.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_rows, n_features)
-            Inputs minus their reference.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-        """
-        check_is_fitted(self)
-        return self.evaluate(validate_data(self, X, dtype=np.float64, reset=False))
-
     def unfrozen(
-        self,
-        *,
-        target: str,
-        unit: str = "um",
-        inputs: Sequence[Input] | None = None,
-        support: Support = Support(),
-        provenance: Provenance | None = None,
-        rows: FloatArray | None = None,
+        self, *, inputs: Sequence[Input] | None = None, rows: FloatArray | None = None, **header: Any
     ) -> "EstimatorModel":
         """Return the fitted estimator as a model that can be replayed and judged, and nothing else.
 
         Parameters
         ----------
-        target, unit, inputs, support, provenance
-            As in `thermocomp.models.base.ThermalRegressor.freeze`.
+        inputs : sequence of Input, optional
+            One per feature; see `thermocomp.models.base.ThermalRegressor.freeze`.
         rows : ndarray of shape (n_rows, n_features), optional
             Inputs minus their reference that it will be asked for: predicted at once, which is much faster.
+        **header
+            As in `thermocomp.models.base.ThermalRegressor.freeze`.
 
         Returns
         -------
@@ -73,17 +46,14 @@ class UnfrozenRegressor(ThermalRegressor):
             With all of the inputs.
         """
         given = self._inputs(inputs)
-        made = None if rows is None else self.evaluate(rows)
+        made = None if rows is None else self._predict(rows)
         try:
             fingerprint = str(joblib.hash(self))
         except PicklingError:  # a class from inside a function: its predictions stand for it
             fingerprint = str(joblib.hash((self.name, self.data_min_, self.data_max_, made)))
         return EstimatorModel(
-            target=target,
-            unit=unit,
+            **{"unit": "um", **header},
             inputs=given,
-            support=support,
-            provenance=provenance,
             estimator=self,
             fingerprint=fingerprint,
             known={} if made is None or rows is None else {r.tobytes(): v for r, v in zip(rows, made, strict=True)},
@@ -126,7 +96,7 @@ class EstimatorModel(ErrorModel):
         if change.ndim == 1 and (before := self.known.get(change.tobytes())) is not None:
             return memory, before
         rows = change.reshape(-1, change.shape[-1])
-        return memory, self.estimator.evaluate(rows).reshape(change.shape[:-1])
+        return memory, self.estimator._predict(rows).reshape(change.shape[:-1])
 
     @property
     def sensors(self) -> tuple[str, ...]:

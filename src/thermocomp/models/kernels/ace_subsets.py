@@ -251,7 +251,55 @@ def _take(
 
 
 @compiled
-def correlations(  # noqa: PLR0912, PLR0915
+def _first_phi(
+    order: RankArray, bounds: RankArray, groups: Any, start: FloatArray, half: int, accelerate: bool
+) -> FloatArray:
+    """Return E[S|T] of each variable, (p, n): 0 for a constant one."""
+    p, n = len(order) - 1, len(start)
+    first = np.zeros((p, n))
+    sums, zero = np.empty(n + 1), np.zeros(n)
+    for j in range(p):
+        if groups[j] > 1:
+            running_sums(start, zero, order[j], sums)
+            smooth(sums, half, accelerate, bounds[j], groups[j], first[j])
+    return first
+
+
+@compiled
+def _note_used(on: FloatArray, idle: NDArray[np.bool_], used: NDArray[np.bool_]) -> None:
+    """Note which variables any lane works on."""
+    for j in range(len(used)):
+        used[j] = False
+        for v in range(LANES):
+            used[j] |= on[j, v] > 0 and not idle[v]
+
+
+@compiled
+def _ended(
+    v: int,
+    n: int,
+    sweep: int,
+    result: FloatArray,
+    previous: FloatArray,
+    age: NDArray[np.int64],
+    momentum: FloatArray,
+    accelerate: bool,
+    tolerance: float,
+) -> bool:
+    """Renew the momentum of lane `v` after a sweep; return whether its subset is done."""
+    now = np.sqrt(result[0, v] / n) if accelerate else result[1, v] / n
+    if accelerate:
+        age[v] = 0 if sweep == 1 or now > previous[v] else age[v] + 1
+        momentum[0, v] = min(MOMENTUM, age[v] / (age[v] + 3.0))
+        ended = now <= tolerance
+    else:
+        ended = sweep > 1 and not previous[v] - now > tolerance
+    previous[v] = now
+    return bool(ended)
+
+
+@compiled
+def correlations(
     order: RankArray,
     bounds: RankArray,
     groups: Any,
@@ -278,15 +326,9 @@ def correlations(  # noqa: PLR0912, PLR0915
     psi : ndarray of shape (n_subsets,)
     sweeps : ndarray of int64 of shape (n_subsets,)
     """
-    p, n = len(order) - 1, len(start)
-    count = len(subsets)
+    p, n, count = len(order) - 1, len(start), len(subsets)
     psi, sweeps = np.zeros(count), np.zeros(count, np.int64)
-    first = np.zeros((p, n))
-    start_sums, zero = np.empty(n + 1), np.zeros(n)
-    for j in range(p):
-        if groups[j] > 1:
-            running_sums(start, zero, order[j], start_sums)
-            smooth(start_sums, half, accelerate, bounds[j], groups[j], first[j])
+    first = _first_phi(order, bounds, groups, start, half, accelerate)
     theta, total, residual = np.empty((n, LANES)), np.empty((n, LANES)), np.empty((n, LANES))
     last_total, work = np.zeros((n, LANES)), np.empty((n, LANES))
     spare = (half + 1) // 2 if accelerate else 0
@@ -306,24 +348,11 @@ def correlations(  # noqa: PLR0912, PLR0915
                 queue += 1
         if idle.all():
             return psi, sweeps
-        for j in range(p):
-            used[j] = False
-            for v in range(LANES):
-                used[j] |= on[j, v] > 0 and not idle[v]
+        _note_used(on, idle, used)
         _lane_theta(
-            total,
-            last_total,
-            momentum,
-            half,
-            accelerate,
-            bounds[p],
-            groups[p],
-            theta,
-            residual,
-            sums,
-            again,
+            total, last_total, momentum, half, accelerate, bounds[p], groups[p], theta, residual, sums, again,
             result[:1],
-        )
+        )  # fmt: skip
         for v in range(LANES):
             if result[0, v] == 0.0 and not idle[v]:
                 idle[v] = True
@@ -339,17 +368,9 @@ def correlations(  # noqa: PLR0912, PLR0915
         store(result, 0, move)
         _lane_sums(theta, residual, total, result)
         for v in range(LANES):
-            if idle[v]:
-                continue
-            k = holds[v]
-            sweeps[k] += 1
-            psi[k] = abs(result[3, v]) / np.sqrt(result[2, v] * n) if result[2, v] > 0 else 0.0
-            now = np.sqrt(result[0, v] / n) if accelerate else result[1, v] / n
-            if accelerate:
-                age[v] = 0 if sweeps[k] == 1 or now > previous[v] else age[v] + 1
-                momentum[0, v] = min(MOMENTUM, age[v] / (age[v] + 3.0))
-                idle[v] = now <= tolerance
-            else:
-                idle[v] = sweeps[k] > 1 and not previous[v] - now > tolerance
-            previous[v] = now
-            idle[v] |= sweeps[k] == max_sweeps
+            if not idle[v]:
+                k = holds[v]
+                sweeps[k] += 1
+                psi[k] = abs(result[3, v]) / np.sqrt(result[2, v] * n) if result[2, v] > 0 else 0.0
+                ended = _ended(v, n, sweeps[k], result, previous, age, momentum, accelerate, tolerance)
+                idle[v] = ended or sweeps[k] == max_sweeps

@@ -67,7 +67,7 @@ def left_by(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
-def add(  # noqa: PLR0912, PLR0915
+def add(  # noqa: PLR0912, PLR0915 - in one piece it is four times as fast
     columns: FloatArray, least: FloatArray, state: State, lists: Lists, inside: ByteArray, size: int, budget: int
 ) -> int:
     """Go on with the enumeration of all sets up to `size` until it is over or `budget` sets were looked at.

@@ -113,39 +113,22 @@ def run(
         result.parts.append(Swapping(problem, sizes, n_best, limit, bound))
     # dropping begins with the cheap branches at the end, which find good sets; so does adding with those at the begin
     turns = list(range(n_tasks)) if route == "dropping" else list(range(n_tasks))[::-1]
-    whole = jobs == 1
-    began = said = time.monotonic()
+    watch = _Watch(result, nodes, seconds, progress)
 
     def work(part: Search) -> None:
-        nonlocal said
         while turns and not result.stopped:
-            if whole:
-                part.start(0, n_tasks)
-                turns.clear()
-            else:
-                task = turns.pop()  # one at a time: the interpreter's lock sees to it
-                part.start(task, task + 1)
-            chunk = part.chunk if nodes is None else min(part.chunk, nodes)
-            while not result.stopped:
-                done = part.go_on(chunk)
-                result.looked += done
-                if done == 0:
-                    break
-                now = time.monotonic()
-                if nodes is not None and result.looked >= nodes:
-                    result.stopped = result.stopped or "nodes"
-                elif seconds is not None and now - began >= seconds:
-                    result.stopped = result.stopped or "seconds"
-                if progress is not None and now - said >= 1:
-                    said = now
-                    progress(f"best subsets: {result.looked:,} sets looked at in {now - began:.0f} s")
+            task = turns.pop()  # one at a time: the interpreter's lock sees to it
+            part.start(task, task + 1)
+            watch.through(part)
 
     try:
         with _interrupts(result):
-            if whole:
-                work(result.parts[0])
-            else:
+            if jobs > 1:
                 Parallel(n_jobs=jobs, prefer="threads")(delayed(work)(part) for part in result.parts[:jobs])
+            elif turns:
+                turns.clear()
+                result.parts[0].start(0, n_tasks)
+                watch.through(result.parts[0])
     except KeyboardInterrupt:  # before the search could take it, or from `progress`
         result.stopped = "interrupted"
     for part in result.parts:
@@ -155,6 +138,31 @@ def run(
         part.start(task, task + 1)
         result.leave_open(part.open_from())
     return result
+
+
+class _Watch:
+    """What stops a search, and who is told of it."""
+
+    def __init__(
+        self, result: Result, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None
+    ) -> None:
+        self.result, self.nodes, self.seconds, self.progress = result, nodes, seconds, progress
+        self.began = self.said = time.monotonic()
+
+    def through(self, part: Search) -> None:
+        """Look at the sets of the branches that a part has taken, until there are no more or it is stopped."""
+        result = self.result
+        chunk = part.chunk if self.nodes is None else min(part.chunk, self.nodes)
+        while not result.stopped and (done := part.go_on(chunk)):
+            result.looked += done
+            now = time.monotonic()
+            if self.nodes is not None and result.looked >= self.nodes:
+                result.stopped = result.stopped or "nodes"
+            elif self.seconds is not None and now - self.began >= self.seconds:
+                result.stopped = result.stopped or "seconds"
+            if self.progress is not None and now - self.said >= 1:
+                self.said = now
+                self.progress(f"best subsets: {result.looked:,} sets looked at in {now - self.began:.0f} s")
 
 
 @contextmanager
