@@ -17,7 +17,20 @@ _ALWAYS = 7
 
 
 def lines(models: Sequence[str], taken: Sequence[str], *, by_position: bool, unproved: bool) -> int:
-    """Return how many lines a header has, before it is known what they say."""
+    """Return how many lines a header has, before it is known what they say.
+
+    Parameters
+    ----------
+    models, taken : sequence of str
+        What is told of models, and of those who take unproven ones.
+    by_position : bool
+        The drift depends on the place.
+    unproved : bool
+
+    Returns
+    -------
+    int
+    """
     told = min(len(models), _MODELS) + len(told_taken(taken))
     return _ALWAYS + told + _PLACE * by_position + (1 if unproved else _PROOF)
 
