@@ -6,18 +6,20 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.papers.study import Claim, Table
+from thermocomp.models.training import train
+from thermocomp.papers.study import BoolArray, Claim, Curve, Figure, FloatArray, Panel, Style, Table
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
-
-FloatArray = NDArray[np.float64]
+from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
 #: no paper's model stops at the edge of its trained range: so far beyond it that no reading gets there
 PAPERS_SUPPORT = Support(margin=1e3)
@@ -67,6 +69,31 @@ def derived(recording: Recording, channel: Channel, weights: Mapping[str, float]
     values = recording.values([recording.channel(name) for name in weights]) @ np.array(list(weights.values()))
     table = recording.table.assign(**{channel.name: values})
     return replace(recording, table=table, channels=(*recording.channels, channel))
+
+
+def stacked(
+    recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
+) -> Samples:
+    """Stack tests as the papers do: they begin with a cold machine, and their first reading is the zero.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    targets, inputs : sequence of str
+        See `thermocomp.recording.samples.stack`.
+    rezero : bool
+        True: temperatures are counted from the start of each test; False: as read.
+
+    Returns
+    -------
+    Samples
+    """
+    return stack(recordings, targets, inputs, rezero=rezero, zeroing=FIRST_READING, starts=COLD)
+
+
+def every(samples: Samples) -> BoolArray:
+    """Return the choice of all rows, shape (n_rows,)."""
+    return np.ones(len(samples), dtype=np.bool_)
 
 
 def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"], seed: int) -> Samples:
@@ -157,8 +184,7 @@ def fitted(
     """
     columns = [[c.name for c in samples.targets].index(t) for t in targets]
     y = samples.deviations[:, columns]
-    every = np.ones(len(samples), dtype=np.bool_)
-    inputs = samples.model_inputs(range(len(samples.inputs)), every)
+    inputs = samples.model_inputs(range(len(samples.inputs)), every(samples))
     header: dict[str, Any] = {"inputs": inputs, "support": support}
     fitting: Any = estimator
     fitting.fit(samples.frame(), y[:, 0] if len(columns) == 1 else y, **fit)
@@ -168,6 +194,62 @@ def fitted(
         t: fitting.freeze(target=t, unit=samples.targets[j].unit, output=k, **header)
         for k, (t, j) in enumerate(zip(targets, columns, strict=True))
     }
+
+
+def trained(method: str, samples: Samples, target: int = 0, support: Support = Support()) -> ErrorModel:
+    """Train a method of the house, as it comes, on all rows of the samples.
+
+    Parameters
+    ----------
+    method : str
+        Key of `thermocomp.models.methods.METHODS`.
+    samples : Samples
+    target : int
+        Place of the target.
+    support : Support
+        What the model does outside the trained range.
+
+    Returns
+    -------
+    ErrorModel
+    """
+    return train(method, samples, target, every(samples), support=support).model
+
+
+def frozen(
+    samples: Samples, columns: Sequence[int], coefficients: Sequence[float], intercept: float, **shape: Any
+) -> Polynomial:
+    """Freeze coefficients as a polynomial of some inputs for the first target.
+
+    Parameters
+    ----------
+    samples : Samples
+        It was fitted to.
+    columns : sequence of int
+        Of the inputs.
+    coefficients : sequence of float
+    intercept : float
+        [unit of the target]
+    **shape
+        Its ``variables`` and ``terms``; each input by itself if not given.
+
+    Returns
+    -------
+    Polynomial
+    """
+    inputs = samples.model_inputs(columns, every(samples))
+    single = tuple(Variable.single(c.name, k) for k, c in enumerate(inputs))
+    shape = {"variables": single, "terms": tuple((k,) for k in range(len(single)))} | shape
+    (target, *_) = samples.targets
+    return Polynomial(
+        target=target.name,
+        unit=target.unit,
+        inputs=inputs,
+        support=PAPERS_SUPPORT,
+        coefficients=tuple(coefficients),
+        intercept=intercept,
+        **shape,
+    )
 
 
 def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
@@ -184,7 +266,7 @@ def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
     ndarray of shape (n_rows,)
         [unit of the model]
     """
-    return replay(model, samples, np.ones(len(samples), dtype=np.bool_))[0]
+    return replay(model, samples, every(samples))[0]
 
 
 def measured(samples: Samples, target: str) -> FloatArray:
@@ -197,7 +279,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
     return measured(samples, model.target) - predicted(model, samples)
 
 
-# -- claims and errors ------------------------------------------------------------------------------------------------
+# -- errors ---------------------------------------------------------------------------------------------------------
 
 
 def judged(ids: Sequence[str], text: str, paper: str, ours: str, holds: bool, otherwise: str) -> Claim:
@@ -255,6 +337,16 @@ class Errors:
         return cls(float(np.sqrt(np.mean(e**2))), float(np.abs(e).mean()), float(np.abs(e).max()), float(np.ptp(e)))
 
 
+def rms(residual: FloatArray) -> float:
+    """Return the root of the mean square of a residual of any shape."""
+    return Errors.of(residual).rms
+
+
+def described(residual: FloatArray, deviation: FloatArray) -> float:
+    """Return the share of a deviation's variance that a model describes which leaves this residual: R2."""
+    return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
+
+
 def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> Table:
     """Lay errors out: a row per residual.
 
@@ -279,6 +371,59 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
 
 
 # -- curves --------------------------------------------------------------------------------------------------------
+
+
+def curves(
+    x: FloatArray,
+    values: Mapping[str, FloatArray],
+    style: Style = "line",
+    *,
+    dashed: Sequence[str] = (),
+    points: Sequence[str] = (),
+) -> list[Curve]:
+    """Return curves over the same x.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n,)
+    values : mapping of str to ndarray of shape (n,)
+        By their label.
+    style : {'line', 'dashed', 'points'}
+        Of those that are not named further on.
+    dashed, points : sequence of str
+        Labels of curves drawn so.
+
+    Returns
+    -------
+    list of Curve
+    """
+    styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
+    styles.update(dict.fromkeys(points, "points"))
+    return [Curve(label, x, y, styles.get(label, style)) for label, y in values.items()]
+
+
+def single(
+    key: str, caption: str, axes: tuple[str, str], curves: Sequence[Curve], *, title: str = "", columns: int = 1
+) -> Figure:
+    """Return a figure with one panel.
+
+    Parameters
+    ----------
+    key, caption : str
+        See `thermocomp.papers.study.Figure`.
+    axes : tuple of str
+        What stands at x and y.
+    curves : sequence of Curve
+    title : str
+        Of the panel.
+    columns : int
+        Of 2 it fills one.
+
+    Returns
+    -------
+    Figure
+    """
+    return Figure(key, caption, [Panel(title, *axes, curves)], columns)
 
 
 def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatArray]:
