@@ -16,7 +16,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.training import train
-from thermocomp.papers.study import BoolArray, Claim, Curve, Figure, FloatArray, Panel, Style, Table
+from thermocomp.papers.study import BoolArray, Curve, Figure, FloatArray, Panel, Style, Table
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD
@@ -280,39 +280,6 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
 
 
 # -- errors ---------------------------------------------------------------------------------------------------------
-
-
-def judged(ids: Sequence[str], text: str, paper: str, ours: str, holds: bool, otherwise: str) -> Claim:
-    """Return a claim that holds or does not, with the finding told only if it does not.
-
-    Parameters
-    ----------
-    ids, text, paper, ours
-        See `thermocomp.papers.study.Claim`.
-    holds : bool
-    otherwise : str
-        The finding: why it does not hold.
-
-    Returns
-    -------
-    Claim
-    """
-    return Claim(tuple(ids), text, paper, ours, holds, "" if holds else otherwise)
-
-
-def shown(ids: Sequence[str], text: str, paper: str, ours: str) -> Claim:
-    """Return a number that is only to be looked at.
-
-    Parameters
-    ----------
-    ids, text, paper, ours
-        See `thermocomp.papers.study.Claim`.
-
-    Returns
-    -------
-    Claim
-    """
-    return Claim(tuple(ids), text, paper, ours, None)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Literal, NamedTuple, TypeVar
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +92,7 @@ class Claims(Generic[Found]):
     """The claims of a study, in the order in which they are told: each with the function that makes our side of it."""
 
     def __init__(self) -> None:
-        self._judges: list[Callable[[Found], Claim]] = []
+        self._judges: list[Callable[[Found], Sequence[Claim]]] = []
 
     def add(
         self, ids: str, text: str, paper: str = ""
@@ -118,14 +118,18 @@ class Claims(Generic[Found]):
                 finding = mine.note + (mine.otherwise if holds is False else "")
                 return Claim(tuple(ids.split()), text, paper, mine.text, holds, finding)
 
-            self._judges.append(judge)
+            self._judges.append(lambda found: (judge(found),))
             return judge
 
         return register
 
+    def include(self, others: "Claims[Any]", part: Callable[[Found], Any]) -> None:
+        """Go on with all claims about a part of what was found."""
+        self._judges.append(lambda found: others(part(found)))
+
     def __call__(self, found: Found) -> tuple[Claim, ...]:
         """Return all claims, judged by what was found."""
-        return tuple(judge(found) for judge in self._judges)
+        return tuple(claim for judge in self._judges for claim in judge(found))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,15 +10,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit
 from thermocomp.papers.chen1996.setup import TENFOLD
 from thermocomp.papers.chen1996.volume import Learned
-from thermocomp.papers.common import Errors, judged, shown
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.papers.common import Errors, rms, single
+from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
 from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.experiments import SimulatedTest, simulate
@@ -28,8 +27,6 @@ from thermocomp.simulation.volume import VolumetricTruth
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import straight_lines
-
-FloatArray = NDArray[np.float64]
 
 #: points in the work volume, each in a thermal state of its own (C-35)
 POINTS = 1000
@@ -75,7 +72,7 @@ class Volume:
 
     def gain(self, what: str = WITH) -> float:
         """Return how many times smaller the error is, by its RMS."""
-        return Errors.of(self.sizes[WITHOUT]).rms / Errors.of(self.sizes[what]).rms
+        return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
 class _Part(NamedTuple):
@@ -115,7 +112,7 @@ def judge(learned: Learned, seed: int) -> Volume:
         alone = np.zeros(missed.shape)
         alone[:, INDEX[c.code]] = missed[:, INDEX[c.code]]
         moved = [kinematics.synthesize(*each)[0] for each in zip(alone, points, tools, strict=True)]
-        by_component[c.code] = Errors.of(np.linalg.norm(moved, axis=1)).rms
+        by_component[c.code] = rms(np.linalg.norm(moved, axis=1))
     return Volume(learned, errors, causes, by_component, max(p.closure for p in parts))
 
 
@@ -202,72 +199,74 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
 # -- claims ----------------------------------------------------------------------------------------------------------
 
 
-def claims(found: Volume) -> list[Claim]:
-    """Judge what the paper says about the work volume, by criteria that were fixed beforehand."""
+claims = Claims[Volume]()
+
+
+@claims.add(
+    "C-01 C-08",
+    "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
+    f"first order; the true error, composed exactly, is met within {CLOSED} um)",
+)
+def _closes(found: Volume) -> Ours:
+    return Ours(f"{found.closure:.3f} um at most", found.closure <= CLOSED, "angles are too large for first order")
+
+
+@claims.add(
+    "C-05",
+    "In most cases first order describes the thermal part of a position-dependent component well enough",
+    "m = 1",
+)
+def _first_order(found: Volume) -> Ours:
     fits = found.learned.fits
-    straight = [code for code, fit in fits.items() if fit.enough == 1]
     more = [f"{code} (m = {fit.enough})" for code, fit in fits.items() if fit.enough > 1]
-    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
-    causes = {name: Errors.of(np.linalg.norm(e, axis=1)).rms for name, e in found.causes.items()}
-    ratio = found.sizes[WITHOUT] / found.sizes[WITH]
-    median, share = float(np.median(ratio)), float(np.mean(ratio >= TENFOLD))
-    limits = (
-        f"what is left is the {SPINDLE} ({causes[SPINDLE]:.2f} um) and the {AXES_SHARE} ({causes[AXES_SHARE]:.2f} um); "
-        f"{causes[START]:.2f} um are there already at the {START}"
+    straight = sum(fit.enough == 1 for fit in fits.values())
+    return Ours(
+        f"{straight} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
+        2 * straight > len(fits),
+        "the bent parts of bed and column make parabolas",
     )
-    flat, full = (_off(f) for f in (found.learned.flat, fits["EYX"]))
-    return [
-        judged(
-            ("C-01", "C-08"),
-            "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
-            f"first order; the true error, composed exactly, is met within {CLOSED} um)",
-            "",
-            f"{found.closure:.3f} um at most",
-            found.closure <= CLOSED,
-            "angles are too large for first order",
-        ),
-        judged(
-            ("C-05",),
-            "In most cases first order describes the thermal part of a position-dependent component well enough",
-            "m = 1",
-            f"{len(straight)} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
-            2 * len(straight) > len(fits),
-            "the bent parts of bed and column make parabolas",
-        ),
-        judged(
-            ("C-06",),
-            "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
-            "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
-            "",
-            f"{flat:.2f} -> {full:.2f} um",
-            full < flat,
-            "the dependence is smaller than the noise",
-        ),
-        judged(
-            ("C-35",),
-            f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
-            "points, tools and thermal states of tests that were not learned from (RMS)",
-            "ten times",
-            f"{Errors.of(found.sizes[WITHOUT]).rms:.1f} -> {Errors.of(found.sizes[WITH]).rms:.2f} um, "
-            f"{found.gain():.1f} times, at the median point {median:.0f} times, at {share:.0%} ten times or more; "
-            f"{limits}; by component: {told}",
-            found.gain() >= TENFOLD,
-            "temperatures do not tell all that the screws and the spindle's shaft do",
-        ),
-        shown(
-            ("C-35",),
-            "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)",
-            "",
-            f"{Errors.of(found.sizes[LINES]).rms:.1f} um, {found.gain(LINES):.1f} times",
-        ),
-    ]
+
+
+@claims.add(
+    "C-06",
+    "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
+    "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
+)
+def _bed(found: Volume) -> Ours:
+    flat, full = (_off(f) for f in (found.learned.flat, found.learned.fits["EYX"]))
+    return Ours(f"{flat:.2f} -> {full:.2f} um", full < flat, "the dependence is smaller than the noise")
+
+
+@claims.add(
+    "C-35",
+    f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
+    "points, tools and thermal states of tests that were not learned from (RMS)",
+    "ten times",
+)
+def _tenfold(found: Volume) -> Ours:
+    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
+    spindle, axes, start = (rms(np.linalg.norm(found.causes[c], axis=1)) for c in (SPINDLE, AXES_SHARE, START))
+    ratio = found.sizes[WITHOUT] / found.sizes[WITH]
+    return Ours(
+        f"{rms(found.sizes[WITHOUT]):.1f} -> {rms(found.sizes[WITH]):.2f} um, {found.gain():.1f} times, at the median "
+        f"point {np.median(ratio):.0f} times, at {np.mean(ratio >= TENFOLD):.0%} ten times or more; what is left is "
+        f"the {SPINDLE} ({spindle:.2f} um) and the {AXES_SHARE} ({axes:.2f} um); {start:.2f} um are there already at "
+        f"the {START}; by component: {told}",
+        found.gain() >= TENFOLD,
+        "temperatures do not tell all that the screws and the spindle's shaft do",
+    )
+
+
+@claims.add("C-35", "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)")
+def _lines(found: Volume) -> str:
+    return f"{rms(found.sizes[LINES]):.1f} um, {found.gain(LINES):.1f} times"
 
 
 def numbers(found: Volume) -> dict[str, float]:
     """Return the figures that a page can assert."""
     made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
     short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
-    return made | {f"volume_{short[name]}_um": Errors.of(e).rms for name, e in found.sizes.items()}
+    return made | {f"volume_{short[name]}_um": rms(e) for name, e in found.sizes.items()}
 
 
 # -- tables and figures ----------------------------------------------------------------------------------------------
@@ -277,7 +276,7 @@ def tables(found: Volume) -> list[Table]:
     """Return the error before and after, and what each component was made of and leaves."""
     rows = []
     for name, size in found.sizes.items():
-        along = [f"{Errors.of(found.errors[name][:, k]).rms:.2f}" for k in range(3)]
+        along = [f"{rms(found.errors[name][:, k]):.2f}" for k in range(3)]
         e = Errors.of(size)
         rows.append([name, f"{e.rms:.2f}", f"{np.percentile(size, MOST):.2f}", f"{e.max_abs:.2f}", *along])
     header = ("", "RMS", f"{MOST} %", "max", "X RMS", "Y RMS", "Z RMS")
@@ -304,10 +303,10 @@ def tables(found: Volume) -> list[Table]:
 def figures(found: Volume) -> list[Figure]:
     """Return how large the error is in what share of the points."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
-    curves = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
-    panel = Panel("", "length of the error vector [um]", "points with a smaller one [%]", curves)
+    lines = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
     text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
-    return [Figure("chen1996-volume", text, [panel])]
+    axes = "length of the error vector [um]", "points with a smaller one [%]"
+    return [single("chen1996-volume", text, axes, lines)]
 
 
 def _off(fit: PositionFit) -> float:
@@ -315,4 +314,4 @@ def _off(fit: PositionFit) -> float:
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None
-    return Errors.of(fit.model.profile.at(points) - cold("EYX", points)).rms
+    return rms(fit.model.profile.at(points) - cold("EYX", points))
