@@ -1,8 +1,8 @@
 """What the studies share: recordings in a paper's names, models replayed over whole tests, errors and their tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -20,6 +20,8 @@ from thermocomp.papers.study import BoolArray, Curve, Figure, FloatArray, Panel,
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD
+
+Item = TypeVar("Item")
 
 #: no paper's model stops at the edge of its trained range: so far beyond it that no reading gets there
 PAPERS_SUPPORT = Support(margin=1e3)
@@ -312,6 +314,23 @@ def rms(residual: FloatArray) -> float:
 def described(residual: FloatArray, deviation: FloatArray) -> float:
     """Return the share of a deviation's variance that a model describes which leaves this residual: R2."""
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
+
+
+def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[Item], str]]) -> Table:
+    """Lay items out, a row each.
+
+    Parameters
+    ----------
+    caption : str
+    items : iterable
+    columns : mapping of str to callable
+        What is written of an item, by what stands above it.
+
+    Returns
+    -------
+    Table
+    """
+    return Table(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
 
 
 def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> Table:

@@ -228,7 +228,7 @@ class Study:
     Parameters
     ----------
     name : str
-        Key of `thermocomp.papers.studies.STUDIES`.
+        One of `thermocomp.papers.studies.STUDIES`.
     title : str
         Of the paper, with authors and year.
     claims : tuple of Claim

@@ -11,16 +11,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
-from thermocomp.papers.chen1996.setup import (
-    CLOSELY,
-    COMPETITIVE,
-    DIFFERENCES,
-    DRIFTS,
-    SUBGROUPS,
-    TEMPERATURES,
-    drift_samples,
-    recordings,
-)
+from thermocomp.papers.chen1996 import setup
+from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPERATURES, drift_samples, recordings
 from thermocomp.papers.study import Claims, FloatArray, Ours
 from thermocomp.recording.samples import Samples
 
@@ -146,7 +138,9 @@ def learn(seed: int, told: Callable[[float], None]) -> Learned:
     """
     samples = drift_samples(recordings("chen1996", seed))
     heat = samples.only(TEMPERATURES)
-    regressions = {t: SecondOrderRegression(differences=DIFFERENCES, subset=group) for t, group in SUBGROUPS.items()}
+    regressions = {
+        t: SecondOrderRegression(differences=setup.DIFFERENCES, subset=group) for t, group in setup.SUBGROUPS.items()
+    }
     models = {t: common.fitted(r, heat, [t])[t] for t, r in regressions.items()}
     wide = {t: common.fitted(SecondOrderRegression(), heat, [t])[t] for t in DRIFTS}
     kinds: dict[str, tuple[SigmoidNet, int]] = {"": (SigmoidNet(hidden=HIDDEN), STARTS)}

@@ -17,15 +17,8 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position
 from thermocomp.models.second_order import SecondOrderRegression
-from thermocomp.papers.chen1996.setup import (
-    DIFFERENCES,
-    EQ6,
-    EQ8,
-    SLOPE_VARIABLES,
-    TEMPERATURES,
-    recordings,
-    with_differences,
-)
+from thermocomp.papers.chen1996 import setup
+from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
 from thermocomp.papers.common import rms
 from thermocomp.papers.study import Claims, FloatArray, Ours, Table
 from thermocomp.recording.cycles import whole as whole_test
@@ -74,7 +67,7 @@ class Design:
     @property
     def method(self) -> SecondOrderRegression:
         """Chen's regression."""
-        return SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
+        return SecondOrderRegression(differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
 
     def reference(self, n_states: int) -> list[int]:
         """Return the states of a test that are counted from the mean of."""

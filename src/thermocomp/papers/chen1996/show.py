@@ -1,6 +1,6 @@
 """Chen, Yuan, Ni 1996, sections 3.2 and 4.2: tables and figures of the fits to the 810 sets."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -28,37 +28,24 @@ def tables(found: Learned) -> list[Table]:
         [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
         for name, row in screening(found).items()
     ]
-    fits = [
-        [
-            t,
-            ", ".join(SUBGROUPS[t]),
-            f"{len(r.candidates_)}",
-            f"{len(r.terms_)} ({TERMS[t]})",
-            f"{r.r_squared_:.3f}" + (f" ({R2_X})" if t == "x" else ""),
-            f"{r.standard_error_:.2f}" + (f" ({SEE_X:.1f})" if t == "x" else ""),
-            f"{found.mra[t]:.2f} ({MAE_MRA[t]})",
-            f"{found.net[t]:.2f} ({MAE_NET[t]})",
-            f"{r.n_effective_:.0f}",
-        ]
-        for t, r in found.regressions.items()
-    ]
+    regressions = found.regressions
+    fits: dict[str, Callable[[str], str]] = {
+        "": str,
+        "variables": lambda t: ", ".join(SUBGROUPS[t]),
+        "terms": lambda t: f"{found.candidates[t]}",
+        "left (paper)": lambda t: f"{found.terms[t]} ({TERMS[t]})",
+        "R2": lambda t: f"{regressions[t].r_squared_:.3f}" + (f" ({R2_X})" if t == "x" else ""),
+        "SEE [um]": lambda t: f"{regressions[t].standard_error_:.2f}" + (f" ({SEE_X:.1f})" if t == "x" else ""),
+        "MAE [um]": lambda t: f"{found.mra[t]:.2f} ({MAE_MRA[t]})",
+        "MAE net [um]": lambda t: f"{found.net[t]:.2f} ({MAE_NET[t]})",
+        "independent rows": lambda t: f"{found.independent[t]:.0f}",
+    }
     ours = dict(zip(found.regressions["x"].terms_, found.regressions["x"].coef_, strict=True))
     sweep = {**found.others, "9-20-3": found.nets}
     counts = [[kind, *_sweep_row(nets)] for kind, nets in sweep.items()]
-    fit_header = (
-        "",
-        "variables",
-        "terms",
-        "left (paper)",
-        "R2",
-        "SEE [um]",
-        "MAE [um]",
-        "MAE net [um]",
-        "independent rows",
-    )
     return [
         Table("Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first),
-        Table("Table 2 and the fits, the paper's numbers in brackets", fit_header, fits),
+        common.table("Table 2 and the fits, the paper's numbers in brackets", DRIFTS, fits),
         beside("Drift in x: coefficients [um/degC, um/degC2] here and in Eq. 5", ours, EQ5),
         *(_log(found.regressions[t], t) for t in ("x", "y")),
         Table(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,20 +13,9 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position, slope_samples
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
-from thermocomp.papers.chen1996 import law
+from thermocomp.papers.chen1996 import law, setup
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
-from thermocomp.papers.chen1996.setup import (
-    CLOSELY,
-    DIFFERENCES,
-    EQ6,
-    EQ8,
-    SLOPE_VARIABLES,
-    SPEED,
-    TEMPERATURES,
-    TENFOLD,
-    recordings,
-    with_differences,
-)
+from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, recordings, with_differences
 from thermocomp.papers.chen1996.show import beside, figure
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, curves, rms
 from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
@@ -125,17 +114,11 @@ def learn(seed: int, other_seed: int) -> Positioning:
     """
     (first,), (second,) = (map(with_differences, recordings("chen1996-slope", s)) for s in (seed, other_seed))
     learned, other = (from_recording(day, "EYY") for day in (first, second))
-    paper = PositionOptions(order=EQ6.degree(), inputs=TEMPERATURES, support=PAPERS_SUPPORT)
+    paper = PositionOptions(order=EQ6.degree(), inputs=setup.TEMPERATURES, support=PAPERS_SUPPORT)
     # The two regressions differ in their candidates only.
+    chens = partial(SecondOrderRegression, differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES)
     regression, linear = (
-        fit_position(
-            learned,
-            replace(
-                paper,
-                method=SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES, second_order=second),
-            ),
-        )
-        for second in (True, False)
+        fit_position(learned, replace(paper, method=chens(second_order=second))) for second in (True, False)
     )
     nets: list[PositionFit] = Parallel(n_jobs=-1, prefer="threads")(
         delayed(fit_position)(
@@ -144,7 +127,9 @@ def learn(seed: int, other_seed: int) -> Positioning:
         for start in range(STARTS)
     )
     typical = int(np.argsort([_net(n).loss_history_[-1] for n in nets])[STARTS // 2])
-    ours = fit_position(learned, PositionOptions(order=EQ6.degree(), inputs=(*TEMPERATURES, *SPEED), method="dynamic"))
+    ours = fit_position(
+        learned, PositionOptions(order=EQ6.degree(), inputs=(*setup.TEMPERATURES, *setup.SPEED), method="dynamic")
+    )
     fits = {MRA: regression, NET: nets[typical], DYNAMIC: ours}
     return Positioning(learned, other, from_recording(first, "EAY"), fits, nets, linear, law.seek(seed))
 
@@ -253,7 +238,7 @@ def _lateral(found: Positioning) -> Ours:
     after = ", ".join(f"{m} {left[m]:.1f}" for m in found.fits)
     return Ours(
         f"{left[NONE]:.1f} um; {after} um: {best:.1f} times",
-        best >= TENFOLD,
+        best >= setup.TENFOLD,
         f"even the measured slope leaves {left[MEASURED]:.1f} um; the temperatures tell the slope to "
         f"{min(found.elsewhere[MRA], found.elsewhere[NET]):.2f} um/m (RMS)",
     )

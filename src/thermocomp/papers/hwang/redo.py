@@ -8,19 +8,7 @@ from thermocomp.models.selection.collinearity import Spectrum, contributions
 from thermocomp.models.selection.grouping import group, interval_of
 from thermocomp.papers.common import described, rms
 from thermocomp.papers.hwang import setup, show
-from thermocomp.papers.hwang.setup import (
-    JUDGED,
-    LINEAR,
-    NAMES,
-    NONE,
-    OPTIMAL,
-    PLAIN,
-    QUADRATIC,
-    SAME,
-    SINGLE,
-    Computed,
-    named,
-)
+from thermocomp.papers.hwang.setup import JUDGED, LINEAR, NAMES, NONE, OPTIMAL, QUADRATIC, SAME, SINGLE, Computed, named
 from thermocomp.papers.study import Claims, Ours, Part, Progress, Study
 
 TITLE = "Hwang, Lee, Yang: Optimal variable selection in a thermal error model for real time error compensation"
@@ -254,7 +242,7 @@ def _noise(c: Computed) -> Ours:
     ratios = {key: s[QUADRATIC].std / s[LINEAR].std for key, s in c.shaken.items()}
     worse = [f"{law} {size:g} degC" for (law, size), v in ratios.items() if v <= 1]
     not_above = f"; not above for {', '.join(worse)}" if worse else ""
-    alone = at[PLAIN].std / linear.std
+    alone = at[setup.PLAIN].std / linear.std
     reason = (
         "so much of it comes from the choice of the temperatures, not from the squares"
         if alone > 0.5 * ratios["uniform", 0.4]

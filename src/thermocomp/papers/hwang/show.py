@@ -1,9 +1,13 @@
 """What the study of Hwang, Lee and Yang shows: its tables and figures."""
 
+from collections.abc import Callable
+
 import numpy as np
 
+from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection.collinearity import Spectrum, spectrum
-from thermocomp.papers.common import curves, errors_table, rms, single
+from thermocomp.models.selection.grouping import Interval
+from thermocomp.papers.common import curves, errors_table, rms, single, table
 from thermocomp.papers.hwang import setup
 from thermocomp.papers.hwang.setup import JUDGED, LINEAR, OPTIMAL, PLAIN, QUADRATIC, Computed, named
 from thermocomp.papers.study import Figure, Panel, Table
@@ -11,23 +15,18 @@ from thermocomp.papers.study import Figure, Panel, Table
 
 def tables(c: Computed) -> tuple[Table, ...]:
     """Return the tables."""
-    rows = [
-        [
-            f"{i.low:.4f} to {i.high:.4f}{' (taken)' if i is c.interval else ''}",
-            str(len(g.groups_)),
-            f"{setup.agreement(i.groups):.2f}",
-            f"{g.searched_[0]} + {g.searched_[1]}",
-            named(g.selected_),
-            f"{g.standard_error_:.2f}",
-            f"{g.spectrum_.smallest:.3g}",
-            f"{g.spectrum_.sum_inverse:.3g}",
-            f"{g.spectrum_.condition_number:.2g}",
-            f"{unseen:.2f}",
-        ]
-        for (i, g), unseen in zip(c.swept, _unseen(c), strict=True)
-    ]
-    header = ["threshold", "groups", "as Table 1", "models", "variables", "SE [um]"]
-    header += ["smallest eigenvalue", "sum of 1/eigenvalue", "condition", "RMS, new tests [um]"]
+    swept: dict[str, Callable[[tuple[Interval, CorrelationGrouping]], str]] = {
+        "threshold": lambda s: f"{s[0].low:.4f} to {s[0].high:.4f}{' (taken)' if s[0] is c.interval else ''}",
+        "groups": lambda s: str(len(s[1].groups_)),
+        "as Table 1": lambda s: f"{setup.agreement(s[0].groups):.2f}",
+        "models": lambda s: f"{s[1].searched_[0]} + {s[1].searched_[1]}",
+        "variables": lambda s: named(s[1].selected_),
+        "SE [um]": lambda s: f"{s[1].standard_error_:.2f}",
+        "smallest eigenvalue": lambda s: f"{s[1].spectrum_.smallest:.3g}",
+        "sum of 1/eigenvalue": lambda s: f"{s[1].spectrum_.sum_inverse:.3g}",
+        "condition": lambda s: f"{s[1].spectrum_.condition_number:.2g}",
+        "RMS, new tests [um]": lambda s: f"{_unseen(s[1], c):.2f}",
+    }
     ones = spectrum(np.column_stack([np.ones(len(c.fit)), c.change[:, c.single.selected_]]))
     eigenvalues = [
         [name, " ".join(f"{v:.3g}" for v in s.eigenvalues), f"{s.sum_inverse:.3g}", f"{s.condition_number:.2g}"]
@@ -46,7 +45,7 @@ def tables(c: Computed) -> tuple[Table, ...]:
     ]
     columns = ("model", "eigenvalues [degC2]", "sum of 1/eigenvalue [1/degC2]", "condition number")
     return (
-        Table("Every threshold there is (E-H1)", header, rows),
+        table("Every threshold there is (E-H1)", c.swept, swept),
         Table("Eigenvalues of X'X (Table 3)", columns, eigenvalues),
         Table(
             "R2 under random sensor error, 100 draws (Fig. 6)",
@@ -76,7 +75,7 @@ def figures(c: Computed) -> tuple[Figure, ...]:
     groups = np.array([float(len(i.groups)) for i, _ in c.swept])
     smallest = np.log10([g.spectrum_.smallest for _, g in c.swept])
     error = np.array([g.standard_error_ for _, g in c.swept])
-    errors = {"standard error of the fit": error, "RMS on new tests": np.array(_unseen(c))}
+    errors = {"standard error of the fit": error, "RMS on new tests": np.array([_unseen(g, c) for _, g in c.swept])}
     swept = [
         Panel(title, "number of groups", y, curves(groups, values, "points"))
         for title, y, values in (
@@ -114,7 +113,6 @@ def figures(c: Computed) -> tuple[Figure, ...]:
     )
 
 
-def _unseen(c: Computed) -> list[float]:
-    """Return the RMS that the model of each threshold leaves of the new tests [um]."""
-    z, heat = c.new.deviations[:, 0], c.new.frame()
-    return [rms(z - g.predict(heat)) for _, g in c.swept]
+def _unseen(grouping: CorrelationGrouping, c: Computed) -> float:
+    """Return the RMS that the model of a threshold leaves of the new tests [um]."""
+    return rms(c.new.deviations[:, 0] - grouping.predict(c.new.frame()))

@@ -3,21 +3,8 @@
 import numpy as np
 
 from thermocomp.papers.common import curves
-from thermocomp.papers.precompensation.cutting import (
-    BEFORE,
-    BEFORE_SPEED,
-    CARRIED,
-    CASES,
-    COOLS,
-    FALSE,
-    RIGHT,
-    ROOM,
-    TRIED,
-    UNKNOWN,
-    WARMS,
-    Milled,
-    Surfaces,
-)
+from thermocomp.papers.precompensation import cutting
+from thermocomp.papers.precompensation.cutting import CARRIED, COOLS, FALSE, RIGHT, UNKNOWN, WARMS, Milled, Surfaces
 from thermocomp.papers.precompensation.program import EVERY, NEEDED, SAFE, TOLERANCE, WAYS
 from thermocomp.papers.precompensation.setup import LEAST, NET, NONE, PAPERS_DEPTHS, SHARE
 from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Panel, Style, Table
@@ -62,8 +49,8 @@ def _uneven(m: Milled) -> Ours:
 
 @claims.add(
     "E-P5",
-    f"The start state is wrong by half an hour: the spindle had run at {BEFORE_SPEED:g} 1/min for "
-    f"{BEFORE / 60:g} min when the program began, which was revised for a cold machine; revised with the state "
+    f"The start state is wrong by half an hour: the spindle had run at {cutting.BEFORE_SPEED:g} 1/min for "
+    f"{cutting.BEFORE / 60:g} min when the program began, which was revised for a cold machine; revised with the state "
     "carried over; and a cold machine with a program revised for one that had run",
     "assumes a cold start",
 )
@@ -84,7 +71,8 @@ def _start(m: Milled) -> Ours:
 
 @claims.add(
     "E-P6",
-    f"The room warms, or cools, by {ROOM:g} degC in the hour between the surfaces, and the program does not know",
+    f"The room warms, or cools, by {cutting.ROOM:g} degC in the hour between the surfaces, and the program does not "
+    "know",
     "a relatively stable environment",
 )
 def _room(m: Milled) -> Ours:
@@ -120,8 +108,11 @@ def tables(m: Milled) -> tuple[Table, ...]:
         ),
         Table(
             f"Depth difference with NC programs revised {EVERY}, {_over(m)}; in brackets the greatest [um]",
-            ("machine and room", NONE, *TRIED),
-            [[case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in TRIED)] for case in CASES],
+            ("machine and room", NONE, *cutting.TRIED),
+            [
+                [case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in cutting.TRIED)]
+                for case in cutting.CASES
+            ],
         ),
     )
 
@@ -156,7 +147,7 @@ def figures(m: Milled) -> tuple[Figure, ...]:
             "precompensation-programs",
             "Second surface minus first, mean over the positions, of NC programs revised every 10 min with the net "
             "(P-07); and where room (E-P6) or start state (E-P5) are not what the revision takes them for. Warm: the "
-            f"spindle had run for {BEFORE / 60:g} min before.",
+            f"spindle had run for {cutting.BEFORE / 60:g} min before.",
             [
                 Panel(title, "cutting test", "depth difference [um]", [*curves(tests, values, "points"), zero])
                 for title, values in (

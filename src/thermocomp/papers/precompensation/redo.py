@@ -11,18 +11,7 @@ import numpy as np
 from thermocomp.models.selection.orders import Order
 from thermocomp.papers.common import Errors, curves, errors_table, rms, single
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
-from thermocomp.papers.precompensation.setup import (
-    CHOSEN,
-    CUTS,
-    LEAST,
-    NET,
-    NONE,
-    PAPERS_DEPTHS,
-    PAPERS_ORDERS,
-    POSITIONS,
-    SHARE,
-    Computed,
-)
+from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, PAPERS_DEPTHS, POSITIONS, Computed
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table
 
 TITLE = "Pre-compensation of thermal errors by revising the NC program"
@@ -62,13 +51,13 @@ claims = Claims[Computed]()
 @claims.add("P-01 P-02", "The final prediction error chooses k = 1 and m = 0, at every position", "k = 1, m = 0")
 def _orders(c: Computed) -> Ours:
     best = [(o.k, o.m) for o in c.by_fpe]
-    plain = [next(o.fpe for o in table if (o.k, o.m) == PAPERS_ORDERS) for table in c.orders]
+    plain = [next(o.fpe for o in table if (o.k, o.m) == setup.PAPERS_ORDERS) for table in c.orders]
     chosen, least = rms(c.left[CHOSEN]), rms(c.left[LEAST])
     others = "; ".join(f"{h / 60:g} min: k = {k}, m = {m}" for h, ((k, m), _, _) in c.clocks.items())
     worth = "the larger model is not the better one (E-P3)." if chosen >= least else "they are worth it."
     return Ours(
         "; ".join(f"{p} mm: k = {k}, m = {m}" for p, (k, m) in zip(POSITIONS, best, strict=True)),
-        all(orders == PAPERS_ORDERS for orders in best),
+        all(orders == setup.PAPERS_ORDERS for orders in best),
         f"With k = 1, m = 0 it is at most {max(p / o.fpe for p, o in zip(plain, c.by_fpe, strict=True)):.2f} times as "
         f"large. In free run under new conditions the orders it chooses leave {chosen:.2f} um RMS, k = 1, m = 0 "
         f"{least:.2f} um: {worth} By the step of time: {others}.",
@@ -150,7 +139,7 @@ def _scheduled(c: Computed) -> Ours:
 @claims.add(
     "P-07",
     "Depth difference of surfaces milled cold and after 1 h of varying speeds (criterion: at most the paper's "
-    f"share of it is left, {SHARE:.2f})",
+    f"share of it is left, {setup.SHARE:.2f})",
     f"{PAPERS_DEPTHS[0]:g} -> {PAPERS_DEPTHS[1]:g} um",
 )
 def _depth(c: Computed) -> Ours:
@@ -158,7 +147,7 @@ def _depth(c: Computed) -> Ours:
     worse = sum(after > before for before, after in (k.means for k in c.cuts))
     return Ours(
         f"{without:.1f} -> {with_:.1f} um, mean of {CUTS} tests and {len(POSITIONS)} positions",
-        with_ <= SHARE * without,
+        with_ <= setup.SHARE * without,
         " What is left is the model's error in free run, after an hour that it was not taught.",
         note=f"It falls to {with_ / without:.2f} of what it was; it grows in {worse} of {CUTS} tests.",
     )
@@ -280,7 +269,7 @@ def _numbers(c: Computed) -> dict[str, float]:
     return {
         "k": float(c.by_fpe[0].k),
         "m": float(c.by_fpe[0].m),
-        "rms_none_um": rms(c.left[NONE]),
+        "rms_none_um": rms(c.left[setup.NONE]),
         "rms_net_um": rms(c.left[NET]),
         "rms_least_squares_um": rms(c.left[LEAST]),
         "rms_orders_by_fpe_um": rms(c.left[CHOSEN]),

@@ -4,25 +4,15 @@ Temperatures are counted from the start of the test, as the paper draws their va
 (Fig. 6) is on-line, so methods are judged on a test of another day with other speeds, by the RMS of what they leave.
 """
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
-from thermocomp.papers.common import Errors, curves, errors_table, rms, single
+from thermocomp.models.numerics.stepwise import Step
+from thermocomp.papers.common import Errors, curves, errors_table, rms, single, table
 from thermocomp.papers.stepwise2017 import setup
-from thermocomp.papers.stepwise2017.setup import (
-    COMPONENTS,
-    F_DELETE,
-    F_ENTER,
-    LEAST,
-    NONE,
-    PAPERS_CHOICE,
-    PAPERS_RESIDUAL,
-    PURSUIT,
-    SLICED,
-    STEPWISE,
-    Computed,
-)
+from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL, PURSUIT, STEPWISE, Computed, Thinned
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table
 
 TITLE = "Open Mech. Eng. J. 11 (2017): Temperature measurement point optimization by stepwise regression"
@@ -73,7 +63,7 @@ def _first(c: Computed) -> Ours:
 @claims.add(
     "T-03 T-07",
     "F_E = 100 and F_D = 50 leave five temperatures of 24, or fewer",
-    f"5: {', '.join(map(str, PAPERS_CHOICE))}",
+    f"5: {', '.join(map(str, setup.PAPERS_CHOICE))}",
 )
 def _few(c: Computed) -> Ours:
     n, count, log = len(c.fit), len(c.chosen), c.selection.log_
@@ -85,7 +75,7 @@ def _few(c: Computed) -> Ours:
             f"{c.worth:.0f}). The last step raised R2 by {log[-1].r_squared_step:.1e}; thinned to "
             f"{c.thinned[-1].rows} rows it keeps {len(c.thinned[-1].names)}."
         )
-    return Ours(f"{count}: {', '.join(map(_place, c.chosen))}", 1 <= count <= len(PAPERS_CHOICE), many)
+    return Ours(f"{count}: {', '.join(map(_place, c.chosen))}", 1 <= count <= len(setup.PAPERS_CHOICE), many)
 
 
 @claims.add("T-05 T-06", "Temperatures that came in and were deleted again")
@@ -120,7 +110,7 @@ for _name, _called in ((LEAST, "least squares on all temperatures"), (PURSUIT, "
 
 @claims.add("T-08 T-09", f"On-line, the residual stays below {PAPERS_RESIDUAL:g} um", f"< {PAPERS_RESIDUAL:g} um")
 def _bounded(c: Computed) -> Ours:
-    online, drift = c.errors[STEPWISE], c.errors[NONE].max_abs
+    online, drift = c.errors[STEPWISE], c.errors[setup.NONE].max_abs
     over = float(np.mean(np.abs(c.left[STEPWISE]) > PAPERS_RESIDUAL))
     holds = online.max_abs < PAPERS_RESIDUAL
     tiny = holds and drift < 2 * PAPERS_RESIDUAL
@@ -141,7 +131,7 @@ def _in_fit(c: Computed) -> str:
 
 @claims.add("T-10", "On-line RMS of the neighbours: principal components (Miao), sliced inverse regression (Zhang)")
 def _neighbours(c: Computed) -> str:
-    return f"{c.errors[COMPONENTS].rms:.2f} um, {c.errors[SLICED].rms:.2f} um"
+    return f"{c.errors[setup.COMPONENTS].rms:.2f} um, {c.errors[setup.SLICED].rms:.2f} um"
 
 
 # -- beyond the paper --------------------------------------------------------------------------------------------------
@@ -168,7 +158,7 @@ def _robust(c: Computed) -> Ours:
     )
 
 
-@claims.add("E-T3", f"Temperatures that F_E = {F_ENTER:g} and F_D = {F_DELETE:g} keep of the same test, thinned")
+@claims.add("E-T3", f"Temperatures that F_E = {F_ENTER:g} and F_D = {setup.F_DELETE:g} keep of the same test, thinned")
 def _thinned(c: Computed) -> Ours:
     return Ours(
         ", ".join(f"{len(t.names)} with {t.rows} rows" for t in c.thinned),
@@ -191,41 +181,27 @@ def _absolute(c: Computed) -> str:
 
 
 def _tables(c: Computed) -> tuple[Table, ...]:
-    steps = [
-        [
-            str(s.number),
-            f"{'+' if s.action == 'enter' else '-'} {_place(s.term)}",
-            f"{s.f:.1f}",
-            f"{s.alpha:.1e}",
-            f"{s.r_squared:.4f}",
-            f"{s.r_squared_step:+.1e}",
-        ]
-        for s in c.selection.log_
-    ]
-    thinned = [
-        [
-            str(t.rows),
-            f"{t.effective:.0f}",
-            f"{t.first:.2f}",
-            str(len(t.names)),
-            ", ".join(map(_place, t.names)),
-            f"{t.rms:.2f}",
-        ]
-        for t in c.thinned
-    ]
+    steps: dict[str, Callable[[Step], str]] = {
+        "step": lambda s: str(s.number),
+        "temperature": lambda s: f"{'+' if s.action == 'enter' else '-'} {_place(s.term)}",
+        "partial F": lambda s: f"{s.f:.1f}",
+        "alpha if rows were independent": lambda s: f"{s.alpha:.1e}",
+        "R2": lambda s: f"{s.r_squared:.4f}",
+        "change of R2": lambda s: f"{s.r_squared_step:+.1e}",
+    }
+    thinned: dict[str, Callable[[Thinned], str]] = {
+        "rows": lambda t: str(t.rows),
+        "independent": lambda t: f"{t.effective:.0f}",
+        "R2 a first one needs": lambda t: f"{t.first:.2f}",
+        "chosen": lambda t: str(len(t.names)),
+        "which": lambda t: ", ".join(map(_place, t.names)),
+        "on-line RMS [um]": lambda t: f"{t.rms:.2f}",
+    }
     tests = (("fit", c.left_in_fit), ("on-line", c.left))
     return (
-        Table(
-            "Steps of the selection",
-            ("step", "temperature", "partial F", "alpha if rows were independent", "R2", "change of R2"),
-            steps,
-        ),
+        table("Steps of the selection", c.selection.log_, steps),
         errors_table("What the methods leave", {(what, m): e for what, left in tests for m, e in left.items()}),
-        Table(
-            "What a fixed F owes to the number of rows (E-T3)",
-            ("rows", "independent", "R2 a first one needs", "chosen", "which", "on-line RMS [um]"),
-            thinned,
-        ),
+        table("What a fixed F owes to the number of rows (E-T3)", c.thinned, thinned),
     )
 
 
@@ -265,12 +241,12 @@ def _figures(c: Computed) -> tuple[Figure, ...]:
 
 def _numbers(c: Computed) -> dict[str, float]:
     short = {
-        NONE: "_none",
+        setup.NONE: "_none",
         STEPWISE: "",
         LEAST: "_least_squares",
         PURSUIT: "_projection_pursuit",
-        COMPONENTS: "_principal_components",
-        SLICED: "_sliced_inverse",
+        setup.COMPONENTS: "_principal_components",
+        setup.SLICED: "_sliced_inverse",
     }
     return {
         "temperatures": float(len(c.fit.inputs) - 1),
