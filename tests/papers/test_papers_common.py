@@ -151,7 +151,7 @@ def test_a_claim_is_judged_by_its_function() -> None:
 
     @claims.add("C-34 C-36", "It is small", "1 um")
     def _small(error: float) -> Ours:
-        return Ours(f"{error:g} um", np.less(error, 1), " The rest is noise.", note="Of ten rows.")
+        return Ours(f"{error:g} um", np.less(error, 1), "The rest is noise.", note="Of ten rows.")
 
     @parts.add("C-35", "Rows")
     def _rows(n: int) -> str:

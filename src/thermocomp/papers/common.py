@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 import pandas as pd
 
+from thermocomp.assessment import metrics
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
@@ -303,7 +304,7 @@ class Errors:
     def of(cls, residual: FloatArray) -> "Errors":
         """Return the figures of a residual of any shape, nan left out; that of no compensation is the deviation."""
         e = residual[np.isfinite(residual)]
-        return cls(float(np.sqrt(np.mean(e**2))), float(np.abs(e).mean()), float(np.abs(e).max()), float(np.ptp(e)))
+        return cls(*(m(e, 0.0 * e) for m in (metrics.rms, metrics.mae, metrics.max_abs, metrics.peak_to_peak)))
 
 
 def rms(residual: FloatArray) -> float:

@@ -115,8 +115,8 @@ class Claims(Generic[Found]):
                 told = ours(found)
                 mine = Ours(told) if isinstance(told, str) else told
                 holds = None if mine.holds is None else bool(mine.holds)
-                finding = mine.note + (mine.otherwise if holds is False else "")
-                return Claim(tuple(ids.split()), text, paper, mine.text, holds, finding)
+                finding = (mine.note, mine.otherwise if holds is False else "")
+                return Claim(tuple(ids.split()), text, paper, mine.text, holds, " ".join(filter(None, finding)))
 
             self._judges.append(lambda found: (judge(found),))
             return judge

@@ -4,7 +4,7 @@ The synthesis itself is in the paper's ref. 6; here it is that of `thermocomp.vo
 by `thermocomp.simulation.volume`, which knows the machine and nothing of that synthesis.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -75,15 +75,29 @@ class Volume:
         return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
-class _Part(NamedTuple):
-    """What one test tells; see `Volume`."""
+class _Points(NamedTuple):
+    """Random points of the volume in random rows of a test: the machine there and then, and what a model tells of it.
 
+    Parameters
+    ----------
+    now, start : ndarray of shape (n, n_observables)
+        The machine at the instant, and when the test began.
+    points, tools : ndarray of shape (n, 3)
+        [mm]
+    told : ndarray of shape (n, 32)
+        Predicted components [um, urad].
+    full, lines, begin : ndarray of shape (n, 3)
+        Corrections: by all components, by one straight line per axis, and by all components when the test began [um].
+    """
+
+    now: FloatArray
+    start: FloatArray
     points: FloatArray
     tools: FloatArray
-    errors: dict[str, FloatArray]
-    missed: FloatArray  #: true minus predicted components, (n, 32)
-    causes: dict[str, FloatArray]
-    closure: float
+    told: FloatArray
+    full: FloatArray
+    lines: FloatArray
+    begin: FloatArray
 
 
 def judge(learned: Learned, seed: int) -> Volume:
@@ -102,22 +116,37 @@ def judge(learned: Learned, seed: int) -> Volume:
     rng = np.random.default_rng(seed)
     tests = list(simulate(virtual.find("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
-    parts = [_judge(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
-    errors = {k: np.vstack([p.errors[k] for p in parts]) for k in parts[0].errors}
-    causes = {k: np.vstack([p.causes[k] for p in parts]) for k in parts[0].causes}
-    missed, points, tools = (np.vstack([getattr(p, name) for p in parts]) for name in ("missed", "points", "tools"))
-    kinematics = Kinematics(learned.machine)
-    by_component = {}
-    for c in COMPONENTS:
-        alone = np.zeros(missed.shape)
-        alone[:, INDEX[c.code]] = missed[:, INDEX[c.code]]
-        moved = [kinematics.synthesize(*each)[0] for each in zip(alone, points, tools, strict=True)]
-        by_component[c.code] = rms(np.linalg.norm(moved, axis=1))
-    return Volume(learned, errors, causes, by_component, max(p.closure for p in parts))
+    parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
+    p = _Points(*map(np.vstack, zip(*parts, strict=True)))
+    truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
+
+    def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
+        """Return what the errors of some components do to the tool points [um]."""
+        alone = np.zeros_like(values)
+        columns = [INDEX[code] for code in codes]
+        alone[:, columns] = values[:, columns]
+        return np.vstack([kinematics.synthesize(*each)[0] for each in zip(alone, p.points, p.tools, strict=True)])
+
+    # the zero was set at the test position with this tool, when the test began
+    zero = truth.error(p.start, np.tile(MIDDLE, (POINTS, 1)), p.tools)
+    errors = {
+        name: truth.error(p.now, p.points + 1e-3 * added, p.tools) - zero + added
+        for name, added in ((WITHOUT, np.zeros((POINTS, 3))), (LINES, p.lines), (WITH, p.full))
+    }
+    true = as_measured(truth, p.now, p.start, p.points)
+    missed = true - p.told
+    drifts = [c.code for c in COMPONENTS if c.group == "spindle"]
+    causes = {
+        SPINDLE: effect(missed, drifts),
+        AXES_SHARE: effect(missed, INDEX.keys() - drifts),
+        START: truth.error(p.start, p.points + 1e-3 * p.begin, p.tools) - zero + p.begin,
+    }
+    by_component = {c.code: rms(np.linalg.norm(effect(missed, [c.code]), axis=1)) for c in COMPONENTS}
+    return Volume(learned, errors, causes, by_component, float(np.abs(effect(true) - errors[WITHOUT]).max()))
 
 
-def _judge(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Part:
-    model, kinematics = VolumetricModel(learned.machine), Kinematics(learned.machine)
+def _points(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
+    model = VolumetricModel(learned.machine)
     recording = virtual.recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
     rows = rng.integers(0, len(recording), n)
@@ -125,35 +154,14 @@ def _judge(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generat
     tools = np.stack([np.zeros(n), np.zeros(n), -rng.uniform(*TOOLS, n)], axis=-1)
     assert test.observables is not None
     now, start = test.observables[rows], np.tile(test.observables[0], (n, 1))
-
-    full, lines, told = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(COMPONENTS)))
-    for k, row in enumerate(rows.tolist()):
-        field = states[row]
-        full[k] = field.correction(points[k], tools[k])
-        told[k] = field.components(points[k])
-        straight = straight_lines(field, MIDDLE, tools[k], grid=2).lines
-        lines[k] = [line.correction.at(p) for line, p in zip(straight, points[k].tolist(), strict=True)]
-    truth = VolumetricTruth(MachiningCentre().observables)
-    # the zero was set at the test position with this tool, when the test began
-    zero = truth.error(start, np.tile(MIDDLE, (n, 1)), tools)
-    errors = {
-        name: truth.error(now, points + 1e-3 * added, tools) - zero + added
-        for name, added in ((WITHOUT, np.zeros((n, 3))), (LINES, lines), (WITH, full))
-    }
-    begin = np.stack([states[0].correction(p, t) for p, t in zip(points, tools, strict=True)])
-    at_start = truth.error(start, points + 1e-3 * begin, tools) - zero + begin
-    true = as_measured(truth, now, start, points)
-    missed = true - told
-    spindle = np.zeros_like(missed)
-    drifts = [INDEX[c.code] for c in COMPONENTS if c.group == "spindle"]
-    spindle[:, drifts] = missed[:, drifts]
-
-    def effect(values: FloatArray) -> FloatArray:
-        return np.vstack([kinematics.synthesize(*each)[0] for each in zip(values, points, tools, strict=True)])
-
-    causes = {SPINDLE: effect(spindle), AXES_SHARE: effect(missed - spindle), START: at_start}
-    closure = float(np.abs(effect(true) - errors[WITHOUT]).max())
-    return _Part(points, tools, errors, missed, causes, closure)
+    told, full, lines, begin = [], [], [], []
+    for row, point, tool in zip(rows.tolist(), points, tools, strict=True):
+        straight = straight_lines(states[row], MIDDLE, tool, grid=2).lines
+        told.append(states[row].components(point))
+        full.append(states[row].correction(point, tool))
+        lines.append([line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)])
+        begin.append(states[0].correction(point, tool))
+    return _Points(now, start, points, tools, *map(np.array, (told, full, lines, begin)))
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:

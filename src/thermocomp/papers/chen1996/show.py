@@ -46,7 +46,7 @@ def tables(found: Learned) -> list[Table]:
     return [
         Table("Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first),
         common.table("Table 2 and the fits, the paper's numbers in brackets", DRIFTS, fits),
-        beside("Drift in x: coefficients [um/degC, um/degC2] here and in Eq. 5", ours, EQ5),
+        beside("Drift in x: coefficients [um/degC, um/degC2]", "Eq. 5", ours, EQ5),
         *(_log(found.regressions[t], t) for t in ("x", "y")),
         Table(
             "Nets: mean absolute error after training, mean over the starts", ("", "starts", *DRIFTS, "mean"), counts
@@ -59,13 +59,15 @@ def _sweep_row(nets: Sequence[Trained]) -> list[str]:
     return [f"{len(nets)}", *(f"{m:.2f}" for m in mae), f"{np.mean(mae):.2f}"]
 
 
-def beside(caption: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> Table:
+def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> Table:
     """Lay out coefficients by their terms, ours beside the paper's.
 
     Parameters
     ----------
-    caption : str
-        Ends with the name of the paper's equation.
+    what : str
+        They are.
+    equation : str
+        Of the paper.
     ours, paper : mapping of str to float
 
     Returns
@@ -73,7 +75,7 @@ def beside(caption: str, ours: Mapping[str, float], paper: Mapping[str, float]) 
     Table
     """
     rows = [[t, *(f"{c[t]:.3f}" if t in c else "" for c in (ours, paper))] for t in {**ours, **paper}]
-    return Table(caption, ("term", "here", caption[-5:]), rows)
+    return Table(f"{what} here and in {equation}", ("term", "here", equation), rows)
 
 
 def _log(regression: SecondOrderRegression, target: str) -> Table:

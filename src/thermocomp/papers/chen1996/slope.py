@@ -285,7 +285,7 @@ def tables(found: Positioning) -> list[Table]:
         errors |= {(what, "cold profile alone" if m == NONE else m): e for m, e in residuals(found, day).items()}
     return [
         Table("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
-        beside("Slope of Y: coefficients [um/m per degC, degC2] here and in Eq. 8", ours, EQ8),
+        beside("Slope of Y: coefficients [um/m per degC, degC2]", "Eq. 8", ours, EQ8),
         common.errors_table("Positioning of Y, all profiles: error without and with compensation", errors),
         *law.tables(found.law),
     ]

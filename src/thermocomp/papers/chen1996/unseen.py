@@ -70,6 +70,11 @@ class Unseen:
         """Return the RMS that each of the nets leaves, shape (n_starts,) [um]."""
         return np.array([rms(n.models[target], samples) for n in self.learned.nets])
 
+    def left(self, target: str, samples: Samples) -> dict[str, float]:
+        """Return the RMS that each method leaves, of the nets the median [um]."""
+        net = float(np.median(self.nets(target, samples)))
+        return {m: net if m == NET else rms(models[target], samples) for m, models in self.models.items()}
+
     @cached_property
     def cut(self) -> Samples:
         """The test at 1250 1/min, with the sensor of the spindle cut off."""
@@ -114,9 +119,9 @@ def _bad(left: float, none: float) -> bool:
 
 
 def _new_observations(found: Unseen, test: int) -> Ours:
-    none, mra, ours = (found.errors(test, "z", m).rms for m in (NONE, MRA, DYNAMIC))
-    nets = found.nets("z", found.tests[test])
-    net, wide = float(np.median(nets)), rms(found.learned.wide["z"], found.tests[test])
+    samples, none = found.tests[test], found.errors(test, "z", NONE).rms
+    nets, wide = found.nets("z", samples), rms(found.learned.wide["z"], samples)
+    mra, net, ours = found.left("z", samples).values()
     equal = net <= COMPETITIVE * mra and mra <= COMPETITIVE * net
     reasons = [f"the {m} leaves {e / none:.0%} of the drift" for m, e in ((MRA, mra), (NET, net)) if _bad(e, none)]
     if not equal:
@@ -165,8 +170,7 @@ def _shaken(found: Unseen, left: Mapping[str, float]) -> str:
     "Fig. 16",
 )
 def _uniform(found: Unseen) -> Ours:
-    none, noisy = found.errors(0, "z", NONE).rms, found.noisy
-    clean = {MRA: found.errors(0, "z", MRA).rms, NET: float(np.median(found.nets("z", found.tests[0])))}
+    none, noisy, clean = found.errors(0, "z", NONE).rms, found.noisy, found.left("z", found.tests[0])
     reasons = [
         f"the {m} leaves {noisy[m] / none:.0%} of the drift with noise, {clean[m] / none:.0%} without"
         for m in (MRA, NET)
@@ -260,10 +264,8 @@ def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
     dict of str to float
         Of the nets the median.
     """
-    noisy = [common.with_noise(found.tests[0], NOISE, law, k) for k in range(DRAWS)]
-    left = {m: float(np.mean([rms(models["z"], s) for s in noisy])) for m, models in found.models.items() if m != NET}
-    left[NET] = float(np.mean([np.median(found.nets("z", s)) for s in noisy]))
-    return {m: left[m] for m in found.models}
+    noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
+    return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}
 
 
 def largest_error(found: Unseen) -> dict[str, float]:
@@ -296,13 +298,12 @@ def numbers(found: Unseen) -> dict[str, float]:
     """Return the figures that a page can assert: RMS, of the nets the median, and largest errors."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic"}
     made: dict[str, float] = {}
-    for k, test in enumerate(("1250", "random")):
-        for t in DRIFTS:
-            made |= {f"rms_{t}_{test}_{short[m]}_um": found.errors(k, t, m).rms for m in short if m != NET}
-            made[f"rms_{t}_{test}_net_um"] = float(np.median(found.nets(t, found.tests[k])))
     for t in DRIFTS:
-        made[f"rms_{t}_1250_cut_mra_um"] = rms(found.learned.models[t], found.cut)
-        made[f"rms_{t}_1250_cut_net_um"] = float(np.median(found.nets(t, found.cut)))
+        for k, test in enumerate(("1250", "random")):
+            left = {NONE: found.errors(k, t, NONE).rms} | found.left(t, found.tests[k])
+            made |= {f"rms_{t}_{test}_{short[m]}_um": e for m, e in left.items()}
+        cut = found.left(t, found.cut)
+        made |= {f"rms_{t}_1250_cut_{short[m]}_um": cut[m] for m in (MRA, NET)}
     made |= {f"rms_z_1250_noise_{short[m]}_um": e for m, e in found.noisy.items()}
     made |= {f"largest_error_{short[m]}_um": e for m, e in largest_error(found).items()}
     made |= {f"largest_depth_{short[m]}_um": e for m, e in largest_depth(found).items()}

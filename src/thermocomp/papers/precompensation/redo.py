@@ -148,7 +148,7 @@ def _depth(c: Computed) -> Ours:
     return Ours(
         f"{without:.1f} -> {with_:.1f} um, mean of {CUTS} tests and {len(POSITIONS)} positions",
         with_ <= setup.SHARE * without,
-        " What is left is the model's error in free run, after an hour that it was not taught.",
+        "What is left is the model's error in free run, after an hour that it was not taught.",
         note=f"It falls to {with_ / without:.2f} of what it was; it grows in {worse} of {CUTS} tests.",
     )
 

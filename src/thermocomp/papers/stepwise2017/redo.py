@@ -153,8 +153,8 @@ def _robust(c: Computed) -> Ours:
         f"noise x {noise[STEPWISE]:.1f}, lost sensor x {lost[STEPWISE]:.1f}; least squares x {noise[LEAST]:.1f}, "
         f"x {lost[LEAST]:.1f}; projection pursuit x {noise[PURSUIT]:.1f}, x {lost[PURSUIT]:.1f}",
         all(noise[STEPWISE] < noise[m] and lost[STEPWISE] < lost[m] for m in (LEAST, PURSUIT)),
-        ". With few sensors each one counts for more.",
-        note="; ".join(told),
+        "With few sensors each one counts for more.",
+        note=f"{'; '.join(told)}.",
     )
 
 

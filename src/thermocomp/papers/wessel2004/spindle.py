@@ -164,7 +164,7 @@ def _bent(s: Spindle) -> Ours:
     return Ours(
         f"MLR {mlr:.2f} um, ACE {ace:.2f} um",
         ace < mlr,
-        " The paper's evidence is that the curves are bent; bends of several can cancel.",
+        "The paper's evidence is that the curves are bent; bends of several can cancel.",
         note=s.found.reasons(),
     )
 
