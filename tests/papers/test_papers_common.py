@@ -10,7 +10,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.ols import LeastSquares
-from thermocomp.papers import common
+from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
 from thermocomp.papers.study import Claims, Ours, Part, Study, Table
 from thermocomp.recording.recording import Recording
@@ -136,7 +136,7 @@ def test_the_table_of_errors_has_a_row_per_residual() -> None:
 
 
 def test_tests_are_put_end_to_end(tests: Samples) -> None:
-    hours, values = common.end_to_end(tests, tests.deviations[:, 0])
+    hours, values = pictures.end_to_end(tests, tests.deviations[:, 0])
 
     n = int((tests.test == 0).sum())
     assert len(hours) == len(values) == len(tests) + 1
@@ -171,7 +171,7 @@ def test_a_claim_is_judged_by_its_function() -> None:
 
 
 def test_a_study_is_its_parts_one_after_the_other() -> None:
-    table, figure = Table("t", ("a",), []), common.single("k", "c", ("x", "y"), [])
+    table, figure = Table("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
     made = Study.of("n", "T", Part([], [table], [figure], {"a": 1.0}), Part([], [], [figure], {"b": 2.0}))
     assert (made.name, made.title, made.claims, made.tables) == ("n", "T", (), (table,))
     assert made.figures == (figure, figure)
@@ -180,10 +180,10 @@ def test_a_study_is_its_parts_one_after_the_other() -> None:
 
 def test_curves_over_the_same_x() -> None:
     x = np.arange(3.0)
-    drawn = common.curves(x, {"a": x, "b": 2 * x, "c": 3 * x}, dashed=["b"], points=["c"])
+    drawn = pictures.curves(x, {"a": x, "b": 2 * x, "c": 3 * x}, dashed=["b"], points=["c"])
     assert [(c.label, c.style) for c in drawn] == [("a", "line"), ("b", "dashed"), ("c", "points")]
     assert all(c.x is x for c in drawn)
-    assert [c.style for c in common.curves(x, {"a": x}, "points")] == ["points"]
+    assert [c.style for c in pictures.curves(x, {"a": x}, "points")] == ["points"]
 
 
 def test_the_share_that_is_described() -> None:

@@ -12,7 +12,8 @@ from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
-from thermocomp.papers.common import curves, rms, single, stacked
+from thermocomp.papers.common import rms, stacked
+from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.study import Claim, Figure, Progress, Study, Table, silent
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples

@@ -16,7 +16,8 @@ from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit
 from thermocomp.papers.chen1996.setup import TENFOLD
 from thermocomp.papers.chen1996.volume import Learned
-from thermocomp.papers.common import Errors, rms, single
+from thermocomp.papers.common import Errors, rms
+from thermocomp.papers.pictures import single
 from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
 from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
 from thermocomp.simulation.centre import MachiningCentre

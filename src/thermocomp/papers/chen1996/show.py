@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from thermocomp.models.second_order import SecondOrderRegression
-from thermocomp.papers import common
+from thermocomp.papers import common, pictures
 from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
 from thermocomp.papers.chen1996.setup import DRIFTS, SENSORS, SUBGROUPS
 from thermocomp.papers.study import Curve, Figure, Table
@@ -93,8 +93,8 @@ def figures(found: Learned) -> list[Figure]:
     for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
         for number, (target, model) in enumerate(models.items(), start=first):
             curves = [
-                Curve("measured", *common.end_to_end(samples, common.measured(samples, target)), "points"),
-                Curve(kind, *common.end_to_end(samples, common.predicted(model, samples))),
+                Curve("measured", *pictures.end_to_end(samples, common.measured(samples, target)), "points"),
+                Curve(kind, *pictures.end_to_end(samples, common.predicted(model, samples))),
             ]
             axes = "time, five tests one after the other [h]", f"{target} [um]"
             text = f"drift in {target} over the five tests, and the fit by the {kind}."
@@ -104,4 +104,4 @@ def figures(found: Learned) -> list[Figure]:
 
 def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[Curve]) -> Figure:
     """Return a figure with one panel, like the paper's figure of that number."""
-    return common.single(f"chen1996-fig{number}", f"Fig. {number}: {text}", axes, curves)
+    return pictures.single(f"chen1996-fig{number}", f"Fig. {number}: {text}", axes, curves)

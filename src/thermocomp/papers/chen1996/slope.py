@@ -17,7 +17,8 @@ from thermocomp.papers.chen1996 import law, setup
 from thermocomp.papers.chen1996.law import HIDDEN, Law, r2_about_zero
 from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES, recordings, with_differences
 from thermocomp.papers.chen1996.show import beside, figure
-from thermocomp.papers.common import PAPERS_SUPPORT, Errors, curves, rms
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
 from thermocomp.recording.profiles import Profiles
 

@@ -13,7 +13,8 @@ from thermocomp.papers import common
 from thermocomp.papers.chen1996.drift import Learned
 from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
 from thermocomp.papers.chen1996.show import figure
-from thermocomp.papers.common import Errors, curves, trained
+from thermocomp.papers.common import Errors, trained
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, Table
 from thermocomp.recording.samples import Samples
 

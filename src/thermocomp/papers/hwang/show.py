@@ -7,9 +7,10 @@ import numpy as np
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection.collinearity import Spectrum, spectrum
 from thermocomp.models.selection.grouping import Interval
-from thermocomp.papers.common import curves, errors_table, rms, single, table
+from thermocomp.papers.common import errors_table, rms, table
 from thermocomp.papers.hwang import setup
 from thermocomp.papers.hwang.setup import JUDGED, LINEAR, OPTIMAL, PLAIN, QUADRATIC, Computed, named
+from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.study import Figure, Panel, Table
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thermocomp.papers.common import curves
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.precompensation import cutting
 from thermocomp.papers.precompensation.cutting import CARRIED, COOLS, FALSE, RIGHT, UNKNOWN, WARMS, Milled, Surfaces
 from thermocomp.papers.precompensation.program import EVERY, NEEDED, SAFE, TOLERANCE, WAYS

@@ -9,7 +9,8 @@ revised, read back and milled, in `thermocomp.papers.precompensation.cutting`.
 import numpy as np
 
 from thermocomp.models.selection.orders import Order
-from thermocomp.papers.common import Errors, curves, errors_table, rms, single
+from thermocomp.papers.common import Errors, errors_table, rms
+from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
 from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, PAPERS_DEPTHS, POSITIONS, Computed
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table

@@ -10,7 +10,8 @@ from functools import partial
 import numpy as np
 
 from thermocomp.models.numerics.stepwise import Step
-from thermocomp.papers.common import Errors, curves, errors_table, rms, single, table
+from thermocomp.papers.common import Errors, errors_table, rms, table
+from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.stepwise2017 import setup
 from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL, PURSUIT, STEPWISE, Computed, Thinned
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table

@@ -8,7 +8,8 @@ import numpy as np
 
 from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
-from thermocomp.papers.common import curves, rms
+from thermocomp.papers.common import rms
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import BoolArray, Claims, Figure, Ours, Panel, Part, Progress, Table
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,

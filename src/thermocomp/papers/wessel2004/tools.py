@@ -9,7 +9,8 @@ from scipy.stats import spearmanr
 
 from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
-from thermocomp.papers.common import curves, rms
+from thermocomp.papers.common import rms
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Table
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, called
 from thermocomp.papers.wessel2004.trial import (

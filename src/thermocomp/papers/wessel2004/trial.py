@@ -14,7 +14,8 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common
-from thermocomp.papers.common import curves, errors_table, every, fitted, predicted, rms
+from thermocomp.papers.common import errors_table, every, fitted, predicted, rms
+from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import BoolArray, FloatArray, Panel, Table
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
