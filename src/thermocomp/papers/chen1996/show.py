@@ -65,9 +65,9 @@ def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[s
     Parameters
     ----------
     what : str
-        They are.
+        What the coefficients are of, and their unit.
     equation : str
-        Of the paper.
+        The paper's, such as ``Eq. 5``.
     ours, paper : mapping of str to float
 
     Returns
@@ -103,5 +103,19 @@ def figures(found: Learned) -> list[Figure]:
 
 
 def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[Curve]) -> Figure:
-    """Return a figure with one panel, like the paper's figure of that number."""
+    """Return a figure with one panel, like the paper's figure of that number.
+
+    Parameters
+    ----------
+    number : int
+    text : str
+        Of the caption.
+    axes : tuple of str
+        What stands at x and y.
+    curves : sequence of Curve
+
+    Returns
+    -------
+    Figure
+    """
     return pictures.single(f"chen1996-fig{number}", f"Fig. {number}: {text}", axes, curves)
