@@ -1,6 +1,6 @@
 """Chen, Yuan, Ni 1996 redone: the procedure is the paper's, and what is judged can fail."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -71,7 +71,7 @@ def unseen(learned: Learned) -> Unseen:
     return chen1996_unseen.observe(learned, 1)
 
 
-def find(claims: list[Claim], identifier: str, text: str) -> Claim:
+def find(claims: Sequence[Claim], identifier: str, text: str) -> Claim:
     (found,) = [c for c in claims if identifier in c.ids and text in c.text]
     return found
 

@@ -11,12 +11,13 @@ from thermocomp.models.position import PositionOptions, slope_samples
 from thermocomp.papers.chen1996 import law
 from thermocomp.papers.chen1996.law import DESIGNS, OURS, Law, Recovery
 from thermocomp.papers.chen1996.setup import EQ6, EQ8, TEMPERATURES
+from thermocomp.papers.study import FloatArray
 
 DAYS = range(3)
 
 
 @pytest.fixture(scope="module")
-def days() -> list[list[law.FloatArray]]:
+def days() -> list[list[FloatArray]]:
     return [law.temperatures("chen1996-law", k) for k in DAYS]
 
 
@@ -29,14 +30,14 @@ def sought() -> Law:
         return law.seek(5)
 
 
-def test_three_tests_of_17_profiles(days: list[list[law.FloatArray]]) -> None:
+def test_three_tests_of_17_profiles(days: list[list[FloatArray]]) -> None:
     """C-23: 51 sets."""
     measured = law.plant(days[0], OURS, np.random.default_rng(0))
     assert [m.errors.shape for m in measured] == [(17, 12)] * 3
     assert [m.temperatures.shape for m in measured] == [(17, 9)] * 3
 
 
-def test_what_is_planted_are_the_paper_s_equations(days: list[list[law.FloatArray]]) -> None:
+def test_what_is_planted_are_the_paper_s_equations(days: list[list[FloatArray]]) -> None:
     """C-22, C-24, E-C4, E-C6: um/m, and at 500 mm half as many um."""
     quiet = replace(OURS, laser=0.0, sensor=0.0, runs=1)
     for true, m in zip(days[0], law.plant(days[0], quiet, np.random.default_rng(0)), strict=True):
@@ -49,7 +50,7 @@ def test_what_is_planted_are_the_paper_s_equations(days: list[list[law.FloatArra
 
 
 @pytest.mark.parametrize("design", [OURS, replace(OURS, centred=False)])
-def test_slopes_and_temperatures_are_those_of_the_house(days: list[list[law.FloatArray]], design: law.Design) -> None:
+def test_slopes_and_temperatures_are_those_of_the_house(days: list[list[FloatArray]], design: law.Design) -> None:
     measured = law.plant(days[0], design, np.random.default_rng(1))
     tests = [m.profiles(f"test {k}") for k, m in enumerate(measured)]
     samples, _ = slope_samples(tests, PositionOptions(inputs=TEMPERATURES, reference=design.reference(17)))
@@ -58,7 +59,7 @@ def test_slopes_and_temperatures_are_those_of_the_house(days: list[list[law.Floa
     np.testing.assert_allclose(k1, samples.deviations[:, 0], atol=1e-9)
 
 
-def test_the_law_comes_back_whole(days: list[list[law.FloatArray]]) -> None:
+def test_the_law_comes_back_whole(days: list[list[FloatArray]]) -> None:
     """C-23: four terms of 20, none that is not there; not so from the cold state, or from one warm-up."""
     ours = law.recover(OURS, days, 60, 0)
     assert ours.whole >= law.MOST

@@ -10,8 +10,9 @@ from thermocomp.core.machine import Channel
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.ols import LeastSquares
-from thermocomp.papers import common
+from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
+from thermocomp.papers.study import Claims, Ours, Part, Study, Table
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
@@ -135,7 +136,7 @@ def test_the_table_of_errors_has_a_row_per_residual() -> None:
 
 
 def test_tests_are_put_end_to_end(tests: Samples) -> None:
-    hours, values = common.end_to_end(tests, tests.deviations[:, 0])
+    hours, values = pictures.end_to_end(tests, tests.deviations[:, 0])
 
     n = int((tests.test == 0).sum())
     assert len(hours) == len(values) == len(tests) + 1
@@ -145,7 +146,48 @@ def test_tests_are_put_end_to_end(tests: Samples) -> None:
     assert hours[-1] == pytest.approx((tests.time[n - 1] + tests.time[-1]) / 3600)
 
 
-def test_a_finding_is_told_only_where_a_claim_fails() -> None:
-    assert common.judged(["C-34"], "text", "", "", True, "why").finding == ""
-    assert common.judged(["C-34"], "text", "", "", False, "why").finding == "why"
-    assert common.shown(["C-34"], "text", "", "").holds is None
+def test_a_claim_is_judged_by_its_function() -> None:
+    claims, parts = Claims[float](), Claims[int]()
+
+    @claims.add("C-34 C-36", "It is small", "1 um")
+    def _small(error: float) -> Ours:
+        return Ours(f"{error:g} um", np.less(error, 1), "The rest is noise.", note="Of ten rows.")
+
+    @parts.add("C-35", "Rows")
+    def _rows(n: int) -> str:
+        return f"{n}"
+
+    claims.include(parts, int)
+
+    small, rows = claims(0.5)
+    large, _ = claims(2.0)
+    assert (small.ids, small.text, small.paper, small.ours) == (("C-34", "C-36"), "It is small", "1 um", "0.5 um")
+    assert small.holds is True
+    assert small.finding == "Of ten rows."
+    assert large.holds is False
+    assert large.finding == "Of ten rows. The rest is noise."
+    assert (rows.ours, rows.holds, rows.finding) == ("0", None, "")
+    assert _small(2.0) == large
+
+
+def test_a_study_is_its_parts_one_after_the_other() -> None:
+    table, figure = Table("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
+    made = Study.of("n", "T", Part([], [table], [figure], {"a": 1.0}), Part([], [], [figure], {"b": 2.0}))
+    assert (made.name, made.title, made.claims, made.tables) == ("n", "T", (), (table,))
+    assert made.figures == (figure, figure)
+    assert made.numbers == {"a": 1.0, "b": 2.0}
+
+
+def test_curves_over_the_same_x() -> None:
+    x = np.arange(3.0)
+    drawn = pictures.curves(x, {"a": x, "b": 2 * x, "c": 3 * x}, dashed=["b"], points=["c"])
+    assert [(c.label, c.style) for c in drawn] == [("a", "line"), ("b", "dashed"), ("c", "points")]
+    assert all(c.x is x for c in drawn)
+    assert [c.style for c in pictures.curves(x, {"a": x}, "points")] == ["points"]
+
+
+def test_the_share_that_is_described() -> None:
+    drift = np.array([0.0, 1.0, 2.0, 3.0])
+    assert common.described(0 * drift, drift) == 1
+    assert common.described(drift - drift.mean(), drift) == 0
+    assert common.described(np.array([0.5, -0.5, 0.0, 0.0]), drift) == pytest.approx(0.9)

@@ -1,20 +1,22 @@
 """Wessel et al. 2004 redone: each judgement on data whose answer is known, and the whole study on a heated rod."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import equivalents
+from thermocomp.models.selection.maximal_correlation import MaximalCorrelations
 from thermocomp.papers.study import Claim, Study
 from thermocomp.papers.wessel2004 import redo as wessel2004
 from thermocomp.papers.wessel2004 import sets as wessel2004_sets
 from thermocomp.papers.wessel2004 import spindle as wessel2004_spindle
 from thermocomp.papers.wessel2004 import tools as wessel2004_tools
+from thermocomp.papers.wessel2004.sets import Selection
 from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
 from thermocomp.recording.cycles import whole
 from thermocomp.recording.recording import Recording
@@ -91,7 +93,7 @@ def study() -> Iterator[tuple[Study, list[float]]]:
         yield wessel2004.run(0, lambda share, _: told.append(share)), told
 
 
-def claim(claims: tuple[Claim, ...], words: str) -> Claim:
+def claim(claims: Sequence[Claim], words: str) -> Claim:
     (found,) = [c for c in claims if words in c.text]
     return found
 
@@ -229,7 +231,9 @@ def test_a_row_is_beyond_only_if_one_can_see_it() -> None:
 
 
 def peaks(learned: Recording, unseen: Recording) -> tuple[Claim, Claim]:
-    return wessel2004_spindle._peak_claims(trial([learned, unseen], 0, (0, 1), beside=False))
+    found = trial([learned, unseen], 0, (0, 1), beside=False)
+    both = wessel2004_spindle.Spindle([learned, unseen], found, found)
+    return wessel2004_spindle._cropped(both), wessel2004_spindle._guarded(both)
 
 
 def test_peaks_are_cropped_and_flagged() -> None:
@@ -299,11 +303,15 @@ def judged(residual: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> T
 
 
 def test_the_local_gain_is_the_greatest_of_ten_stretches() -> None:
-    warm = judged(lambda x: (np.where(x <= 10, 12.0, 1.0), np.ones(100)))
-    c = wessel2004_tools._locally(warm)
+    def locally(found: Trial) -> Claim:
+        return wessel2004_tools._locally(
+            wessel2004_tools.Resting(found, found, selection([[[0.4, 0.5, 0.6]]], [(0,)]), {})
+        )
+
+    c = locally(judged(lambda x: (np.where(x <= 10, 12.0, 1.0), np.ones(100))))
     assert c.holds
     assert c.ours.startswith("up to 12.0x, in rows 1-10 of 100")
-    assert not wessel2004_tools._locally(judged(lambda _: (np.full(100, 9.0), np.ones(100)))).holds
+    assert not locally(judged(lambda _: (np.full(100, 9.0), np.ones(100)))).holds
 
 
 def test_the_worst_episode_is_left_out() -> None:
@@ -326,6 +334,14 @@ def test_over_and_under_estimates_go_by_the_drift() -> None:
 # -- choice of temperatures ----------------------------------------------------------------------------------------
 
 
+def selection(psi: ArrayLike, sets: list[tuple[int, ...]]) -> Selection:
+    """Return the comparison of sets by their maximal correlations, (displacements, sets, tests)."""
+    values = np.asarray(psi, dtype=np.float64)
+    known = MaximalCorrelations(values, tuple(sets), tuple(f"set{k}" for k in range(values.shape[2])), complete=True)
+    small = equivalents(list(values), sets)
+    return Selection(known, known, small, small, small, [100], 1.0)
+
+
 def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
     sets = [(0,), (1,), (0, 1)]
     rng = np.random.default_rng(0)
@@ -336,8 +352,10 @@ def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
     assert small.common == ((1,), (0, 1))
     best = max(((1,), (0, 1)), key=lambda s: psi[:, sets.index(s)].sum())
     assert wessel2004_sets._choice(small) == best
-    with_all, shared = wessel2004_sets._equal_claims(small, small, small)
-    assert with_all.holds
+    found = selection(psi, sets)
+    assert found.chosen == best
+    shared = wessel2004_sets._shared(found)
+    assert wessel2004_sets._several(found).holds
     assert shared.holds is False  # T2 is in both, and by itself as good as the best
     assert "{T2} by itself is as good" in shared.finding
 
@@ -345,7 +363,8 @@ def test_the_choice_is_the_greatest_sum_of_the_common_sets() -> None:
 def test_no_common_set_is_told() -> None:
     rng = np.random.default_rng(1)
     psi = np.array([[0.9, 0.5], [0.5, 0.9]])[:, :, None] + 1e-4 * rng.normal(size=(2, 2, 23))
-    several, shared = wessel2004_sets._equal_claims(*[equivalents(list(psi), [(0,), (1,)])] * 3)
+    found = selection(psi, [(0,), (1,)])
+    several, shared = wessel2004_sets._several(found), wessel2004_sets._shared(found)
     assert several.holds is False
     assert shared.holds is False
     assert several.ours.endswith("0 common: none")

@@ -1,23 +1,28 @@
 """What the studies share: recordings in a paper's names, models replayed over whole tests, errors and their tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from thermocomp.assessment import metrics
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.papers.study import Claim, Table
+from thermocomp.models.training import train
+from thermocomp.papers.study import BoolArray, FloatArray, Table
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples
+from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.starts import COLD
 
-FloatArray = NDArray[np.float64]
+Item = TypeVar("Item")
 
 #: no paper's model stops at the edge of its trained range: so far beyond it that no reading gets there
 PAPERS_SUPPORT = Support(margin=1e3)
@@ -67,6 +72,31 @@ def derived(recording: Recording, channel: Channel, weights: Mapping[str, float]
     values = recording.values([recording.channel(name) for name in weights]) @ np.array(list(weights.values()))
     table = recording.table.assign(**{channel.name: values})
     return replace(recording, table=table, channels=(*recording.channels, channel))
+
+
+def stacked(
+    recordings: Sequence[Recording], targets: Sequence[str], inputs: Sequence[str] | None = None, *, rezero: bool = True
+) -> Samples:
+    """Stack tests as the papers do: they begin with a cold machine, and their first reading is the zero.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    targets, inputs : sequence of str
+        See `thermocomp.recording.samples.stack`.
+    rezero : bool
+        True: temperatures are counted from the start of each test; False: as read.
+
+    Returns
+    -------
+    Samples
+    """
+    return stack(recordings, targets, inputs, rezero=rezero, zeroing=FIRST_READING, starts=COLD)
+
+
+def every(samples: Samples) -> BoolArray:
+    """Return the choice of all rows, shape (n_rows,)."""
+    return np.ones(len(samples), dtype=np.bool_)
 
 
 def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"], seed: int) -> Samples:
@@ -157,8 +187,7 @@ def fitted(
     """
     columns = [[c.name for c in samples.targets].index(t) for t in targets]
     y = samples.deviations[:, columns]
-    every = np.ones(len(samples), dtype=np.bool_)
-    inputs = samples.model_inputs(range(len(samples.inputs)), every)
+    inputs = samples.model_inputs(range(len(samples.inputs)), every(samples))
     header: dict[str, Any] = {"inputs": inputs, "support": support}
     fitting: Any = estimator
     fitting.fit(samples.frame(), y[:, 0] if len(columns) == 1 else y, **fit)
@@ -168,6 +197,62 @@ def fitted(
         t: fitting.freeze(target=t, unit=samples.targets[j].unit, output=k, **header)
         for k, (t, j) in enumerate(zip(targets, columns, strict=True))
     }
+
+
+def trained(method: str, samples: Samples, target: int = 0, support: Support = Support()) -> ErrorModel:
+    """Train a method of the house, as it comes, on all rows of the samples.
+
+    Parameters
+    ----------
+    method : str
+        Key of `thermocomp.models.methods.METHODS`.
+    samples : Samples
+    target : int
+        Place of the target.
+    support : Support
+        What the model does outside the trained range.
+
+    Returns
+    -------
+    ErrorModel
+    """
+    return train(method, samples, target, every(samples), support=support).model
+
+
+def frozen(
+    samples: Samples, columns: Sequence[int], coefficients: Sequence[float], intercept: float, **shape: Any
+) -> Polynomial:
+    """Freeze coefficients as a polynomial of some inputs for the first target.
+
+    Parameters
+    ----------
+    samples : Samples
+        It was fitted to.
+    columns : sequence of int
+        Of the inputs.
+    coefficients : sequence of float
+    intercept : float
+        [unit of the target]
+    **shape
+        Its ``variables`` and ``terms``; each input by itself if not given.
+
+    Returns
+    -------
+    Polynomial
+    """
+    inputs = samples.model_inputs(columns, every(samples))
+    single = tuple(Variable.single(c.name, k) for k, c in enumerate(inputs))
+    shape = {"variables": single, "terms": tuple((k,) for k in range(len(single)))} | shape
+    (target, *_) = samples.targets
+    return Polynomial(
+        target=target.name,
+        unit=target.unit,
+        inputs=inputs,
+        support=PAPERS_SUPPORT,
+        coefficients=tuple(coefficients),
+        intercept=intercept,
+        **shape,
+    )
 
 
 def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
@@ -184,7 +269,7 @@ def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
     ndarray of shape (n_rows,)
         [unit of the model]
     """
-    return replay(model, samples, np.ones(len(samples), dtype=np.bool_))[0]
+    return replay(model, samples, every(samples))[0]
 
 
 def measured(samples: Samples, target: str) -> FloatArray:
@@ -197,40 +282,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
     return measured(samples, model.target) - predicted(model, samples)
 
 
-# -- claims and errors ------------------------------------------------------------------------------------------------
-
-
-def judged(ids: Sequence[str], text: str, paper: str, ours: str, holds: bool, otherwise: str) -> Claim:
-    """Return a claim that holds or does not, with the finding told only if it does not.
-
-    Parameters
-    ----------
-    ids, text, paper, ours
-        See `thermocomp.papers.study.Claim`.
-    holds : bool
-    otherwise : str
-        The finding: why it does not hold.
-
-    Returns
-    -------
-    Claim
-    """
-    return Claim(tuple(ids), text, paper, ours, holds, "" if holds else otherwise)
-
-
-def shown(ids: Sequence[str], text: str, paper: str, ours: str) -> Claim:
-    """Return a number that is only to be looked at.
-
-    Parameters
-    ----------
-    ids, text, paper, ours
-        See `thermocomp.papers.study.Claim`.
-
-    Returns
-    -------
-    Claim
-    """
-    return Claim(tuple(ids), text, paper, ours, None)
+# -- errors ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -252,7 +304,34 @@ class Errors:
     def of(cls, residual: FloatArray) -> "Errors":
         """Return the figures of a residual of any shape, nan left out; that of no compensation is the deviation."""
         e = residual[np.isfinite(residual)]
-        return cls(float(np.sqrt(np.mean(e**2))), float(np.abs(e).mean()), float(np.abs(e).max()), float(np.ptp(e)))
+        return cls(*(m(e, 0.0 * e) for m in (metrics.rms, metrics.mae, metrics.max_abs, metrics.peak_to_peak)))
+
+
+def rms(residual: FloatArray) -> float:
+    """Return the root of the mean square of a residual of any shape."""
+    return Errors.of(residual).rms
+
+
+def described(residual: FloatArray, deviation: FloatArray) -> float:
+    """Return the share of a deviation's variance that a model describes which leaves this residual: R2."""
+    return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
+
+
+def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[Item], str]]) -> Table:
+    """Lay items out, a row each.
+
+    Parameters
+    ----------
+    caption : str
+    items : iterable
+    columns : mapping of str to callable
+        What is written of an item, by what stands above it.
+
+    Returns
+    -------
+    Table
+    """
+    return Table(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
 
 
 def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> Table:
@@ -276,33 +355,3 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
         rows.append([what, method, *(f"{v:.2f}" for v in (e.rms, e.mae, e.max_abs, e.peak_to_peak))])
     header = ("", "method", f"RMS [{unit}]", f"MAE [{unit}]", f"max [{unit}]", f"peak-to-peak [{unit}]")
     return Table(caption, header, rows)
-
-
-# -- curves --------------------------------------------------------------------------------------------------------
-
-
-def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Put the tests of samples one after the other on one axis of time, with a break in the line between them.
-
-    Parameters
-    ----------
-    samples : Samples
-    values : ndarray of shape (n_rows,)
-
-    Returns
-    -------
-    hours, values : ndarray of shape (n_rows + n_tests - 1,)
-        A nan between two tests.
-    """
-    x: list[FloatArray] = []
-    y: list[FloatArray] = []
-    begin = 0.0
-    for test in dict.fromkeys(samples.test.tolist()):
-        mine = samples.test == test
-        if x:
-            x.append(np.array([begin]))
-            y.append(np.array([np.nan]))
-        x.append(begin + samples.time[mine] / 3600.0)
-        y.append(values[mine])
-        begin = float(x[-1][-1])
-    return np.concatenate(x), np.concatenate(y)

@@ -10,14 +10,13 @@ from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
-from thermocomp.papers.common import Errors
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Progress, Study, Table, silent
+from thermocomp.papers.common import rms, stacked
+from thermocomp.papers.pictures import curves, single
+from thermocomp.papers.study import Claim, Figure, Progress, Study, Table, silent
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recording.samples import Samples
 
 #: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
 FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")
@@ -133,7 +132,7 @@ def virtual(experiment: Experiment, seed: int) -> Task:
     recordings = experiment.recordings(seed)
     target = experiment.target
     name = target if isinstance(target, str) else recordings[0].displacements[target].name
-    samples = stack(recordings, [name], zeroing=FIRST_READING, starts=COLD)
+    samples = stacked(recordings, [name])
     unseen = samples.test >= len(recordings) - experiment.unseen
     split = Split("unseen tests", ~unseen, unseen)
     return Task(f"{experiment.name}, {name}", samples, Judging("whole tests left out", (split,)))
@@ -158,12 +157,12 @@ def measured(recordings: Sequence[Recording], target: str) -> Task:
     InputError
         There is no such channel, or fewer than two thermal cycles.
     """
-    samples = stack(recordings, [target], zeroing=FIRST_READING, starts=COLD)
+    samples = stacked(recordings, [target])
     name = f"{samples.test_names[0]}{' ...' if len(recordings) > 1 else ''}, {target}"
     return Task(name, samples, leave_one_cycle_out(samples))
 
 
-def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progress = silent) -> list[Row]:
+def judge(task: Task, methods: Sequence[str], progress: Progress = silent) -> list[Row]:
     """Judge methods on a task, none first.
 
     Parameters
@@ -171,8 +170,6 @@ def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progre
     task : Task
     methods : sequence of str
         ``all`` stands for all of them.
-    jobs : int
-        Processes to share the work among; -1 takes all cores.
     progress : callable
         Told the share done after each piece of work.
 
@@ -187,13 +184,11 @@ def judge(task: Task, methods: Sequence[str], *, jobs: int = 1, progress: Progre
         done += 1
         progress(done / pieces, f"{task.name}: {what}")
 
-    found = compare(task.samples, methods, task.judging, limits=None, jobs=jobs, progress=tell)
-    rows = []
+    found = compare(task.samples, methods, task.judging, limits=None, progress=tell)
+    rows = [_none(task, found.overall()[0])]
     for overall in found.overall():
-        blocks = [a for a in found.assessments if a.model == overall.model and a.frozen is not None]
-        rows.append(_row(task, overall, blocks))
-    first = found.overall()[0]
-    return [_none(task, first), *rows]
+        rows.append(_row(task, overall, [a for a in found.assessments if a.model == overall.model]))
+    return rows
 
 
 def run(
@@ -204,7 +199,6 @@ def run(
     methods: Sequence[str] = FAST,
     experiments: Sequence[Experiment] = EXPERIMENTS,
     targets: Sequence[str] | None = None,
-    jobs: int = 1,
 ) -> Study:
     """Judge the methods on all experiments, and on measured recordings.
 
@@ -220,8 +214,6 @@ def run(
     experiments : sequence of Experiment
     targets : sequence of str, optional
         Displacements of the measured machine; all of them if not given.
-    jobs : int
-        Processes to share the work among; -1 takes all cores.
 
     Returns
     -------
@@ -244,9 +236,9 @@ def run(
 
     for experiment in experiments:
         tell(0.0, f"{experiment.name}: recording")
-        rows.append(judge(virtual(experiment, seed), names, jobs=jobs, progress=tell))
+        rows.append(judge(virtual(experiment, seed), names, tell))
     for task in real:
-        rows.append(judge(task, names, jobs=jobs, progress=tell))
+        rows.append(judge(task, names, tell))
     progress(1.0, "done")
     return Study(
         name="cross",
@@ -281,16 +273,16 @@ def _row(task: Task, overall: Assessment, blocks: Sequence[Assessment]) -> Row:
 
 def _none(task: Task, first: Assessment) -> Row:
     learned = np.any([s.learn for s in task.judging.splits], axis=0)
-    rms = first.none_metric("rms")
+    none = first.none_metric("rms")
     return Row(
         task=task.name,
         method=NONE,
-        fit_rms=Errors.of(task.samples.deviations[learned, 0]).rms,
-        rms=rms,
+        fit_rms=rms(task.samples.deviations[learned, 0]),
+        rms=none,
         max_abs=first.none_metric("max_abs"),
         peak_to_peak=first.none_metric("peak_to_peak"),
-        noise_rms=rms,
-        lost_rms=rms,
+        noise_rms=none,
+        lost_rms=none,
         lost="",
         sensors=0,
         fit_s=0.0,
@@ -305,7 +297,7 @@ def _fit_rms(task: Task, blocks: Sequence[Assessment]) -> float:
         if block.frozen is not None:
             learned = splits[block.block].learn & np.isfinite(task.samples.deviations[:, 0])
             residuals.append(task.samples.deviations[learned, 0] - replay(block.frozen, task.samples, learned)[0])
-    return Errors.of(np.concatenate(residuals)).rms
+    return rms(np.concatenate(residuals))
 
 
 def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
@@ -371,14 +363,13 @@ def _table(rows: Sequence[Row]) -> Table:
 
 def _figure(rows: Sequence[Sequence[Row]]) -> Figure:
     places = np.arange(1, len(rows) + 1, dtype=np.float64)
-    methods = [r.method for r in rows[0][1:]]
-    curves = [
-        Curve(m, places, np.array([mine[k + 1].rms / mine[0].rms for mine in rows]), "points")
-        for k, m in enumerate(methods)
-    ]
+    shares = {
+        first.method: np.array([mine[k].rms / mine[0].rms for mine in rows]) for k, first in enumerate(rows[0]) if k
+    }
     told = "; ".join(f"{k} {mine[0].task}" for k, mine in enumerate(rows, start=1))
-    return Figure(
+    return single(
         "cross-unseen",
         f"RMS in the unseen test as a share of that without compensation. Experiments: {told}.",
-        [Panel("", "experiment", "RMS / RMS without compensation", curves)],
+        ("experiment", "RMS / RMS without compensation"),
+        curves(places, shares, "points"),
     )

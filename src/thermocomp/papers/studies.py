@@ -6,16 +6,8 @@ from importlib import import_module
 
 from thermocomp.papers.study import Claim, Progress, Study, silent
 
-#: title by name; each name is a package beside this module, with ``redo.run(seed, progress) -> Study``
-STUDIES: dict[str, str] = {
-    "chen1996": "Chen, Yuan, Ni 1996: Thermal error modelling for real-time error compensation",
-    "wessel2004": "Wessel et al. 2004: Predicting thermal displacements in modular tool systems",
-    "hwang": "Hwang, Lee, Yang: Optimal variable selection for a thermal error model",
-    "precompensation": "Pre-compensation of thermal error by revision of the NC program",
-    "stepwise2017": "Open Mech. Eng. J. 11 (2017): Stepwise selection of temperature points by partial F",
-}
-
-
+#: each is a package beside this module, with ``redo.run(seed, progress) -> Study``
+STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")
 #: between the seeds of a study's repeated runs
 APART = 100
 
@@ -26,7 +18,7 @@ def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
     Parameters
     ----------
     name : str
-        Key of `STUDIES`.
+        One of `STUDIES`.
     seed : int
         Of weather, noise and what is drawn by lot.
     progress : callable
@@ -46,7 +38,7 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = s
     Parameters
     ----------
     name : str
-        Key of `STUDIES`.
+        One of `STUDIES`.
     seed : int
         Of the first run; the others take seeds `APART` further on: a study steps its own seeds by one.
     repeats : int

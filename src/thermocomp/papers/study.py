@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+#: how a curve is drawn
+Style = Literal["line", "dashed", "points"]
 
 #: told after each part of a study: how much of it is done (0..1), and what comes next
 Progress = Callable[[float, str], None]
@@ -60,6 +63,75 @@ class Claim:
             raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding")
 
 
+#: what a study found, and its claims are judged by
+Found = TypeVar("Found")
+
+
+class Ours(NamedTuple):
+    """Our side of a claim.
+
+    Parameters
+    ----------
+    text : str
+        Our number.
+    holds : bool or None
+        See `Claim`.
+    otherwise : str
+        Why it does not hold: told only if it does not.
+    note : str
+        What limits it: told in any case, before that.
+    """
+
+    text: str
+    holds: bool | None = None
+    otherwise: str = ""
+    note: str = ""
+
+
+class Claims(Generic[Found]):
+    """The claims of a study, in the order in which they are told: each with the function that makes our side of it."""
+
+    def __init__(self) -> None:
+        self._judges: list[Callable[[Found], Sequence[Claim]]] = []
+
+    def add(
+        self, ids: str, text: str, paper: str = ""
+    ) -> Callable[[Callable[[Found], Ours | str]], Callable[[Found], Claim]]:
+        """Add a claim, judged by the function that is decorated.
+
+        Parameters
+        ----------
+        ids, text, paper : str
+            See `Claim`; several ids with blanks between them.
+
+        Returns
+        -------
+        callable
+            Takes a function of what was found; it returns our side, or its text alone where nothing could be false.
+        """
+
+        def register(ours: Callable[[Found], Ours | str]) -> Callable[[Found], Claim]:
+            def judge(found: Found) -> Claim:
+                told = ours(found)
+                mine = Ours(told) if isinstance(told, str) else told
+                holds = None if mine.holds is None else bool(mine.holds)
+                finding = (mine.note, mine.otherwise if holds is False else "")
+                return Claim(tuple(ids.split()), text, paper, mine.text, holds, " ".join(filter(None, finding)))
+
+            self._judges.append(lambda found: (judge(found),))
+            return judge
+
+        return register
+
+    def include(self, others: "Claims[Any]", part: Callable[[Found], Any]) -> None:
+        """Go on with all claims about a part of what was found."""
+        self._judges.append(lambda found: others(part(found)))
+
+    def __call__(self, found: Found) -> tuple[Claim, ...]:
+        """Return all claims, judged by what was found."""
+        return tuple(claim for judge in self._judges for claim in judge(found))
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """One curve of a panel.
@@ -76,7 +148,7 @@ class Curve:
     label: str
     x: FloatArray
     y: FloatArray
-    style: Literal["line", "dashed", "points"] = "line"
+    style: Style = "line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,13 +206,29 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """What one part of a study tells.
+
+    Parameters
+    ----------
+    claims, tables, figures, numbers
+        See `Study`.
+    """
+
+    claims: Sequence[Claim]
+    tables: Sequence[Table]
+    figures: Sequence[Figure]
+    numbers: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
 class Study:
     """A paper's study, run.
 
     Parameters
     ----------
     name : str
-        Key of `thermocomp.papers.studies.STUDIES`.
+        One of `thermocomp.papers.studies.STUDIES`.
     title : str
         Of the paper, with authors and year.
     claims : tuple of Claim
@@ -156,3 +244,15 @@ class Study:
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
     numbers: dict[str, float]
+
+    @classmethod
+    def of(cls, name: str, title: str, *parts: Part) -> "Study":
+        """Return the study that these parts make, one after the other."""
+        return cls(
+            name,
+            title,
+            tuple(c for p in parts for c in p.claims),
+            tuple(t for p in parts for t in p.tables),
+            tuple(f for p in parts for f in p.figures),
+            {key: value for p in parts for key, value in p.numbers.items()},
+        )

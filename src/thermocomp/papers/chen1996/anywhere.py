@@ -4,21 +4,21 @@ The synthesis itself is in the paper's ref. 6; here it is that of `thermocomp.vo
 by `thermocomp.simulation.volume`, which knows the machine and nothing of that synthesis.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit
 from thermocomp.papers.chen1996.setup import TENFOLD
 from thermocomp.papers.chen1996.volume import Learned
-from thermocomp.papers.common import Errors, judged, shown
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.papers.common import Errors, rms
+from thermocomp.papers.pictures import single
+from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
 from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.experiments import SimulatedTest, simulate
@@ -28,8 +28,6 @@ from thermocomp.simulation.volume import VolumetricTruth
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import straight_lines
-
-FloatArray = NDArray[np.float64]
 
 #: points in the work volume, each in a thermal state of its own (C-35)
 POINTS = 1000
@@ -75,18 +73,32 @@ class Volume:
 
     def gain(self, what: str = WITH) -> float:
         """Return how many times smaller the error is, by its RMS."""
-        return Errors.of(self.sizes[WITHOUT]).rms / Errors.of(self.sizes[what]).rms
+        return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
-class _Part(NamedTuple):
-    """What one test tells; see `Volume`."""
+class _Points(NamedTuple):
+    """Random points of the volume in random rows of a test: the machine there and then, and what a model tells of it.
 
+    Parameters
+    ----------
+    now, start : ndarray of shape (n, n_observables)
+        The machine at the instant, and when the test began.
+    points, tools : ndarray of shape (n, 3)
+        [mm]
+    told : ndarray of shape (n, 32)
+        Predicted components [um, urad].
+    full, lines, begin : ndarray of shape (n, 3)
+        Corrections: by all components, by one straight line per axis, and by all components when the test began [um].
+    """
+
+    now: FloatArray
+    start: FloatArray
     points: FloatArray
     tools: FloatArray
-    errors: dict[str, FloatArray]
-    missed: FloatArray  #: true minus predicted components, (n, 32)
-    causes: dict[str, FloatArray]
-    closure: float
+    told: FloatArray
+    full: FloatArray
+    lines: FloatArray
+    begin: FloatArray
 
 
 def judge(learned: Learned, seed: int) -> Volume:
@@ -105,22 +117,37 @@ def judge(learned: Learned, seed: int) -> Volume:
     rng = np.random.default_rng(seed)
     tests = list(simulate(virtual.find("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
-    parts = [_judge(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
-    errors = {k: np.vstack([p.errors[k] for p in parts]) for k in parts[0].errors}
-    causes = {k: np.vstack([p.causes[k] for p in parts]) for k in parts[0].causes}
-    missed, points, tools = (np.vstack([getattr(p, name) for p in parts]) for name in ("missed", "points", "tools"))
-    kinematics = Kinematics(learned.machine)
-    by_component = {}
-    for c in COMPONENTS:
-        alone = np.zeros(missed.shape)
-        alone[:, INDEX[c.code]] = missed[:, INDEX[c.code]]
-        moved = [kinematics.synthesize(*each)[0] for each in zip(alone, points, tools, strict=True)]
-        by_component[c.code] = Errors.of(np.linalg.norm(moved, axis=1)).rms
-    return Volume(learned, errors, causes, by_component, max(p.closure for p in parts))
+    parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
+    p = _Points(*map(np.vstack, zip(*parts, strict=True)))
+    truth, kinematics = VolumetricTruth(MachiningCentre().observables), Kinematics(learned.machine)
+
+    def effect(values: FloatArray, codes: Collection[str] = INDEX) -> FloatArray:
+        """Return what the errors of some components do to the tool points [um]."""
+        alone = np.zeros_like(values)
+        columns = [INDEX[code] for code in codes]
+        alone[:, columns] = values[:, columns]
+        return np.vstack([kinematics.synthesize(*each)[0] for each in zip(alone, p.points, p.tools, strict=True)])
+
+    # the zero was set at the test position with this tool, when the test began
+    zero = truth.error(p.start, np.tile(MIDDLE, (POINTS, 1)), p.tools)
+    errors = {
+        name: truth.error(p.now, p.points + 1e-3 * added, p.tools) - zero + added
+        for name, added in ((WITHOUT, np.zeros((POINTS, 3))), (LINES, p.lines), (WITH, p.full))
+    }
+    true = as_measured(truth, p.now, p.start, p.points)
+    missed = true - p.told
+    drifts = [c.code for c in COMPONENTS if c.group == "spindle"]
+    causes = {
+        SPINDLE: effect(missed, drifts),
+        AXES_SHARE: effect(missed, INDEX.keys() - drifts),
+        START: truth.error(p.start, p.points + 1e-3 * p.begin, p.tools) - zero + p.begin,
+    }
+    by_component = {c.code: rms(np.linalg.norm(effect(missed, [c.code]), axis=1)) for c in COMPONENTS}
+    return Volume(learned, errors, causes, by_component, float(np.abs(effect(true) - errors[WITHOUT]).max()))
 
 
-def _judge(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Part:
-    model, kinematics = VolumetricModel(learned.machine), Kinematics(learned.machine)
+def _points(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
+    model = VolumetricModel(learned.machine)
     recording = virtual.recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
     rows = rng.integers(0, len(recording), n)
@@ -128,35 +155,14 @@ def _judge(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generat
     tools = np.stack([np.zeros(n), np.zeros(n), -rng.uniform(*TOOLS, n)], axis=-1)
     assert test.observables is not None
     now, start = test.observables[rows], np.tile(test.observables[0], (n, 1))
-
-    full, lines, told = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(COMPONENTS)))
-    for k, row in enumerate(rows.tolist()):
-        field = states[row]
-        full[k] = field.correction(points[k], tools[k])
-        told[k] = field.components(points[k])
-        straight = straight_lines(field, MIDDLE, tools[k], grid=2).lines
-        lines[k] = [line.correction.at(p) for line, p in zip(straight, points[k].tolist(), strict=True)]
-    truth = VolumetricTruth(MachiningCentre().observables)
-    # the zero was set at the test position with this tool, when the test began
-    zero = truth.error(start, np.tile(MIDDLE, (n, 1)), tools)
-    errors = {
-        name: truth.error(now, points + 1e-3 * added, tools) - zero + added
-        for name, added in ((WITHOUT, np.zeros((n, 3))), (LINES, lines), (WITH, full))
-    }
-    begin = np.stack([states[0].correction(p, t) for p, t in zip(points, tools, strict=True)])
-    at_start = truth.error(start, points + 1e-3 * begin, tools) - zero + begin
-    true = as_measured(truth, now, start, points)
-    missed = true - told
-    spindle = np.zeros_like(missed)
-    drifts = [INDEX[c.code] for c in COMPONENTS if c.group == "spindle"]
-    spindle[:, drifts] = missed[:, drifts]
-
-    def effect(values: FloatArray) -> FloatArray:
-        return np.vstack([kinematics.synthesize(*each)[0] for each in zip(values, points, tools, strict=True)])
-
-    causes = {SPINDLE: effect(spindle), AXES_SHARE: effect(missed - spindle), START: at_start}
-    closure = float(np.abs(effect(true) - errors[WITHOUT]).max())
-    return _Part(points, tools, errors, missed, causes, closure)
+    told, full, lines, begin = [], [], [], []
+    for row, point, tool in zip(rows.tolist(), points, tools, strict=True):
+        straight = straight_lines(states[row], MIDDLE, tool, grid=2).lines
+        told.append(states[row].components(point))
+        full.append(states[row].correction(point, tool))
+        lines.append([line.correction.at(p) for line, p in zip(straight, point.tolist(), strict=True)])
+        begin.append(states[0].correction(point, tool))
+    return _Points(now, start, points, tools, *map(np.array, (told, full, lines, begin)))
 
 
 def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, points: FloatArray) -> FloatArray:
@@ -202,72 +208,74 @@ def as_measured(truth: VolumetricTruth, now: FloatArray, start: FloatArray, poin
 # -- claims ----------------------------------------------------------------------------------------------------------
 
 
-def claims(found: Volume) -> list[Claim]:
-    """Judge what the paper says about the work volume, by criteria that were fixed beforehand."""
+claims = Claims[Volume]()
+
+
+@claims.add(
+    "C-01 C-08",
+    "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
+    f"first order; the true error, composed exactly, is met within {CLOSED} um)",
+)
+def _closes(found: Volume) -> Ours:
+    return Ours(f"{found.closure:.3f} um at most", found.closure <= CLOSED, "angles are too large for first order")
+
+
+@claims.add(
+    "C-05",
+    "In most cases first order describes the thermal part of a position-dependent component well enough",
+    "m = 1",
+)
+def _first_order(found: Volume) -> Ours:
     fits = found.learned.fits
-    straight = [code for code, fit in fits.items() if fit.enough == 1]
     more = [f"{code} (m = {fit.enough})" for code, fit in fits.items() if fit.enough > 1]
-    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
-    causes = {name: Errors.of(np.linalg.norm(e, axis=1)).rms for name, e in found.causes.items()}
-    ratio = found.sizes[WITHOUT] / found.sizes[WITH]
-    median, share = float(np.median(ratio)), float(np.mean(ratio >= TENFOLD))
-    limits = (
-        f"what is left is the {SPINDLE} ({causes[SPINDLE]:.2f} um) and the {AXES_SHARE} ({causes[AXES_SHARE]:.2f} um); "
-        f"{causes[START]:.2f} um are there already at the {START}"
+    straight = sum(fit.enough == 1 for fit in fits.values())
+    return Ours(
+        f"{straight} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
+        2 * straight > len(fits),
+        "the bent parts of bed and column make parabolas",
     )
-    flat, full = (_off(f) for f in (found.learned.flat, fits["EYX"]))
-    return [
-        judged(
-            ("C-01", "C-08"),
-            "The error anywhere is synthesised from components of the machine's elements (here from the true ones, to "
-            f"first order; the true error, composed exactly, is met within {CLOSED} um)",
-            "",
-            f"{found.closure:.3f} um at most",
-            found.closure <= CLOSED,
-            "angles are too large for first order",
-        ),
-        judged(
-            ("C-05",),
-            "In most cases first order describes the thermal part of a position-dependent component well enough",
-            "m = 1",
-            f"{len(straight)} of {len(fits)} components" + (f"; all but {', '.join(more)}" if more else ""),
-            2 * len(straight) > len(fits),
-            "the bent parts of bed and column make parabolas",
-        ),
-        judged(
-            ("C-06",),
-            "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
-            "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
-            "",
-            f"{flat:.2f} -> {full:.2f} um",
-            full < flat,
-            "the dependence is smaller than the noise",
-        ),
-        judged(
-            ("C-35",),
-            f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
-            "points, tools and thermal states of tests that were not learned from (RMS)",
-            "ten times",
-            f"{Errors.of(found.sizes[WITHOUT]).rms:.1f} -> {Errors.of(found.sizes[WITH]).rms:.2f} um, "
-            f"{found.gain():.1f} times, at the median point {median:.0f} times, at {share:.0%} ten times or more; "
-            f"{limits}; by component: {told}",
-            found.gain() >= TENFOLD,
-            "temperatures do not tell all that the screws and the spindle's shaft do",
-        ),
-        shown(
-            ("C-35",),
-            "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)",
-            "",
-            f"{Errors.of(found.sizes[LINES]).rms:.1f} um, {found.gain(LINES):.1f} times",
-        ),
-    ]
+
+
+@claims.add(
+    "C-06",
+    "The cold profile of a slide may depend on the other coordinates too (here EYX on Z: the bed gives way "
+    "under the column): with them the profile is nearer to the true one, RMS over the travels of both",
+)
+def _bed(found: Volume) -> Ours:
+    flat, full = (_off(f) for f in (found.learned.flat, found.learned.fits["EYX"]))
+    return Ours(f"{flat:.2f} -> {full:.2f} um", full < flat, "the dependence is smaller than the noise")
+
+
+@claims.add(
+    "C-35",
+    f"Compensation of all components makes the volumetric error ten times smaller, here at {POINTS} random "
+    "points, tools and thermal states of tests that were not learned from (RMS)",
+    "ten times",
+)
+def _tenfold(found: Volume) -> Ours:
+    told = ", ".join(f"{c} {e:.1f}" for c, e in found.by_component.items() if e >= 1.0)
+    spindle, axes, start = (rms(np.linalg.norm(found.causes[c], axis=1)) for c in (SPINDLE, AXES_SHARE, START))
+    ratio = found.sizes[WITHOUT] / found.sizes[WITH]
+    return Ours(
+        f"{rms(found.sizes[WITHOUT]):.1f} -> {rms(found.sizes[WITH]):.2f} um, {found.gain():.1f} times, at the median "
+        f"point {np.median(ratio):.0f} times, at {np.mean(ratio >= TENFOLD):.0%} ten times or more; what is left is "
+        f"the {SPINDLE} ({spindle:.2f} um) and the {AXES_SHARE} ({axes:.2f} um); {start:.2f} um are there already at "
+        f"the {START}; by component: {told}",
+        found.gain() >= TENFOLD,
+        "temperatures do not tell all that the screws and the spindle's shaft do",
+    )
+
+
+@claims.add("C-35", "What a controller reaches that takes one straight line per axis, K0 + tan b (P - P0) (ours)")
+def _lines(found: Volume) -> str:
+    return f"{rms(found.sizes[LINES]):.1f} um, {found.gain(LINES):.1f} times"
 
 
 def numbers(found: Volume) -> dict[str, float]:
     """Return the figures that a page can assert."""
     made = {"volume_closure_um": found.closure, "volume_gain": found.gain(), "volume_gain_lines": found.gain(LINES)}
     short = {WITHOUT: "none", LINES: "lines", WITH: "all"}
-    return made | {f"volume_{short[name]}_um": Errors.of(e).rms for name, e in found.sizes.items()}
+    return made | {f"volume_{short[name]}_um": rms(e) for name, e in found.sizes.items()}
 
 
 # -- tables and figures ----------------------------------------------------------------------------------------------
@@ -277,7 +285,7 @@ def tables(found: Volume) -> list[Table]:
     """Return the error before and after, and what each component was made of and leaves."""
     rows = []
     for name, size in found.sizes.items():
-        along = [f"{Errors.of(found.errors[name][:, k]).rms:.2f}" for k in range(3)]
+        along = [f"{rms(found.errors[name][:, k]):.2f}" for k in range(3)]
         e = Errors.of(size)
         rows.append([name, f"{e.rms:.2f}", f"{np.percentile(size, MOST):.2f}", f"{e.max_abs:.2f}", *along])
     header = ("", "RMS", f"{MOST} %", "max", "X RMS", "Y RMS", "Z RMS")
@@ -304,10 +312,10 @@ def tables(found: Volume) -> list[Table]:
 def figures(found: Volume) -> list[Figure]:
     """Return how large the error is in what share of the points."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
-    curves = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
-    panel = Panel("", "length of the error vector [um]", "points with a smaller one [%]", curves)
+    lines = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
     text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
-    return [Figure("chen1996-volume", text, [panel])]
+    axes = "length of the error vector [um]", "points with a smaller one [%]"
+    return [single("chen1996-volume", text, axes, lines)]
 
 
 def _off(fit: PositionFit) -> float:
@@ -315,4 +323,4 @@ def _off(fit: PositionFit) -> float:
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None
-    return Errors.of(fit.model.profile.at(points) - cold("EYX", points)).rms
+    return rms(fit.model.profile.at(points) - cold("EYX", points))

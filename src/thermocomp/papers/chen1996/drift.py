@@ -6,27 +6,15 @@ from functools import cached_property
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common
-from thermocomp.papers.chen1996.setup import (
-    CLOSELY,
-    COMPETITIVE,
-    DIFFERENCES,
-    DRIFTS,
-    SUBGROUPS,
-    TEMPERATURES,
-    drift_samples,
-    recordings,
-)
-from thermocomp.papers.common import judged, shown
-from thermocomp.papers.study import Claim
+from thermocomp.papers.chen1996 import setup
+from thermocomp.papers.chen1996.setup import CLOSELY, COMPETITIVE, DRIFTS, TEMPERATURES, drift_samples, recordings
+from thermocomp.papers.study import Claims, FloatArray, Ours
 from thermocomp.recording.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: printed: unscreened and screened terms (C-10, C-20), mean absolute errors after training [um] (C-31)
 CANDIDATES = {"x": 20, "y": 35, "z": 20}
@@ -103,6 +91,36 @@ class Learned:
         """Return the mean absolute errors of the nets after training, shape (n_starts,) [um]."""
         return np.array([n.mae[target] for n in self.nets])
 
+    @cached_property
+    def net(self) -> dict[str, float]:
+        """Median of these, by drift [um]."""
+        return {t: float(np.median(self.mae_net(t))) for t in DRIFTS}
+
+    @cached_property
+    def mra(self) -> dict[str, float]:
+        """Mean absolute errors of the regressions, by drift [um]."""
+        return {t: float(np.abs(e).mean()) for t, e in self.mra_residual.items()}
+
+    @property
+    def terms(self) -> dict[str, int]:
+        """Terms of the regressions."""
+        return {t: len(r.terms_) for t, r in self.regressions.items()}
+
+    @property
+    def candidates(self) -> dict[str, int]:
+        """Terms that they were chosen from."""
+        return {t: len(r.candidates_) for t, r in self.regressions.items()}
+
+    @property
+    def independent(self) -> dict[str, float]:
+        """How many independent rows their residuals count as."""
+        return {t: r.n_effective_ for t, r in self.regressions.items()}
+
+    @property
+    def ranges(self) -> dict[str, float]:
+        """From the lowest to the highest drift [um]."""
+        return {t: float(np.ptp(common.measured(self.samples, t))) for t in DRIFTS}
+
 
 def learn(seed: int, told: Callable[[float], None]) -> Learned:
     """Run the five tests and fit what the paper fits.
@@ -120,7 +138,9 @@ def learn(seed: int, told: Callable[[float], None]) -> Learned:
     """
     samples = drift_samples(recordings("chen1996", seed))
     heat = samples.only(TEMPERATURES)
-    regressions = {t: SecondOrderRegression(differences=DIFFERENCES, subset=group) for t, group in SUBGROUPS.items()}
+    regressions = {
+        t: SecondOrderRegression(differences=setup.DIFFERENCES, subset=group) for t, group in setup.SUBGROUPS.items()
+    }
     models = {t: common.fitted(r, heat, [t])[t] for t, r in regressions.items()}
     wide = {t: common.fitted(SecondOrderRegression(), heat, [t])[t] for t in DRIFTS}
     kinds: dict[str, tuple[SigmoidNet, int]] = {"": (SigmoidNet(hidden=HIDDEN), STARTS)}
@@ -147,140 +167,148 @@ def _train(net: SigmoidNet, heat: Samples) -> Trained:
 
 # -- claims --------------------------------------------------------------------------------------------------------
 
-
-def claims(found: Learned) -> list[Claim]:
-    """Judge what the paper says about the fits, by criteria that were fixed beforehand."""
-    return [*_regression_claims(found), *_net_claims(found)]
+claims = Claims[Learned]()
 
 
-def _regression_claims(found: Learned) -> list[Claim]:
-    samples, regressions = found.samples, found.regressions
-    candidates = {t: len(r.candidates_) for t, r in regressions.items()}
-    terms = {t: len(r.terms_) for t, r in regressions.items()}
-    removals = {t: sum(s.action == "remove" for s in r.log_) for t, r in regressions.items()}
-    r2 = {t: r.r_squared_ for t, r in regressions.items()}
-    independent = {t: r.n_effective_ for t, r in regressions.items()}
-    n_tests = len(samples.test_names)
-    weakest, *others = sorted(screening(found).items(), key=lambda item: max(item[1]))
+def _listed(values: Mapping[str, float], form: str = "") -> str:
+    return " / ".join(format(v, form) for v in values.values())
+
+
+@claims.add("C-14", "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down", "810")
+def _sets(found: Learned) -> str:
+    return f"{len(found.samples)} of {len(found.samples.test_names)} tests"
+
+
+@claims.add("C-11", "The nine temperatures have strong correlations with the drifts")
+def _correlated(found: Learned) -> str:
+    weakest, *_, strongest = sorted(((max(r), t) for t, r in screening(found).items()), key=lambda best: best[0])
+    return f"|r| with the drift it goes with best: {weakest[0]:.2f} ({weakest[1]}) to {strongest[0]:.2f}"
+
+
+@claims.add(
+    "C-09 C-10 C-12 C-13",
+    "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
+    _listed(CANDIDATES),
+)
+def _coefficients(found: Learned) -> str:
+    return _listed(found.candidates)
+
+
+@claims.add(
+    "C-15 C-20",
+    "Stepwise regression reduces the coefficients in every direction to half or fewer",
+    f"{_listed(TERMS)} are left",
+)
+def _halved(found: Learned) -> Ours:
+    many = [t for t in DRIFTS if found.terms[t] > found.candidates[t] / 2]
+    return Ours(
+        f"{_listed(found.terms)} are left",
+        not many,
+        f"more than half stay in {' and '.join(many)}: significances take the {len(found.samples)} rows as "
+        f"independent, but they count as {_listed(found.independent, '.0f')}",
+    )
+
+
+@claims.add("C-16 C-17", "Terms that have entered are removed again later", f"{REMOVALS} times in y")
+def _removed(found: Learned) -> Ours:
+    removals = {t: sum(s.action == "remove" for s in r.log_) for t, r in found.regressions.items()}
+    return Ours(
+        f"{_listed(removals)} times in x, y, z",
+        any(removals.values()),
+        "no term that entered lost its significance to later ones",
+    )
+
+
+@claims.add(
+    "C-19 C-36",
+    f"The regressions fit the drifts closely (R2 >= {CLOSELY}, without constant, about zero: E-C10)",
+    f"R2 {R2_X} in x",
+)
+def _closely(found: Learned) -> Ours:
+    r2 = {t: r.r_squared_ for t, r in found.regressions.items()}
     loose = [t for t in DRIFTS if round(r2[t], 3) < CLOSELY]
-    many = [t for t in DRIFTS if terms[t] > candidates[t] / 2]
-    return [
-        shown(
-            ("C-14",),
-            "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down",
-            "810",
-            f"{len(samples)} of {n_tests} tests",
-        ),
-        shown(
-            ("C-11",),
-            "The nine temperatures have strong correlations with the drifts",
-            "",
-            f"|r| with the drift it goes with best: {max(weakest[1]):.2f} ({weakest[0]}) to {max(others[-1][1]):.2f}",
-        ),
-        shown(
-            ("C-09", "C-10", "C-12", "C-13"),
-            "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
-            _listed(CANDIDATES),
-            _listed(candidates),
-        ),
-        judged(
-            ("C-15", "C-20"),
-            "Stepwise regression reduces the coefficients in every direction to half or fewer",
-            f"{_listed(TERMS)} are left",
-            f"{_listed(terms)} are left",
-            not many,
-            f"more than half stay in {_named(many)}: significances take the {len(samples)} rows as independent, but "
-            f"they count as {_listed(independent, '.0f')}",
-        ),
-        judged(
-            ("C-16", "C-17"),
-            "Terms that have entered are removed again later",
-            f"{REMOVALS} times in y",
-            f"{_listed(removals)} times in x, y, z",
-            any(removals.values()),
-            "no term that entered lost its significance to later ones",
-        ),
-        judged(
-            ("C-19", "C-36"),
-            f"The regressions fit the drifts closely (R2 >= {CLOSELY}, without constant, about zero: E-C10)",
-            f"R2 {R2_X} in x",
-            _listed(r2, ".3f"),
-            not loose,
-            f"these temperatures do not explain {_named(loose)} that far: standard error of estimate "
-            f"{_listed({t: regressions[t].standard_error_ for t in DRIFTS}, '.2f')} um in x, y, z "
-            f"beside drifts of {_listed(_ranges(samples), '.0f')} um",
-        ),
-        shown(
-            ("C-18", "C-19"),
-            "Standard error of estimate in x",
-            f"{SEE_X:.1f} um",
-            f"{regressions['x'].standard_error_:.2f} um; the drift in x ranges over {_ranges(samples)['x']:.0f} um",
-        ),
-        shown(
-            ("E-C12",),
-            "The rows of a drift are no independent observations: of 810, the residuals count as (ours)",
-            "",
-            f"{_listed(independent, '.0f')} in x, y, z",
-        ),
-    ]
+    return Ours(
+        _listed(r2, ".3f"),
+        not loose,
+        f"these temperatures do not explain {' and '.join(loose)} that far: standard error of estimate "
+        f"{_listed({t: r.standard_error_ for t, r in found.regressions.items()}, '.2f')} um in x, y, z "
+        f"beside drifts of {_listed(found.ranges, '.0f')} um",
+    )
 
 
-def _net_claims(found: Learned) -> list[Claim]:
-    regressions, mra = found.regressions, {t: float(np.abs(e).mean()) for t, e in found.mra_residual.items()}
-    wide = {t: float(np.abs(common.residual(m, found.samples)).mean()) for t, m in found.wide.items()}
-    net = {t: float(np.median(found.mae_net(t))) for t in DRIFTS}
-    apart = [t for t in DRIFTS if not 1 / COMPETITIVE <= net[t] / mra[t] <= COMPETITIVE]
+@claims.add("C-18 C-19", "Standard error of estimate in x", f"{SEE_X:.1f} um")
+def _standard_error(found: Learned) -> str:
+    return f"{found.regressions['x'].standard_error_:.2f} um; the drift in x ranges over {found.ranges['x']:.0f} um"
+
+
+@claims.add("E-C12", "The rows of a drift are no independent observations: of 810, the residuals count as (ours)")
+def _independent(found: Learned) -> str:
+    return f"{_listed(found.independent, '.0f')} in x, y, z"
+
+
+@claims.add(
+    "C-25 C-26",
+    "More than 20 hidden nodes do not improve the net (mean error after training, beyond what the start of the "
+    "training makes)",
+    "9-20-3",
+)
+def _nodes(found: Learned) -> Ours:
     at_20 = np.array([n.mean for n in found.nets])
+    mean, spread = at_20.mean(), at_20.std(ddof=1)
     above = {h: np.mean([n.mean for n in found.others[f"9-{h}-3"]]) for h in SWEEP if h > HIDDEN}
-    better = [f"{h}" for h, error in above.items() if error < at_20.mean() - at_20.std(ddof=1)]
-    return [
-        judged(
-            ("C-25", "C-26"),
-            "More than 20 hidden nodes do not improve the net (mean error after training, beyond what the start of the "
-            "training makes)",
-            "9-20-3",
-            f"{at_20.mean():.2f} +- {at_20.std(ddof=1):.2f} um with 20, "
-            + ", ".join(f"{e:.2f} with {h}" for h, e in above.items()),
-            not better,
-            f"{_named(better)} nodes learn the 810 rows better; whether that is worth anything only new tests tell",
-        ),
-        _rejected(
-            found, "C-28", "Scaling each channel by its own range is better than a common factor", "common scaling"
-        ),
-        _rejected(found, "C-30", "Pattern update ends with smaller errors than batch update", "batch update"),
-        judged(
-            ("C-29", "C-31"),
-            f"Mean absolute errors of net and regression are very close (within a factor of {COMPETITIVE:g} of each "
-            "other in every direction)",
-            f"net {_listed(MAE_NET, '.1f')}, regression {_listed(MAE_MRA, '.1f')} um",
-            f"net {_listed(net, '.2f')}, regression {_listed(mra, '.2f')} um",
-            not apart,
-            f"in {_named(apart)} the net has {_listed({t: net[t] / mra[t] for t in apart}, '.2f')} of the regression's "
-            f"error. Against {_listed({t: len(r.terms_) for t, r in regressions.items()})} terms it has "
-            f"{found.typical.net.n_parameters_} weights and thresholds, and all nine temperatures: a regression on "
-            f"these gets {_listed(wide, '.2f')} um in x, y, z. What is learned by heart of it, the new tests tell",
-        ),
-        shown(
-            ("C-31",),
-            "A net depends on its start (ours): smallest and largest mean absolute error of "
-            f"{len(found.nets)} trainings",
-            "",
-            "; ".join(f"{t} {found.mae_net(t).min():.2f}-{found.mae_net(t).max():.2f}" for t in DRIFTS) + " um",
-        ),
-    ]
+    better = " and ".join(f"{h}" for h, error in above.items() if error < mean - spread)
+    return Ours(
+        f"{mean:.2f} +- {spread:.2f} um with 20, {', '.join(f'{e:.2f} with {h}' for h, e in above.items())}",
+        not better,
+        f"{better} nodes learn the 810 rows better; whether that is worth anything only new tests tell",
+    )
 
 
-def _rejected(found: Learned, identifier: str, text: str, kind: str) -> Claim:
+def _rejected(found: Learned, kind: str) -> Ours:
     """Judge what the paper rejected: its mean error after training must be above that of the chosen net."""
     chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
-    return judged(
-        (identifier,),
-        text,
-        "",
+    return Ours(
         f"{chosen:.2f} um; {kind} {other:.2f} um",
         chosen < other,
         f"after the same {found.typical.net.n_epochs} epochs {kind} ends with {other:.2f} um, not above {chosen:.2f}",
     )
+
+
+@claims.add("C-28", "Scaling each channel by its own range is better than a common factor")
+def _scaling(found: Learned) -> Ours:
+    return _rejected(found, "common scaling")
+
+
+@claims.add("C-30", "Pattern update ends with smaller errors than batch update")
+def _update(found: Learned) -> Ours:
+    return _rejected(found, "batch update")
+
+
+@claims.add(
+    "C-29 C-31",
+    f"Mean absolute errors of net and regression are very close (within a factor of {COMPETITIVE:g} of each "
+    "other in every direction)",
+    f"net {_listed(MAE_NET, '.1f')}, regression {_listed(MAE_MRA, '.1f')} um",
+)
+def _close(found: Learned) -> Ours:
+    wide = {t: float(np.abs(common.residual(m, found.samples)).mean()) for t, m in found.wide.items()}
+    ratios = {t: found.net[t] / found.mra[t] for t in DRIFTS}
+    apart = {t: r for t, r in ratios.items() if not 1 / COMPETITIVE <= r <= COMPETITIVE}
+    return Ours(
+        f"net {_listed(found.net, '.2f')}, regression {_listed(found.mra, '.2f')} um",
+        not apart,
+        f"in {' and '.join(apart)} the net has {_listed(apart, '.2f')} of the regression's "
+        f"error. Against {_listed(found.terms)} terms it has "
+        f"{found.typical.net.n_parameters_} weights and thresholds, and all nine temperatures: a regression on "
+        f"these gets {_listed(wide, '.2f')} um in x, y, z. What is learned by heart of it, the new tests tell",
+    )
+
+
+@claims.add(
+    "C-31", f"A net depends on its start (ours): smallest and largest mean absolute error of {STARTS} trainings"
+)
+def _starts(found: Learned) -> str:
+    return "; ".join(f"{t} {found.mae_net(t).min():.2f}-{found.mae_net(t).max():.2f}" for t in DRIFTS) + " um"
 
 
 def screening(found: Learned) -> dict[str, tuple[float, ...]]:
@@ -292,28 +320,17 @@ def screening(found: Learned) -> dict[str, tuple[float, ...]]:
     }
 
 
-def _ranges(samples: Samples) -> dict[str, float]:
-    return {t: float(np.ptp(common.measured(samples, t))) for t in DRIFTS}
-
-
-def _listed(values: Mapping[str, float], form: str = "") -> str:
-    return " / ".join(format(v, form) for v in values.values())
-
-
-def _named(names: Sequence[str]) -> str:
-    return " and ".join(names)
-
-
 def numbers(found: Learned) -> dict[str, float]:
     """Return the figures that a page can assert; of the nets the median."""
-    made: dict[str, float] = {}
+    made = {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)}
     for t, r in found.regressions.items():
-        made |= {f"candidates_{t}": float(len(r.candidates_)), f"terms_{t}": float(len(r.terms_))}
         made |= {
+            f"candidates_{t}": float(found.candidates[t]),
+            f"terms_{t}": float(found.terms[t]),
             f"r2_mra_{t}": r.r_squared_,
             f"see_mra_{t}_um": r.standard_error_,
             f"n_effective_mra_{t}": r.n_effective_,
+            f"mae_mra_{t}_um": found.mra[t],
+            f"mae_net_{t}_um": found.net[t],
         }
-        made[f"mae_mra_{t}_um"] = float(np.abs(found.mra_residual[t]).mean())
-        made[f"mae_net_{t}_um"] = float(np.median(found.mae_net(t)))
-    return {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)} | made
+    return made

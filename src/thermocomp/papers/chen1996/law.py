@@ -11,29 +11,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position
 from thermocomp.models.second_order import SecondOrderRegression
-from thermocomp.papers.chen1996.setup import (
-    DIFFERENCES,
-    EQ6,
-    EQ8,
-    SLOPE_VARIABLES,
-    TEMPERATURES,
-    recordings,
-    with_differences,
-)
-from thermocomp.papers.common import Errors, judged, shown
-from thermocomp.papers.study import Claim, Table
+from thermocomp.papers.chen1996 import setup
+from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
+from thermocomp.papers.common import rms
+from thermocomp.papers.study import Claims, FloatArray, Ours, Table
 from thermocomp.recording.cycles import whole as whole_test
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 #: noise of one run of the laser at a position [um], and of one reading of a temperature [degC]
 LASER, SENSOR = 0.3, 0.05
@@ -77,7 +67,7 @@ class Design:
     @property
     def method(self) -> SecondOrderRegression:
         """Chen's regression."""
-        return SecondOrderRegression(differences=DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
+        return SecondOrderRegression(differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
 
     def reference(self, n_states: int) -> list[int]:
         """Return the states of a test that are counted from the mean of."""
@@ -307,7 +297,7 @@ def seek(seed: int) -> Law:
         net,
         r2_about_zero(k1, net.predict(change)),
         float(np.abs(ends[1] - ends[0]).max()),
-        {name: Errors.of(left).rms for name, left in missed.items()},
+        {name: rms(left) for name, left in missed.items()},
     )
 
 
@@ -319,46 +309,49 @@ def r2_about_zero(measured: FloatArray, predicted: FloatArray) -> float:
 # -- claims --------------------------------------------------------------------------------------------------------
 
 
-def claims(found: Law) -> list[Claim]:
-    """Judge whether the law came back, by criteria that were fixed beforehand."""
+claims = Claims[Law]()
+
+
+@claims.add(
+    "C-23 C-24",
+    f"A known law comes back from 51 profiles: Eq. 8, planted on temperatures of the virtual machine, its "
+    f"{len(EQ8)} terms of 20 and none that is not there, in at least {MOST:.0%} of the draws (ours)",
+    "20 -> 4 terms",
+)
+def _whole(found: Law) -> Ours:
     ours = found.recoveries[OURS]
+    return Ours(
+        f"whole in {ours.whole:.1%} of {len(ours.found)} draws, a term missing in {ours.missing:.1%}, a wrong one "
+        f"in {ours.wrong:.1%} (16 idle terms at a significance of .001 may give 1.6%)",
+        ours.whole >= MOST,
+        "51 profiles with this noise do not tell it",
+    )
+
+
+@claims.add("C-23 E-C12", "The same law, measured and counted otherwise (ours)")
+def _otherwise(found: Law) -> str:
+    return "; ".join(f"{d.name}: {r.whole:.0%}" for d, r in found.recoveries.items() if d is not OURS)
+
+
+@claims.add("C-24", "Coefficients that came back are within three standard errors of the planted ones (ours)")
+def _within(found: Law) -> Ours:
     errors = np.array([found.fit.coefficient_errors[0].get(t, np.nan) for t in EQ8])
-    off = np.abs(ours.coefficients - np.array(list(EQ8.values()))) / errors
-    within = [float(np.mean(off < k)) for k in (2, 3)]
-    return [
-        judged(
-            ("C-23", "C-24"),
-            f"A known law comes back from 51 profiles: Eq. 8, planted on temperatures of the virtual machine, its "
-            f"{len(EQ8)} terms of 20 and none that is not there, in at least {MOST:.0%} of the draws (ours)",
-            "20 -> 4 terms",
-            f"whole in {ours.whole:.1%} of {len(ours.found)} draws, a term missing in {ours.missing:.1%}, a wrong one "
-            f"in {ours.wrong:.1%} (16 idle terms at a significance of .001 may give 1.6%)",
-            ours.whole >= MOST,
-            "51 profiles with this noise do not tell it",
-        ),
-        shown(
-            ("C-23", "E-C12"),
-            "The same law, measured and counted otherwise (ours)",
-            "",
-            "; ".join(f"{d.name}: {r.whole:.0%}" for d, r in found.recoveries.items() if d is not OURS),
-        ),
-        judged(
-            ("C-24",),
-            "Coefficients that came back are within three standard errors of the planted ones (ours)",
-            "",
-            f"{within[0]:.0%} within two, {within[1]:.0%} within three",
-            within[1] >= MOST,
-            "noise of the temperatures makes coefficients too small, and their standard errors do not know it",
-        ),
-        shown(
-            ("C-27",),
-            "The 5-8-1 net learns the same profiles, but tells no law (ours)",
-            "",
-            f"R2 {found.net_r2:.4f}; T1, which is not in the law, moves its slope by up to {found.idle:.1f} um/m; in a "
-            f"test that warms all together it misses {found.elsewhere['net']:.2f} um/m (RMS) of "
-            f"{found.elsewhere['law']:.1f}, the regression {found.elsewhere['MRA']:.2f}; {found.net.caution_}",
-        ),
-    ]
+    off = np.abs(found.recoveries[OURS].coefficients - np.array(list(EQ8.values()))) / errors
+    two, three = (float(np.mean(off < k)) for k in (2, 3))
+    return Ours(
+        f"{two:.0%} within two, {three:.0%} within three",
+        three >= MOST,
+        "noise of the temperatures makes coefficients too small, and their standard errors do not know it",
+    )
+
+
+@claims.add("C-27", "The 5-8-1 net learns the same profiles, but tells no law (ours)")
+def _net(found: Law) -> str:
+    return (
+        f"R2 {found.net_r2:.4f}; T1, which is not in the law, moves its slope by up to {found.idle:.1f} um/m; in a "
+        f"test that warms all together it misses {found.elsewhere['net']:.2f} um/m (RMS) of "
+        f"{found.elsewhere['law']:.1f}, the regression {found.elsewhere['MRA']:.2f}; {found.net.caution_}"
+    )
 
 
 def numbers(found: Law) -> dict[str, float]:

@@ -1,7 +1,13 @@
 """Chen, Yuan, Ni 1996: drifts of the spindle, positioning of Y, new observations, and the whole work volume."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from thermocomp.papers.chen1996 import anywhere, drift, show, slope, unseen, volume
-from thermocomp.papers.study import Progress, Study
+from thermocomp.papers.study import Figure, Part, Progress, Study
+
+TITLE = "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Time Error Compensation"
 
 
 def run(seed: int, progress: Progress) -> Study:
@@ -26,34 +32,20 @@ def run(seed: int, progress: Progress) -> Study:
     progress(0.6, "new observations, noise, a lost sensor")
     observed = unseen.observe(learned, new)
     progress(0.65, "the whole work volume")
-    compensated = anywhere.judge(volume.learn(first_week), second_week)
-    study = Study(
+    volumes = anywhere.judge(volume.learn(first_week), second_week)
+    study = Study.of(
         "chen1996",
-        "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Time Error Compensation",
-        (
-            *drift.claims(learned),
-            *slope.claims(slopes),
-            *unseen.claims(observed),
-            *anywhere.claims(compensated),
-        ),
-        (
-            *show.tables(learned),
-            *slope.tables(slopes),
-            *unseen.tables(observed),
-            *anywhere.tables(compensated),
-        ),
-        (
-            *sorted(
-                (
-                    *show.figures(learned),
-                    *slope.figures(slopes),
-                    *unseen.figures(observed),
-                ),
-                key=lambda figure: int(figure.key.removeprefix("chen1996-fig")),
-            ),
-            *anywhere.figures(compensated),
-        ),
-        drift.numbers(learned) | slope.numbers(slopes) | unseen.numbers(observed) | anywhere.numbers(compensated),
+        TITLE,
+        Part(drift.claims(learned), show.tables(learned), show.figures(learned), drift.numbers(learned)),
+        Part(slope.claims(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
+        Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),
+        Part(anywhere.claims(volumes), anywhere.tables(volumes), anywhere.figures(volumes), anywhere.numbers(volumes)),
     )
     progress(1.0, "done")
-    return study
+    return replace(study, figures=tuple(sorted(study.figures, key=_number)))
+
+
+def _number(figure: Figure) -> float:
+    """Return the number of the paper's figure; what is not in the paper comes last."""
+    number = figure.key.removeprefix("chen1996-fig")
+    return float(number) if number.isdigit() else np.inf

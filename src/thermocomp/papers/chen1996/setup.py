@@ -5,12 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.machine import Channel
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
-from thermocomp.papers.common import derived, renamed
+from thermocomp.papers.common import derived, renamed, stacked
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recording.samples import Samples
 
 #: Table 1 (C-11): symbol -> channel of the virtual machine
 SENSORS = {
@@ -100,4 +98,4 @@ def with_differences(recording: Recording) -> Recording:
 
 def drift_samples(tests: Sequence[Recording]) -> Samples:
     """Stack tests: nine temperatures and the spindle speed, targets x, y and z."""
-    return stack(tests, tuple(DRIFTS), (*TEMPERATURES, *SPEED), zeroing=FIRST_READING, starts=COLD)
+    return stacked(tests, tuple(DRIFTS), (*TEMPERATURES, *SPEED))

@@ -1,14 +1,14 @@
 """Chen, Yuan, Ni 1996, sections 3.2 and 4.2: tables and figures of the fits to the 810 sets."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from thermocomp.models.second_order import SecondOrderRegression
-from thermocomp.papers import common
+from thermocomp.papers import common, pictures
 from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
 from thermocomp.papers.chen1996.setup import DRIFTS, SENSORS, SUBGROUPS
-from thermocomp.papers.study import Curve, Figure, Panel, Table
+from thermocomp.papers.study import Curve, Figure, Table
 
 #: Eq. 5 (C-18)
 EQ5 = {
@@ -28,39 +28,25 @@ def tables(found: Learned) -> list[Table]:
         [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
         for name, row in screening(found).items()
     ]
-    fits = [
-        [
-            t,
-            ", ".join(SUBGROUPS[t]),
-            f"{len(r.candidates_)}",
-            f"{len(r.terms_)} ({TERMS[t]})",
-            f"{r.r_squared_:.3f}" + (f" ({R2_X})" if t == "x" else ""),
-            f"{r.standard_error_:.2f}" + (f" ({SEE_X:.1f})" if t == "x" else ""),
-            f"{np.abs(found.mra_residual[t]).mean():.2f} ({MAE_MRA[t]})",
-            f"{np.median(found.mae_net(t)):.2f} ({MAE_NET[t]})",
-            f"{r.n_effective_:.0f}",
-        ]
-        for t, r in found.regressions.items()
-    ]
+    regressions = found.regressions
+    fits: dict[str, Callable[[str], str]] = {
+        "": str,
+        "variables": lambda t: ", ".join(SUBGROUPS[t]),
+        "terms": lambda t: f"{found.candidates[t]}",
+        "left (paper)": lambda t: f"{found.terms[t]} ({TERMS[t]})",
+        "R2": lambda t: f"{regressions[t].r_squared_:.3f}" + (f" ({R2_X})" if t == "x" else ""),
+        "SEE [um]": lambda t: f"{regressions[t].standard_error_:.2f}" + (f" ({SEE_X:.1f})" if t == "x" else ""),
+        "MAE [um]": lambda t: f"{found.mra[t]:.2f} ({MAE_MRA[t]})",
+        "MAE net [um]": lambda t: f"{found.net[t]:.2f} ({MAE_NET[t]})",
+        "independent rows": lambda t: f"{found.independent[t]:.0f}",
+    }
     ours = dict(zip(found.regressions["x"].terms_, found.regressions["x"].coef_, strict=True))
-    eq5 = [[name, _number(ours.get(name)), _number(EQ5.get(name))] for name in {**ours, **EQ5}]
     sweep = {**found.others, "9-20-3": found.nets}
-    counts = [["9-20-3" if kind in ("", "9-20-3") else kind, *_sweep_row(nets)] for kind, nets in sweep.items()]
-    fit_header = (
-        "",
-        "variables",
-        "terms",
-        "left (paper)",
-        "R2",
-        "SEE [um]",
-        "MAE [um]",
-        "MAE net [um]",
-        "independent rows",
-    )
+    counts = [[kind, *_sweep_row(nets)] for kind, nets in sweep.items()]
     return [
         Table("Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first),
-        Table("Table 2 and the fits, the paper's numbers in brackets", fit_header, fits),
-        Table("Drift in x: coefficients [um/degC, um/degC2] here and in Eq. 5", ("term", "here", "Eq. 5"), eq5),
+        common.table("Table 2 and the fits, the paper's numbers in brackets", DRIFTS, fits),
+        beside("Drift in x: coefficients [um/degC, um/degC2]", "Eq. 5", ours, EQ5),
         *(_log(found.regressions[t], t) for t in ("x", "y")),
         Table(
             "Nets: mean absolute error after training, mean over the starts", ("", "starts", *DRIFTS, "mean"), counts
@@ -73,8 +59,23 @@ def _sweep_row(nets: Sequence[Trained]) -> list[str]:
     return [f"{len(nets)}", *(f"{m:.2f}" for m in mae), f"{np.mean(mae):.2f}"]
 
 
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
+def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> Table:
+    """Lay out coefficients by their terms, ours beside the paper's.
+
+    Parameters
+    ----------
+    what : str
+        What the coefficients are of, and their unit.
+    equation : str
+        The paper's, such as ``Eq. 5``.
+    ours, paper : mapping of str to float
+
+    Returns
+    -------
+    Table
+    """
+    rows = [[t, *(f"{c[t]:.3f}" if t in c else "" for c in (ours, paper))] for t in {**ours, **paper}]
+    return Table(f"{what} here and in {equation}", ("term", "here", equation), rows)
 
 
 def _log(regression: SecondOrderRegression, target: str) -> Table:
@@ -88,16 +89,33 @@ def _log(regression: SecondOrderRegression, target: str) -> Table:
 
 def figures(found: Learned) -> list[Figure]:
     """Return Figs. 3 to 5 and 10 to 12: what was measured, and the fits."""
-    samples = found.samples
-    kinds = (("MRA", 3, found.models), ("net", 10, found.typical.models))
-    drawn = []
-    for kind, first, models in kinds:
+    samples, drawn = found.samples, []
+    for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
         for number, (target, model) in enumerate(models.items(), start=first):
             curves = [
-                Curve("measured", *common.end_to_end(samples, common.measured(samples, target)), "points"),
-                Curve(kind, *common.end_to_end(samples, common.predicted(model, samples))),
+                Curve("measured", *pictures.end_to_end(samples, common.measured(samples, target)), "points"),
+                Curve(kind, *pictures.end_to_end(samples, common.predicted(model, samples))),
             ]
-            panel = Panel("", "time, five tests one after the other [h]", f"{target} [um]", curves)
-            caption = f"Fig. {number}: drift in {target} over the five tests, and the fit by the {kind}."
-            drawn.append(Figure(f"chen1996-fig{number}", caption, [panel]))
+            axes = "time, five tests one after the other [h]", f"{target} [um]"
+            text = f"drift in {target} over the five tests, and the fit by the {kind}."
+            drawn.append(figure(number, text, axes, curves))
     return drawn
+
+
+def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[Curve]) -> Figure:
+    """Return a figure with one panel, like the paper's figure of that number.
+
+    Parameters
+    ----------
+    number : int
+    text : str
+        Of the caption.
+    axes : tuple of str
+        What stands at x and y.
+    curves : sequence of Curve
+
+    Returns
+    -------
+    Figure
+    """
+    return pictures.single(f"chen1996-fig{number}", f"Fig. {number}: {text}", axes, curves)

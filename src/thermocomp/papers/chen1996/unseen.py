@@ -2,23 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.numerics.leastsquares import effective_sample_size
-from thermocomp.models.training import train
 from thermocomp.papers import common
 from thermocomp.papers.chen1996.drift import Learned
 from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
-from thermocomp.papers.common import Errors, judged, shown
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.papers.chen1996.show import figure
+from thermocomp.papers.common import Errors, trained
+from thermocomp.papers.pictures import curves
+from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, Table
 from thermocomp.recording.samples import Samples
-
-FloatArray = NDArray[np.float64]
 
 #: C-33, E-C9: level of the noise [degC], and how often it is drawn
 NOISE, DRAWS = 0.4, 20
@@ -73,6 +71,21 @@ class Unseen:
         """Return the RMS that each of the nets leaves, shape (n_starts,) [um]."""
         return np.array([rms(n.models[target], samples) for n in self.learned.nets])
 
+    def left(self, target: str, samples: Samples) -> dict[str, float]:
+        """Return the RMS that each method leaves, of the nets the median [um]."""
+        net = float(np.median(self.nets(target, samples)))
+        return {m: net if m == NET else rms(models[target], samples) for m, models in self.models.items()}
+
+    @cached_property
+    def cut(self) -> Samples:
+        """The test at 1250 1/min, with the sensor of the spindle cut off."""
+        return common.cut_off(self.tests[0], "T2")
+
+    @cached_property
+    def noisy(self) -> dict[str, float]:
+        """See `noise`; uniform."""
+        return noise(self, "uniform")
+
 
 def rms(model: ErrorModel, samples: Samples) -> float:
     """Return the RMS of what a model leaves [um]."""
@@ -92,29 +105,24 @@ def observe(learned: Learned, seed: int) -> Unseen:
     -------
     Unseen
     """
-    every = np.ones(len(learned.samples), dtype=np.bool_)
-    ours = {t: train("dynamic", learned.samples, k, every).model for k, t in enumerate(DRIFTS)}
+    ours = {t: trained("dynamic", learned.samples, k) for k, t in enumerate(DRIFTS)}
     return Unseen([drift_samples([test]) for test in recordings("chen1996-new", seed)], learned, ours)
 
 
 # -- claims --------------------------------------------------------------------------------------------------------
 
 
-def claims(found: Unseen) -> list[Claim]:
-    """Judge the comparisons of section 5, by criteria that were fixed beforehand."""
-    return [
-        *(_new_observations(found, k) for k in range(len(TESTS))),
-        _memory(found),
-        *_noise(found),
-        *(_fault(found, t) for t in DRIFTS),
-        *_headline(found),
-    ]
+claims = Claims[Unseen]()
 
 
-def _new_observations(found: Unseen, test: int) -> Claim:
-    none, mra, ours = (found.errors(test, "z", m).rms for m in (NONE, MRA, DYNAMIC))
-    nets = found.nets("z", found.tests[test])
-    net, wide = float(np.median(nets)), rms(found.learned.wide["z"], found.tests[test])
+def _bad(left: float, none: float) -> bool:
+    return left > (1 - WELL) * none
+
+
+def _new_observations(found: Unseen, test: int) -> Ours:
+    samples, none = found.tests[test], found.errors(test, "z", NONE).rms
+    nets, wide = found.nets("z", samples), rms(found.learned.wide["z"], samples)
+    mra, net, ours = found.left("z", samples).values()
     equal = net <= COMPETITIVE * mra and mra <= COMPETITIVE * net
     reasons = [f"the {m} leaves {e / none:.0%} of the drift" for m, e in ((MRA, mra), (NET, net)) if _bad(e, none)]
     if not equal:
@@ -126,60 +134,125 @@ def _new_observations(found: Unseen, test: int) -> Claim:
         reasons.append(
             f"a model that also knows the speed and remembers leaves {ours:.2f} um, so what they lack is the past"
         )
-    return judged(
-        ("C-32", "C-36"),
-        f"New observations of z, {TESTS[test]}: MRA and net predict well (at least {WELL:.0%} of the RMS vanishes) and "
-        f"almost equally well (within a factor of {COMPETITIVE:g})",
-        "Fig. 14" if test == 0 else "Fig. 15",
+    return Ours(
         f"RMS {none:.1f} um; MRA {mra:.2f}, net {net:.2f} ({nets.min():.2f}-{nets.max():.2f}) um",
         equal and not _bad(mra, none) and not _bad(net, none),
         "; ".join(reasons),
     )
 
 
-def _bad(left: float, none: float) -> bool:
-    return left > (1 - WELL) * none
+for _test, _name in enumerate(TESTS):
+    claims.add(
+        "C-32 C-36",
+        f"New observations of z, {_name}: MRA and net predict well (at least {WELL:.0%} of the RMS vanishes) and "
+        f"almost equally well (within a factor of {COMPETITIVE:g})",
+        f"Fig. {14 + _test}",
+    )(partial(_new_observations, test=_test))
 
 
-def _memory(found: Unseen) -> Claim:
+@claims.add("C-32", "RMS over both new tests, without compensation -> MRA / net / a model with a memory (ours)")
+def _memory(found: Unseen) -> str:
     parts = []
     for t in DRIFTS:
-        left = [Errors.of(np.concatenate([r[t][m] for r in found.residuals])).rms for m in (NONE, *found.models)]
-        parts.append(f"{t} {left[0]:.1f} -> {' / '.join(f'{e:.2f}' for e in left[1:])}")
-    return shown(
-        ("C-32",),
-        "RMS over both new tests, without compensation -> MRA / net / a model with a memory (ours)",
-        "",
-        f"{'; '.join(parts)} um",
-    )
+        none, *left = (common.rms(np.concatenate([r[t][m] for r in found.residuals])) for m in (NONE, *found.models))
+        parts.append(f"{t} {none:.1f} -> {' / '.join(f'{e:.2f}' for e in left)}")
+    return f"{'; '.join(parts)} um"
 
 
-def _noise(found: Unseen) -> list[Claim]:
-    none = found.errors(0, "z", NONE).rms
-    clean = {MRA: found.errors(0, "z", MRA).rms, NET: float(np.median(found.nets("z", found.tests[0])))}
-    noisy, normal = (noise(found, law) for law in ("uniform", "normal"))
+def _shaken(found: Unseen, left: Mapping[str, float]) -> str:
+    listed = ", ".join(f"{name} {value:.2f}" for name, value in left.items())
+    return f"RMS {found.errors(0, 'z', NONE).rms:.1f} um; {listed} um"
+
+
+@claims.add(
+    "C-33 C-36 E-C9",
+    f"z, 1250 1/min, uniform noise of {NOISE} degC on all temperatures: both predict well (at least {WELL:.0%} of the "
+    "RMS vanishes)",
+    "Fig. 16",
+)
+def _uniform(found: Unseen) -> Ours:
+    none, noisy, clean = found.errors(0, "z", NONE).rms, found.noisy, found.left("z", found.tests[0])
     reasons = [
         f"the {m} leaves {noisy[m] / none:.0%} of the drift with noise, {clean[m] / none:.0%} without"
         for m in (MRA, NET)
         if _bad(noisy[m], none)
     ]
     steepest = float(np.abs(found.learned.regressions["z"].coef_).max())
-    reasons.append(f"noise goes through coefficients of up to {steepest:.1f} um/degC in the MRA")
-    text = f"noise of {NOISE} degC on all temperatures"
-    return [
-        judged(
-            ("C-33", "C-36", "E-C9"),
-            f"z, 1250 1/min, uniform {text}: both predict well (at least {WELL:.0%} of the RMS vanishes)",
-            "Fig. 16",
-            f"RMS {none:.1f} um; {_listed(noisy)} um (mean of {DRAWS} draws)",
-            len(reasons) == 1,
-            "; ".join(reasons),
-        ),
-        shown(("C-33", "E-C9"), f"z, 1250 1/min, normal {text} (ours)", "", f"RMS {none:.1f} um; {_listed(normal)} um"),
-    ]
+    through = f"noise goes through coefficients of up to {steepest:.1f} um/degC in the MRA"
+    return Ours(f"{_shaken(found, noisy)} (mean of {DRAWS} draws)", not reasons, "; ".join([*reasons, through]))
 
 
-def noise(found: Unseen, law: str) -> dict[str, float]:
+@claims.add("C-33 E-C9", f"z, 1250 1/min, normal noise of {NOISE} degC on all temperatures (ours)")
+def _normal(found: Unseen) -> str:
+    return _shaken(found, noise(found, "normal"))
+
+
+def _fault(found: Unseen, target: str) -> Ours:
+    regression = found.learned.models[target]
+    intact, cut = (rms(regression, s) for s in (found.tests[0], found.cut))
+    nets, nets_cut = (found.nets(target, s) for s in (found.tests[0], found.cut))
+    worse, worse_net = cut - intact, float(np.median(nets_cut - nets))
+    reason = f"the RMS of the MRA rises by {worse:.2f} um and that of the net by {worse_net:.2f}"
+    if "T2" not in regression.sensors:
+        reason = f"the stepwise selection left T2 out of the regression of {target}, so its loss cannot hurt"
+    return Ours(
+        f"RMS {found.errors(0, target, NONE).rms:.1f} um; MRA {intact:.2f} -> {cut:.2f}, "
+        f"net {np.median(nets):.2f} -> {np.median(nets_cut):.2f} ({nets_cut.min():.2f}-{nets_cut.max():.2f}), "
+        f"dynamic -> {rms(found.dynamic[target], found.cut):.2f} um",
+        worse_net < worse,
+        reason,
+    )
+
+
+for _target in DRIFTS:
+    claims.add(
+        "C-34 C-36",
+        f"{_target}, 1250 1/min, spindle temperature T2 cut off: the net degrades less than the MRA"
+        + ("" if _target == "x" else " (ours: the paper shows x)"),
+        "Fig. 17" if _target == "x" else "",
+    )(partial(_fault, target=_target))
+
+
+def _tenfold(found: Unseen, largest: Mapping[str, float]) -> Ours:
+    closest = min((MRA, NET), key=lambda m: largest[m])
+    none, best = largest[NONE], largest[closest]
+    times = none / best if best else float("inf")
+    fitted = {
+        m: max(Errors.of(common.residual(models[t], found.learned.samples)).max_abs for t in DRIFTS)
+        for m, models in found.models.items()
+        if m != DYNAMIC
+    }
+    return Ours(
+        f"{none:.1f} um; MRA {largest[MRA]:.1f}, net {largest[NET]:.1f} um: the better of them {times:.1f} times; "
+        f"dynamic (ours) {largest[DYNAMIC]:.1f} um",
+        times >= TENFOLD,
+        f"even in the rows they were fitted to, the regressions are wrong by up to {fitted[MRA]:.1f} um and the net by "
+        f"{fitted[NET]:.1f}; the largest error of the {closest} in the new tests stands "
+        f"{60 * _since_change(found, closest):.0f} min after the spindle changed its speed",
+    )
+
+
+@claims.add(
+    "C-35",
+    "The accuracy of the machine improves by a factor of ten. Here, as far as built: the largest error of the "
+    "tool point (length of x, y, z) in both new tests, at one position; the whole volume needs its kinematics",
+    "10 times",
+)
+def _tool_point(found: Unseen) -> Ours:
+    return _tenfold(found, largest_error(found))
+
+
+@claims.add(
+    "C-35",
+    "The difference in depth from the growth of the spindle shrinks by a factor of ten or more. Here: largest "
+    "peak-to-peak of z in a new test",
+    f"{DEPTH[0]:g} -> {DEPTH[1]:g} um, {DEPTH[0] / DEPTH[1]:.1f} times",
+)
+def _depth(found: Unseen) -> Ours:
+    return _tenfold(found, largest_depth(found))
+
+
+def noise(found: Unseen, law: Literal["uniform", "normal"]) -> dict[str, float]:
     """Return the RMS that each method leaves of z at 1250 1/min with noise, mean over the draws [um].
 
     Parameters
@@ -192,56 +265,8 @@ def noise(found: Unseen, law: str) -> dict[str, float]:
     dict of str to float
         Of the nets the median.
     """
-    kind: Literal["uniform", "normal"] = "uniform" if law == "uniform" else "normal"
-    noisy = [common.with_noise(found.tests[0], NOISE, kind, k) for k in range(DRAWS)]
-    left = {m: float(np.mean([rms(models["z"], s) for s in noisy])) for m, models in found.models.items() if m != NET}
-    left[NET] = float(np.mean([np.median(found.nets("z", s)) for s in noisy]))
-    return {m: left[m] for m in found.models}
-
-
-def _listed(values: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:.2f}" for name, value in values.items())
-
-
-def _fault(found: Unseen, target: str) -> Claim:
-    intact, cut = found.tests[0], common.cut_off(found.tests[0], "T2")
-    regression = found.learned.models[target]
-    mra = [rms(regression, s) for s in (intact, cut)]
-    nets = [found.nets(target, s) for s in (intact, cut)]
-    worse_mra, worse_net = mra[1] - mra[0], float(np.median(nets[1] - nets[0]))
-    reason = f"the RMS of the MRA rises by {worse_mra:.2f} um and that of the net by {worse_net:.2f}"
-    if "T2" not in regression.sensors:
-        reason = f"the stepwise selection left T2 out of the regression of {target}, so its loss cannot hurt"
-    return judged(
-        ("C-34", "C-36"),
-        f"{target}, 1250 1/min, spindle temperature T2 cut off: the net degrades less than the MRA"
-        + ("" if target == "x" else " (ours: the paper shows x)"),
-        "Fig. 17" if target == "x" else "",
-        f"RMS {found.errors(0, target, NONE).rms:.1f} um; MRA {mra[0]:.2f} -> {mra[1]:.2f}, "
-        f"net {np.median(nets[0]):.2f} -> {np.median(nets[1]):.2f} ({nets[1].min():.2f}-{nets[1].max():.2f}), "
-        f"dynamic -> {rms(found.dynamic[target], cut):.2f} um",
-        worse_net < worse_mra,
-        reason,
-    )
-
-
-def _headline(found: Unseen) -> list[Claim]:
-    return [
-        _tenfold(
-            found,
-            "The accuracy of the machine improves by a factor of ten. Here, as far as built: the largest error of the "
-            "tool point (length of x, y, z) in both new tests, at one position; the whole volume needs its kinematics",
-            "10 times",
-            largest_error(found),
-        ),
-        _tenfold(
-            found,
-            "The difference in depth from the growth of the spindle shrinks by a factor of ten or more. Here: largest "
-            "peak-to-peak of z in a new test",
-            f"{DEPTH[0]:g} -> {DEPTH[1]:g} um, {DEPTH[0] / DEPTH[1]:.1f} times",
-            largest_depth(found),
-        ),
-    ]
+    noisy = [found.left("z", common.with_noise(found.tests[0], NOISE, law, k)) for k in range(DRAWS)]
+    return {m: float(np.mean([left[m] for left in noisy])) for m in found.models}
 
 
 def largest_error(found: Unseen) -> dict[str, float]:
@@ -252,28 +277,6 @@ def largest_error(found: Unseen) -> dict[str, float]:
 def largest_depth(found: Unseen) -> dict[str, float]:
     """Return the larger peak-to-peak of z in the two tests, per method [um]."""
     return {m: max(found.errors(k, "z", m).peak_to_peak for k in range(len(TESTS))) for m in (NONE, *found.models)}
-
-
-def _tenfold(found: Unseen, text: str, paper: str, largest: Mapping[str, float]) -> Claim:
-    closest = min((MRA, NET), key=lambda m: largest[m])
-    none, best = largest[NONE], largest[closest]
-    times = none / best if best else float("inf")
-    fitted = {
-        m: max(Errors.of(common.residual(models[t], found.learned.samples)).max_abs for t in DRIFTS)
-        for m, models in found.models.items()
-        if m != DYNAMIC
-    }
-    return judged(
-        ("C-35",),
-        text,
-        paper,
-        f"{none:.1f} um; MRA {largest[MRA]:.1f}, net {largest[NET]:.1f} um: the better of them {times:.1f} times; "
-        f"dynamic (ours) {largest[DYNAMIC]:.1f} um",
-        times >= TENFOLD,
-        f"even in the rows they were fitted to, the regressions are wrong by up to {fitted[MRA]:.1f} um and the net by "
-        f"{fitted[NET]:.1f}; the largest error of the {closest} in the new tests stands "
-        f"{60 * _since_change(found, closest):.0f} min after the spindle changed its speed",
-    )
 
 
 def _since_change(found: Unseen, method: str) -> float:
@@ -296,15 +299,13 @@ def numbers(found: Unseen) -> dict[str, float]:
     """Return the figures that a page can assert: RMS, of the nets the median, and largest errors."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic"}
     made: dict[str, float] = {}
-    for k, test in enumerate(("1250", "random")):
-        for t in DRIFTS:
-            made |= {f"rms_{t}_{test}_{short[m]}_um": found.errors(k, t, m).rms for m in short if m != NET}
-            made[f"rms_{t}_{test}_net_um"] = float(np.median(found.nets(t, found.tests[k])))
-    cut = common.cut_off(found.tests[0], "T2")
     for t in DRIFTS:
-        made[f"rms_{t}_1250_cut_mra_um"] = rms(found.learned.models[t], cut)
-        made[f"rms_{t}_1250_cut_net_um"] = float(np.median(found.nets(t, cut)))
-    made |= {f"rms_z_1250_noise_{short[m]}_um": e for m, e in noise(found, "uniform").items()}
+        for k, test in enumerate(("1250", "random")):
+            left = {NONE: found.errors(k, t, NONE).rms} | found.left(t, found.tests[k])
+            made |= {f"rms_{t}_{test}_{short[m]}_um": e for m, e in left.items()}
+        cut = found.left(t, found.cut)
+        made |= {f"rms_{t}_1250_cut_{short[m]}_um": cut[m] for m in (MRA, NET)}
+    made |= {f"rms_z_1250_noise_{short[m]}_um": e for m, e in found.noisy.items()}
     made |= {f"largest_error_{short[m]}_um": e for m, e in largest_error(found).items()}
     made |= {f"largest_depth_{short[m]}_um": e for m, e in largest_depth(found).items()}
     return made
@@ -330,19 +331,16 @@ def figures(found: Unseen) -> list[Figure]:
     """Return Figs. 14 to 17."""
     constant, random = found.tests
     noisy = common.with_noise(constant, NOISE, "uniform", 0)
-    cut = common.cut_off(constant, "T2")
     return [
         _figure(found, 14, "z", constant, "drift in z at 1250 1/min, a speed that was not learned."),
         _figure(found, 15, "z", random, "drift in z at random speeds."),
         _figure(found, 16, "z", noisy, f"as Fig. 14, with uniform noise of {NOISE} degC on all temperatures."),
-        _figure(found, 17, "x", cut, "drift in x at 1250 1/min with the spindle temperature T2 cut off."),
+        _figure(found, 17, "x", found.cut, "drift in x at 1250 1/min with the spindle temperature T2 cut off."),
     ]
 
 
 def _figure(found: Unseen, number: int, target: str, samples: Samples, text: str) -> Figure:
-    hours = samples.time / 3600.0
-    curves = [Curve("measured", hours, common.measured(samples, target), "points")]
-    for method, models in found.models.items():
-        style: Literal["line", "dashed"] = "dashed" if method == DYNAMIC else "line"
-        curves.append(Curve(method, hours, common.predicted(models[target], samples), style))
-    return Figure(f"chen1996-fig{number}", f"Fig. {number}: {text}", [Panel("", "time [h]", f"{target} [um]", curves)])
+    drift = {"measured": common.measured(samples, target)}
+    drift |= {m: common.predicted(models[target], samples) for m, models in found.models.items()}
+    lines = curves(samples.time / 3600.0, drift, dashed=[DYNAMIC], points=["measured"])
+    return figure(number, text, ("time [h]", f"{target} [um]"), lines)

@@ -9,15 +9,12 @@ from joblib import Parallel, delayed
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.machine import Axis, Machine, Source
 from thermocomp.core.structure import Structure
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit, PositionOptions, fit_position
-from thermocomp.models.training import train
+from thermocomp.papers.common import stacked, trained
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
-from thermocomp.recording.starts import Start
 from thermocomp.recording.tilts import with_tilts
 from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL
 from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE
@@ -120,9 +117,8 @@ def _spindle(tests: Sequence[Recording], inputs: Sequence[str]) -> dict[str, Sou
     tilts = (f"A0C=y1_um:y2_um:{PROBE_DISTANCE:g}m", f"B0C=x1_um:x2_um:{PROBE_DISTANCE:g}m")
     tests, _ = with_tilts(tests, tilts)
     channels = {"X0C": "x1_um", "Y0C": "y1_um", "Z0C": "z_um", "A0C": "A0C", "B0C": "B0C"}
-    samples = stack(tests, list(channels.values()), inputs, zeroing=FIRST_READING, starts=Start())
-    seen = np.ones(len(samples), dtype=np.bool_)
-    return {code: train(METHOD, samples, k, seen).model for k, code in enumerate(channels)}
+    samples = stacked(tests, list(channels.values()), inputs)
+    return {code: trained(METHOD, samples, k) for k, code in enumerate(channels)}
 
 
 def _machine(components: Mapping[str, Source]) -> Machine:

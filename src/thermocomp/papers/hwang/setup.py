@@ -12,26 +12,19 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.assessment.sensitivity import Sensitivity, sensitivity
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import TermTable, Variable
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.numerics.leastsquares import lstsq
+from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
-from thermocomp.models.training import train
-from thermocomp.papers.common import PAPERS_SUPPORT, Errors, predicted, renamed
-from thermocomp.papers.study import Progress
+from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predicted, renamed, stacked, trained
+from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recording.samples import Samples
 from thermocomp.simulation.kits import HWANG_PLACES
-
-FloatArray = NDArray[np.float64]
 
 #: of the temperatures in `HWANG_PLACES` (H-08)
 NAMES = tuple(f"T{k}" for k in range(1, 15))
@@ -80,7 +73,7 @@ class Fit:
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return tests with the paper's names, temperatures as they are."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
-    return stack([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False, zeroing=FIRST_READING, starts=COLD)
+    return stacked([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
@@ -110,17 +103,8 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> Fit:
     X = TermTable(len(used), variables, terms).evaluate(samples.change()[:, columns])
     y = samples.deviations[:, 0]
     solved = lstsq(X, y)
-    model = Polynomial(
-        target=TARGET,
-        unit="um",
-        inputs=samples.model_inputs(columns, np.ones(len(y), dtype=np.bool_)),
-        support=PAPERS_SUPPORT,
-        provenance=None,
-        variables=variables,
-        terms=terms,
-        coefficients=tuple(solved.coefficients.tolist()),
-        intercept=solved.intercept,
-    )
+    found = solved.coefficients.tolist()
+    model = frozen(samples, columns, found, solved.intercept, variables=variables, terms=terms)
     total = float(np.sum((y - y.mean()) ** 2))
     return Fit(model, 1 - solved.rss / total, float(np.sqrt(solved.rss / (len(y) - len(terms) - 1))))
 
@@ -164,6 +148,16 @@ class Computed:
     fits: dict[str, Fit]
     shaken: dict[tuple[str, float], dict[str, Sensitivity]]
     dynamic: FloatArray
+
+    @property
+    def drift(self) -> FloatArray:
+        """Deviation of Z in the rows that were fitted to [um]."""
+        return self.fit.deviations[:, 0]
+
+    @cached_property
+    def worth(self) -> float:
+        """How many independent rows the fit of the optimal model is worth."""
+        return effective_sample_size(self.drift - self.fitted(OPTIMAL))
 
     @cached_property
     def change(self) -> FloatArray:
@@ -210,9 +204,8 @@ def compute(seed: int, progress: Progress) -> Computed:
     }
     progress(0.6, "random sensor error")
     shown = {LINEAR: fits[OPTIMAL].model, QUADRATIC: fits[JUDGED].model, PLAIN: polynomial(fit, JUDGEMENT, 1).model}
-    everything = np.ones(len(fit), dtype=np.bool_)
     shaken: dict[tuple[str, float], dict[str, Sensitivity]] = {
-        (law, size): sensitivity(shown, fit, everything, size=size, law=law, draws=DRAWS, seed=seed)
+        (law, size): sensitivity(shown, fit, every(fit), size=size, law=law, draws=DRAWS, seed=seed)
         for law in LAWS
         for size in NOISES
     }
@@ -225,26 +218,18 @@ def _grouped(samples: Samples, threshold: float) -> CorrelationGrouping:
 
 
 def _fit_of(g: CorrelationGrouping, samples: Samples) -> Fit:
-    inputs = samples.model_inputs(range(len(NAMES)), np.ones(len(samples), dtype=np.bool_))
-    return Fit(
-        g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT), float(g.r_squared_), float(g.standard_error_)
-    )
+    inputs = samples.model_inputs(range(len(NAMES)), every(samples))
+    model = g.freeze(target=TARGET, inputs=inputs, support=PAPERS_SUPPORT)
+    return Fit(model, float(g.r_squared_), float(g.standard_error_))
 
 
 def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
-    learned = stack(tests[:1], [TARGET], inputs, zeroing=FIRST_READING, starts=COLD)
-    model = train("dynamic", learned, 0, np.ones(len(learned), dtype=np.bool_)).model
-    new = stack(tests[1:], [TARGET], inputs, zeroing=FIRST_READING, starts=COLD)
-    return new.deviations[:, 0] - predicted(model, new)
+    learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
+    return new.deviations[:, 0] - predicted(trained("dynamic", learned), new)
 
 
 def named(columns: Sequence[int]) -> str:
     """Write columns as the names of their sensors."""
     return " ".join(NAMES[k] for k in columns) or "none"
-
-
-def rms(residual: FloatArray) -> float:
-    """Return the root of the mean square."""
-    return Errors.of(residual).rms

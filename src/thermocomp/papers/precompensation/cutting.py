@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.datasets.virtual import find, record
@@ -13,14 +12,12 @@ from thermocomp.models.methods import method
 from thermocomp.papers.common import fitted
 from thermocomp.papers.precompensation import program
 from thermocomp.papers.precompensation.setup import CUTS, LEAST, MILLING, NET, NONE, POSITIONS, SPEED
-from thermocomp.papers.study import Progress
+from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.simulation.climate import Climate
 from thermocomp.simulation.protocol import Experiment
 from thermocomp.simulation.segments import Feed, Stretch
-
-FloatArray = NDArray[np.float64]
 
 HOUR = 3600.0
 #: what a wrong start state is wrong by: the spindle ran for so long [s], at the speed of milling [1/min]

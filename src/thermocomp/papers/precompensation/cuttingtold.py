@@ -1,107 +1,88 @@
 """What the study tells of the cutting tests with NC programs: claims, tables, figures and numbers."""
 
-from typing import Literal
-
 import numpy as np
-from numpy.typing import NDArray
 
-from thermocomp.papers.precompensation.cutting import (
-    BEFORE,
-    BEFORE_SPEED,
-    CARRIED,
-    CASES,
-    COOLS,
-    FALSE,
-    RIGHT,
-    ROOM,
-    TRIED,
-    UNKNOWN,
-    WARMS,
-    Milled,
-    Surfaces,
-)
+from thermocomp.papers.pictures import curves
+from thermocomp.papers.precompensation import cutting
+from thermocomp.papers.precompensation.cutting import CARRIED, COOLS, FALSE, RIGHT, UNKNOWN, WARMS, Milled, Surfaces
 from thermocomp.papers.precompensation.program import EVERY, NEEDED, SAFE, TOLERANCE, WAYS
 from thermocomp.papers.precompensation.setup import LEAST, NET, NONE, PAPERS_DEPTHS, SHARE
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Panel, Style, Table
 
-FloatArray = NDArray[np.float64]
-
-
-def claims(m: Milled) -> list[Claim]:
-    """Return what holds of programs that were revised, and what becomes of them when what they take for true is not."""
-    return [_revised(m), _uneven(m), _start(m), _room(m)]
+claims = Claims[Milled]()
 
 
-def _revised(m: Milled) -> Claim:
+@claims.add(
+    "P-06 P-07",
+    "The same with whole NC programs: written, revised by the net every 10 min, read back, and milled on the "
+    f"virtual machine (criterion: {SHARE:.2f} is left)",
+    f"{PAPERS_DEPTHS[0]:g} -> {PAPERS_DEPTHS[1]:g} um",
+)
+def _revised(m: Milled) -> Ours:
     before, after = m.without(RIGHT), m.paper(RIGHT)
-    tests = len(after.depth)
     worse = int(np.sum(after.by_test > before.by_test))
     rest = "; ".join(f"{name}: {m.paper(RIGHT, name).mean:.1f} um" for name in _models(m) if name != NET)
-    return Claim(
-        ("P-06", "P-07"),
-        "The same with whole NC programs: written, revised by the net every 10 min, read back, and milled on the "
-        f"virtual machine (criterion: {SHARE:.2f} is left)",
-        f"{PAPERS_DEPTHS[0]:g} -> {PAPERS_DEPTHS[1]:g} um",
+    ranges = [f"{s.by_test.min():.1f} to {s.by_test.max():.1f}" for s in (before, after)]
+    return Ours(
         f"{before.mean:.1f} -> {after.mean:.1f} um, {_over(m)}",
         after.mean <= SHARE * before.mean,
-        f"By test {_range(before)} -> {_range(after)} um; it grows in {worse} of {tests}. With other models {rest}. "
+        note=f"By test {' -> '.join(ranges)} um; it grows in {worse} of {len(after.depth)}. With other models {rest}. "
         f"Revised as soon as the drift has moved by {TOLERANCE:g} um, it is {m.surfaces[RIGHT, NET, NEEDED].mean:.1f} "
         f"um; by the work offset, between the faces only, {m.surfaces[RIGHT, NET, SAFE].mean:.1f} um. The first program"
         f" has {m.lines} lines; in {m.turning:.1%} of the time the spindle turns as in the recorded tests.",
     )
 
 
-def _uneven(m: Milled) -> Claim:
+@claims.add("P-06", "Within one surface, from its lowest to its highest place: milled cold, and after the hour")
+def _uneven(m: Milled) -> Ours:
     def within(s: Surfaces) -> str:
         first, second = s.unevenness.mean(axis=(0, 2))
         return f"{first:.1f} and {second:.1f} um"
 
-    return Claim(
-        ("P-06",),
-        "Within one surface, from its lowest to its highest place: milled cold, and after the hour",
-        "",
+    return Ours(
         f"{within(m.without(RIGHT))}; revised every 10 min {within(m.paper(RIGHT))}, by {TOLERANCE:g} um "
         f"{within(m.surfaces[RIGHT, NET, NEEDED])}",
-        None,
-        "Depth differences do not show it: the tool warms up in either surface, by cutting, which no model of the "
+        note="Depth differences do not show it: the tool warms up in either surface, by cutting, which no model of the "
         "speed knows of.",
     )
 
 
-def _start(m: Milled) -> Claim:
-    before, unknown, carried, false = m.without(UNKNOWN), m.paper(UNKNOWN), m.paper(CARRIED), m.paper(FALSE)
-    cold = m.without(RIGHT)
-    return Claim(
-        ("E-P5",),
-        f"The start state is wrong by half an hour: the spindle had run at {BEFORE_SPEED:g} 1/min for "
-        f"{BEFORE / 60:g} min when the program began, which was revised for a cold machine; revised with the state "
-        "carried over; and a cold machine with a program revised for one that had run",
-        "assumes a cold start",
-        f"{before.mean:.1f} -> {unknown.mean:.1f} um; {before.mean:.1f} -> {carried.mean:.1f} um; "
-        f"{cold.mean:.1f} -> {false.mean:.1f} um",
-        None,
-        f"With least squares {', '.join(f'{m.paper(c, LEAST).mean:.1f}' for c in (UNKNOWN, CARRIED, FALSE))} um. "
-        f"Taken for cold, the warm machine mills {_than(unknown, before)} than with a program that nobody has revised; "
-        f"taken for warm, the cold one {_than(false, cold)}.",
+@claims.add(
+    "E-P5",
+    f"The start state is wrong by half an hour: the spindle had run at {cutting.BEFORE_SPEED:g} 1/min for "
+    f"{cutting.BEFORE / 60:g} min when the program began, which was revised for a cold machine; revised with the state "
+    "carried over; and a cold machine with a program revised for one that had run",
+    "assumes a cold start",
+)
+def _start(m: Milled) -> Ours:
+    cases = (UNKNOWN, CARRIED, FALSE)
+    before, after, least = (
+        [s.mean for s in each]
+        for each in (map(m.without, cases), map(m.paper, cases), (m.paper(c, LEAST) for c in cases))
+    )
+    unknown, _, false = ("worse" if a > b else "better" for a, b in zip(after, before, strict=True))
+    return Ours(
+        "; ".join(f"{b:.1f} -> {a:.1f} um" for b, a in zip(before, after, strict=True)),
+        note=f"With least squares {', '.join(f'{e:.1f}' for e in least)} um. "
+        f"Taken for cold, the warm machine mills {unknown} than with a program that nobody has revised; "
+        f"taken for warm, the cold one {false}.",
     )
 
 
-def _than(after: Surfaces, before: Surfaces) -> str:
-    return "worse" if after.mean > before.mean else "better"
-
-
-def _room(m: Milled) -> Claim:
+@claims.add(
+    "E-P6",
+    f"The room warms, or cools, by {cutting.ROOM:g} degC in the hour between the surfaces, and the program does not "
+    "know",
+    "a relatively stable environment",
+)
+def _room(m: Milled) -> Ours:
     cases = (WARMS, COOLS)
     alone = [np.abs(m.without(c).depth - m.without(RIGHT).depth).mean() for c in cases]
-    return Claim(
-        ("E-P6",),
-        f"The room warms, or cools, by {ROOM:g} degC in the hour between the surfaces, and the program does not know",
-        "a relatively stable environment",
+    return Ours(
         "; ".join(f"{m.without(c).mean:.1f} -> {m.paper(c).mean:.1f} um" for c in cases),
-        None,
-        f"The room alone moves the second surface by {alone[0]:.1f} um, or {alone[1]:.1f} um: nothing of it can be in "
-        f"the program. With least squares {' and '.join(f'{m.paper(c, LEAST).mean:.1f}' for c in cases)} um are left; "
-        f"in a room that stays, {m.paper(RIGHT, LEAST).mean:.1f} um, with the net {m.paper(RIGHT).mean:.1f} um.",
+        note=f"The room alone moves the second surface by {alone[0]:.1f} um, or {alone[1]:.1f} um: nothing of it can "
+        f"be in the program. With least squares {' and '.join(f'{m.paper(c, LEAST).mean:.1f}' for c in cases)} um are "
+        f"left; in a room that stays, {m.paper(RIGHT, LEAST).mean:.1f} um, with the net {m.paper(RIGHT).mean:.1f} um.",
     )
 
 
@@ -127,14 +108,25 @@ def tables(m: Milled) -> tuple[Table, ...]:
         ),
         Table(
             f"Depth difference with NC programs revised {EVERY}, {_over(m)}; in brackets the greatest [um]",
-            ("machine and room", NONE, *TRIED),
-            [[case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in TRIED)] for case in CASES],
+            ("machine and room", NONE, *cutting.TRIED),
+            [
+                [case, _told(m.without(case)), *(_told(m.paper(case, name)) for name in cutting.TRIED)]
+                for case in cutting.CASES
+            ],
         ),
     )
 
 
 def figures(m: Milled) -> tuple[Figure, ...]:
     """Return the surfaces of one test, and the depth differences of all."""
+    tests = np.arange(1.0, len(m.without(RIGHT).depth) + 1)
+    # goes on to the right, where the legend then hides nothing
+    zero = Curve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
+    ways: tuple[tuple[str, str, Style], ...] = (
+        ("", "not revised", "line"),
+        (EVERY, EVERY, "dashed"),
+        (NEEDED, NEEDED, "line"),
+    )
     return (
         Figure(
             "precompensation-surfaces",
@@ -145,11 +137,7 @@ def figures(m: Milled) -> tuple[Figure, ...]:
                     title,
                     "time [min]",
                     "actual minus drawing [um]",
-                    [
-                        _surfaces(m, "", number, "not revised"),
-                        _surfaces(m, EVERY, number, EVERY, "dashed"),
-                        _surfaces(m, NEEDED, number, NEEDED),
-                    ],
+                    [Curve(label, *_surfaces(m, way, number), style) for way, label, style in ways],
                 )
                 for number, title in ((1, "milled cold"), (2, "milled after the hour"))
             ],
@@ -159,41 +147,29 @@ def figures(m: Milled) -> tuple[Figure, ...]:
             "precompensation-programs",
             "Second surface minus first, mean over the positions, of NC programs revised every 10 min with the net "
             "(P-07); and where room (E-P6) or start state (E-P5) are not what the revision takes them for. Warm: the "
-            f"spindle had run for {BEFORE / 60:g} min before.",
+            f"spindle had run for {cutting.BEFORE / 60:g} min before.",
             [
-                Panel(
-                    title,
-                    "cutting test",
-                    "depth difference [um]",
-                    [
-                        _by_test("not revised", m.without(RIGHT)),
-                        *(_by_test(case, m.paper(case)) for case in cases),
-                        # goes on to the right, where the legend then hides nothing
-                        Curve("", np.array([1.0, 1.5 * len(m.without(RIGHT).depth)]), np.zeros(2), "dashed"),
-                    ],
-                )
-                for title, cases in (
-                    ("revised: the room", (RIGHT, WARMS, COOLS)),
-                    ("revised: the start state", (RIGHT, UNKNOWN, CARRIED, FALSE)),
+                Panel(title, "cutting test", "depth difference [um]", [*curves(tests, values, "points"), zero])
+                for title, values in (
+                    (
+                        f"revised: {what}",
+                        {"not revised": m.without(RIGHT).signed} | {case: m.paper(case).signed for case in cases},
+                    )
+                    for what, cases in (
+                        ("the room", (RIGHT, WARMS, COOLS)),
+                        ("the start state", (RIGHT, UNKNOWN, CARRIED, FALSE)),
+                    )
                 )
             ],
         ),
     )
 
 
-def _by_test(label: str, s: Surfaces) -> Curve:
-    return Curve(label, np.arange(1.0, len(s.depth) + 1), s.signed, "points")
-
-
-def _surfaces(
-    m: Milled, way: str, number: int, label: str, style: Literal["line", "dashed", "points"] = "line"
-) -> Curve:
-    x, y = [], []
-    for face, lies in m.first[way]:
-        if face.number == number:
-            x += [*(face.time / 60), np.nan]
-            y += [*lies, np.nan]
-    return Curve(label, np.array(x), np.array(y), style)
+def _surfaces(m: Milled, way: str, number: int) -> tuple[FloatArray, FloatArray]:
+    """Return times [min], and where the surfaces lie [um], with a break in the line between two faces."""
+    faces = [(face.time / 60, lies) for face, lies in m.first[way] if face.number == number]
+    x, y = (np.concatenate([np.append(part, np.nan) for part in parts]) for parts in zip(*faces, strict=True))
+    return x, y
 
 
 def numbers(m: Milled) -> dict[str, float]:
@@ -233,7 +209,3 @@ def _cell(m: Milled, name: str, way: str) -> str:
 
 def _told(s: Surfaces) -> str:
     return f"{s.mean:.1f} ({s.most:.1f})"
-
-
-def _range(s: Surfaces) -> str:
-    return f"{s.by_test.min():.1f} to {s.by_test.max():.1f}"

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.nc.interpreter.block import Block, Setup
@@ -25,9 +24,8 @@ from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.start import Start, carried, cold
 from thermocomp.nc.thermal.stations import Station
 from thermocomp.papers.precompensation.setup import INTERVAL, MILLING, POSITIONS, SPEED
+from thermocomp.papers.study import FloatArray
 from thermocomp.recording.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 MINUTE = 60.0
 #: length of the tool; the work coordinate system lies so much lower: words of Z are positions of the axis [mm]

@@ -6,24 +6,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import find, record
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.selection.orders import Order
-from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
-from thermocomp.papers.study import Progress
+from thermocomp.papers.common import Errors, described, fitted, predicted, rms, stacked
+from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
+from thermocomp.recording.samples import Samples
 from thermocomp.simulation.climate import Climate
 from thermocomp.simulation.protocol import Experiment
-
-FloatArray = NDArray[np.float64]
 
 SPEED = "spindle_rpm"
 #: where the drift of Z is modelled (P-04) [mm]
@@ -60,6 +55,11 @@ class Cut:
     without: FloatArray
     scheduled: FloatArray
 
+    @property
+    def means(self) -> tuple[float, float]:
+        """Mean magnitudes of both over the positions [um]."""
+        return float(np.abs(self.without).mean()), float(np.abs(self.scheduled).mean())
+
 
 @dataclass(frozen=True, eq=False)
 class Warm:
@@ -93,16 +93,17 @@ class Computed:
         Table of final prediction errors per position.
     hidden : list of int
         Hidden nodes of the nets.
-    one_step : Errors
-        Of least squares with k = 1, m = 0, one step ahead, at all positions.
+    one_step : float
+        RMS of least squares with k = 1, m = 0, one step ahead, at all positions [um].
     clocks : dict of float to (tuple of int, float, float)
         By the interval [s], at the first position: orders by FPE, free-run RMS with them, and with k = 1, m = 0 [um].
     cuts : list of Cut
     warm : Warm
-    room : Errors
-        Of the drift of Z of a machine that stands still for a day: none of it follows from the speed (E-P6).
-    workshop : Errors
-        Of what the nets leave of the same verification in a workshop that follows the day.
+    room : float
+        How far Z of a machine drifts that stands still for a day, peak to peak [um]: none of it follows from the speed
+        (E-P6).
+    workshop : float
+        RMS of what the nets leave of the same verification in a workshop that follows the day [um].
     """
 
     learn: Samples
@@ -110,12 +111,12 @@ class Computed:
     models: dict[str, list[ErrorModel]]
     orders: list[tuple[Order, ...]]
     hidden: list[int]
-    one_step: Errors
+    one_step: float
     clocks: dict[float, tuple[tuple[int, int], float, float]]
     cuts: list[Cut]
     warm: Warm
-    room: Errors
-    workshop: Errors
+    room: float
+    workshop: float
 
     @cached_property
     def free_run(self) -> dict[str, FloatArray]:
@@ -127,6 +128,26 @@ class Computed:
         """What is left of the verification, (n_rows, n_positions) [um]."""
         z = self.judge.deviations
         return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
+
+    @cached_property
+    def schedule(self) -> FloatArray:
+        """What is added to the programmed Z in the verification, by the nets, (n_rows, n_positions) [um]."""
+        return scheduled(self.judge.time, self.free_run[NET])
+
+    @property
+    def by_fpe(self) -> list[Order]:
+        """The orders with the smallest final prediction error, by position."""
+        return [min((o for o in table if o.admissible), key=lambda o: o.fpe) for table in self.orders]
+
+    @property
+    def depths(self) -> tuple[float, float]:
+        """Mean depth difference of all cutting tests, without and with the schedule [um]."""
+        without, with_ = np.mean([k.means for k in self.cuts], axis=0)
+        return float(without), float(with_)
+
+    def shares(self, name: str) -> list[float]:
+        """Return the share of the drift's variance that a model describes at each position."""
+        return [described(e, z) for e, z in zip(self.left[name].T, self.judge.deviations.T, strict=True)]
 
     @property
     def inner(self) -> tuple[int, ...]:
@@ -158,11 +179,10 @@ def compute(seed: int, progress: Progress) -> Computed:
     timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
     models: dict[str, list[ErrorModel]] = {name: [] for name in (NET, LEAST, CHOSEN)}
     tables, hidden, steps = [], [], []
-    k, m = PAPERS_ORDERS
     for number, target in enumerate(targets):
         progress(0.1 + 0.1 * number, f"models at z = {POSITIONS[number]} mm")
-        chosen = ARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k_max=GREATEST, m_max=GREATEST)
-        paper = ARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k=k, m=m)
+        chosen, paper = _by_fpe_and_papers(INTERVAL)
+        k, m = PAPERS_ORDERS
         net = NetARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k=k, m=m, random_state=seed)
         for name, estimator in ((CHOSEN, chosen), (LEAST, paper), (NET, net)):
             models[name].append(fitted(estimator, learn, [target], **timed)[target])
@@ -176,7 +196,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     cuts = [cut(record("precompensation-cut", seed=seed + n)[0], models[NET]) for n in range(CUTS)]
     progress(0.9, "a warm machine, and another room")
     still = record("etve", seed=seed)[0]
-    room = Errors.of(still.table["z_um"].to_numpy(dtype=np.float64))
+    room = Errors.of(still.table["z_um"].to_numpy(dtype=np.float64)).peak_to_peak
     workshop = samples_of(record(in_a_workshop(find("precompensation")), seed=seed)[-1])
     left = workshop.deviations - at_positions(models[NET], workshop)
     warm = warm_start(judge, models[NET][0])
@@ -186,18 +206,18 @@ def compute(seed: int, progress: Progress) -> Computed:
         models,
         tables,
         hidden,
-        Errors.of(np.concatenate(steps)),
+        rms(np.concatenate(steps)),
         clocks,
         cuts,
         warm,
         room,
-        Errors.of(left),
+        rms(left),
     )
 
 
 def samples_of(recording: Recording) -> Samples:
     """Return the drift of Z at all positions, the spindle speed being the only input (P-01)."""
-    return stack([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED], zeroing=FIRST_READING, starts=COLD)
+    return stacked([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED])
 
 
 def in_a_workshop(experiment: Experiment) -> Experiment:
@@ -252,13 +272,17 @@ def warm_start(judge: Samples, model: ErrorModel) -> Warm:
     return Warm(job.time / 3600, drift, drift - (cold - cold[0]), drift - (carried - carried[0]))
 
 
+def _by_fpe_and_papers(interval: float) -> tuple[ARX, ARX]:
+    """Return least squares by a step of time [s]: with the orders that FPE will choose, and with the paper's."""
+    k, m = PAPERS_ORDERS
+    step: dict[str, Any] = {"inputs": (SPEED,), "time": "routed", "interval": interval}
+    return ARX(**step, k_max=GREATEST, m_max=GREATEST), ARX(**step, k=k, m=m)
+
+
 def _clock(
     learn: Samples, judge: Samples, interval: float, timed: Mapping[str, Any]
 ) -> tuple[tuple[int, int], float, float]:
-    target, errors = learn.targets[0].name, []
-    k, m = PAPERS_ORDERS
-    chosen = ARX(inputs=(SPEED,), time="routed", interval=interval, k_max=GREATEST, m_max=GREATEST)
-    for estimator in (chosen, ARX(inputs=(SPEED,), time="routed", interval=interval, k=k, m=m)):
-        model = fitted(estimator, learn, [target], support=PAPERS_SUPPORT, **timed)[target]
-        errors.append(Errors.of(judge.deviations[:, 0] - predicted(model, judge)).rms)
-    return (chosen.k_, chosen.m_), errors[0], errors[1]
+    target, z = learn.targets[0].name, judge.deviations[:, 0]
+    chosen, paper = _by_fpe_and_papers(interval)
+    left, least = (rms(z - predicted(fitted(e, learn, [target], **timed)[target], judge)) for e in (chosen, paper))
+    return (chosen.k_, chosen.m_), left, least

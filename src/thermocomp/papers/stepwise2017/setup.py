@@ -4,25 +4,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 
 from thermocomp.assessment.robustness import Robustness, stress
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.polynomial import Polynomial
-from thermocomp.core.terms import Variable
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.datasets.virtual import record
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.numerics.stepwise import r_squared_of_f
 from thermocomp.models.partial_f import PartialF
-from thermocomp.models.training import train
-from thermocomp.papers.common import PAPERS_SUPPORT, Errors, fitted, predicted
-from thermocomp.papers.study import Progress
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
-
-FloatArray = NDArray[np.float64]
+from thermocomp.papers.common import PAPERS_SUPPORT, Errors, every, fitted, frozen, predicted, rms, stacked, trained
+from thermocomp.papers.study import FloatArray, Progress
+from thermocomp.recording.samples import Samples
 
 TARGET = "x1_um"
 #: F to enter and F to delete (T-03)
@@ -85,8 +77,8 @@ class Computed:
     models : dict of str to ErrorModel
         By the names of `METHODS`.
     thinned : tuple of Thinned
-    absolute : Errors
-        Of the stepwise model of temperatures as they are, not from the start of the test, on the on-line test.
+    absolute : float
+        RMS of the stepwise model of temperatures as they are, not from the start of the test, on the on-line test [um].
     shaken : dict of str to Robustness
         Stepwise and the two it is compared with, on the on-line test with noise and lost sensors.
     """
@@ -96,7 +88,7 @@ class Computed:
     selection: PartialF
     models: dict[str, ErrorModel]
     thinned: tuple[Thinned, ...]
-    absolute: Errors
+    absolute: float
     shaken: dict[str, Robustness]
 
     @cached_property
@@ -110,9 +102,19 @@ class Computed:
         return _left(self.models, self.online)
 
     @cached_property
+    def errors(self) -> dict[str, Errors]:
+        """The same as figures."""
+        return {name: Errors.of(e) for name, e in self.left.items()}
+
+    @property
     def chosen(self) -> tuple[str, ...]:
         """Temperatures in the stepwise model."""
         return self.selection.terms_
+
+    @cached_property
+    def worth(self) -> float:
+        """How many independent rows the stepwise fit is worth."""
+        return effective_sample_size(self.left_in_fit[STEPWISE])
 
 
 def compute(seed: int, progress: Progress) -> Computed:
@@ -129,25 +131,24 @@ def compute(seed: int, progress: Progress) -> Computed:
     """
     progress(0.0, "the two tests")
     test, online = record("stepwise2017", seed=seed)[0], record("stepwise2017-online", seed=seed)[0]
-    learn, judge = (stack([t], [TARGET], zeroing=FIRST_READING, starts=COLD) for t in (test, online))
+    learn, judge = (stacked([t], [TARGET]) for t in (test, online))
     heat = [c.name for c in test.temperatures]
     warm, now = learn.only(heat), judge.only(heat)
     progress(0.1, "stepwise regression")
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
     models = fitted(selection, warm, [TARGET])
     found = {STEPWISE: models[TARGET]}
-    every = np.ones(len(learn), dtype=np.bool_)
     for k, (name, method) in enumerate(METHODS.items()):
         progress(0.2 + 0.1 * k, name)
         if method and name not in found:
-            found[name] = train(method, learn, 0, every, support=PAPERS_SUPPORT).model
+            found[name] = trained(method, learn, support=PAPERS_SUPPORT)
     found[SLICED] = sliced_inverse(warm)
     progress(0.8, "noise and lost sensors")
-    measured, rows = judge.deviations[:, 0], np.ones(len(judge), dtype=np.bool_)
-    shaken = {m: stress(found[m], judge, measured, rows).robustness for m in (STEPWISE, LEAST, PURSUIT)}
+    measured = judge.deviations[:, 0]
+    shaken = {m: stress(found[m], judge, measured, every(judge)).robustness for m in (STEPWISE, LEAST, PURSUIT)}
     progress(0.95, "fewer rows")
-    thinned = tuple(_thinned(warm, now, every_so_many) for every_so_many in THINNED)
-    raw, new = (stack([r], [TARGET], heat, rezero=False, zeroing=FIRST_READING, starts=COLD) for r in (test, online))
+    thinned = tuple(_thinned(warm, now, step) for step in THINNED)
+    raw, new = (stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
     absolute = fitted(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
     return Computed(
         learn,
@@ -155,7 +156,7 @@ def compute(seed: int, progress: Progress) -> Computed:
         selection,
         {name: found[name] for name in METHODS},
         thinned,
-        Errors.of(measured - predicted(absolute, new)),
+        rms(measured - predicted(absolute, new)),
         shaken,
     )
 
@@ -188,22 +189,11 @@ def sliced_inverse(samples: Samples) -> ErrorModel:
     _, directions = linalg.eigh(between)
     onto = whitening @ directions[:, ::-1][:, :DIRECTIONS]
     solved = lstsq(X @ onto, y)
-    names = [c.name for c in samples.inputs]
-    return Polynomial(
-        target=TARGET,
-        unit="um",
-        inputs=samples.model_inputs(range(len(names)), np.ones(len(y), dtype=np.bool_)),
-        support=PAPERS_SUPPORT,
-        provenance=None,
-        variables=tuple(Variable.single(n, i) for i, n in enumerate(names)),
-        terms=tuple((i,) for i in range(len(names))),
-        coefficients=tuple((onto @ solved.coefficients).tolist()),
-        intercept=solved.intercept,
-    )
+    return frozen(samples, range(X.shape[1]), (onto @ solved.coefficients).tolist(), solved.intercept)
 
 
-def _thinned(warm: Samples, online: Samples, every: int) -> Thinned:
-    some = warm.take(np.arange(0, len(warm), every))
+def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
+    some = warm.take(np.arange(0, len(warm), step))
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
     model = fitted(selection, some, [TARGET])[TARGET]
     residual = some.deviations[:, 0] - selection.predict(some.frame())
@@ -213,7 +203,7 @@ def _thinned(warm: Samples, online: Samples, every: int) -> Thinned:
         effective_sample_size(residual),
         r_squared_of_f(F_ENTER, len(some) - 2),
         selection.terms_,
-        Errors.of(error).rms,
+        rms(error),
     )
 
 

@@ -6,10 +6,8 @@ machine (`thermocomp.papers.wessel2004.tools`). What a claim is judged by stands
 down before the first run.
 """
 
-from collections.abc import Callable
-
 from thermocomp.papers.study import Progress, Study
-from thermocomp.papers.wessel2004.sets import appendix_b
+from thermocomp.papers.wessel2004.sets import appendix_b, told
 from thermocomp.papers.wessel2004.spindle import spindle
 from thermocomp.papers.wessel2004.tools import milling_machine, resting_tool
 
@@ -30,30 +28,13 @@ def run(seed: int, progress: Progress) -> Study:
     -------
     Study
     """
-    within = _share_of(progress)
+
+    def within(begin: float, end: float) -> Progress:
+        return lambda done, what: progress(begin + done * (end - begin), what)
+
     fem = spindle(seed, within(0.0, 0.03))
     selection = appendix_b(seed, within(0.03, 0.5))
     tool = resting_tool(seed, within(0.5, 0.93), selection)
     milling = milling_machine(seed, within(0.93, 1.0))
     progress(1.0, "done")
-    parts = (fem, selection.part, tool, milling)
-    numbers: dict[str, float] = {}
-    for part in parts:
-        numbers |= part.numbers
-    return Study(
-        name="wessel2004",
-        title=TITLE,
-        claims=tuple(c for p in parts for c in p.claims),
-        tables=tuple(t for p in parts for t in p.tables),
-        figures=tuple(f for p in parts for f in p.figures),
-        numbers=numbers,
-    )
-
-
-def _share_of(progress: Progress) -> Callable[[float, float], Progress]:
-    """Return a maker of progress that fills part of the whole."""
-
-    def within(begin: float, end: float) -> Progress:
-        return lambda done, what: progress(begin + done * (end - begin), what)
-
-    return within
+    return Study.of("wessel2004", TITLE, fem, told(selection), tool, milling)

@@ -1,10 +1,11 @@
 """Wessel's Appendix B: which temperatures, by the maximal correlation of all sets on all data sets."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.equivalents import Equivalents, equivalents
@@ -14,17 +15,13 @@ from thermocomp.models.selection.maximal_correlation import (
     maximal_correlations,
     subsets_up_to,
 )
-from thermocomp.papers.study import Claim, Progress, Table
-from thermocomp.papers.wessel2004.trial import Part
-
-#: mean Psi of the best set, for each displacement, by the number of temperatures
-_BySize = dict[int, NDArray[np.float64]]
+from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, Table
 
 #: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
-PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS, PAPER_DATA_SETS = 511, 35_259, 129, 23
-#: equivalent sets for S1, S2, S3 and common ones; the sets they share; the one chosen (W-11)
-PAPER_EQUIVALENT, PAPER_COMMON = (46, 7, 27), ((1, 2, 8), (2, 4, 8), (2, 5, 8), (2, 8, 9))
-PAPER_SET = (1, 2, 8)
+PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129
+#: equivalent sets for S1, S2, S3 and common ones; the sets they share; the one chosen, by places from 0 (W-11)
+PAPER_EQUIVALENT, PAPER_COMMON = (46, 7, 27), ((0, 1, 7), (1, 3, 7), (1, 4, 7), (1, 7, 8))
+PAPERS_OWN = (0, 1, 7)
 #: Psi that triples exceed, so that no more temperatures were looked at (W-12)
 ENOUGH_PSI = 0.99
 #: most temperatures in a set
@@ -40,19 +37,47 @@ class Selection:
 
     Parameters
     ----------
-    psi : MaximalCorrelations
-        Of the sets of at most three.
-    small : Equivalents
-        Their comparison.
-    chosen : tuple of int
-        Places of the temperatures, from 0.
-    part : Part
+    psi, larger : MaximalCorrelations
+        Of the sets of at most three, and of all larger ones.
+    small, holm, converged : Equivalents
+        Comparison of the sets of at most three: without correction for their number, by Holm's rule, and with sweeps to
+        the limit.
+    rows : sequence of int
+        Of the data sets.
+    seconds : float
+        All models took [s].
     """
 
     psi: MaximalCorrelations
+    larger: MaximalCorrelations
     small: Equivalents
-    chosen: tuple[int, ...]
-    part: Part
+    holm: Equivalents
+    converged: Equivalents
+    rows: Sequence[int]
+    seconds: float
+
+    @cached_property
+    def chosen(self) -> tuple[int, ...]:
+        """Places of the temperatures that are chosen, from 0."""
+        return _choice(self.small)
+
+    @cached_property
+    def by_size(self) -> dict[int, FloatArray]:
+        """Mean Psi of the best set, for each displacement, by the number of temperatures."""
+        found: dict[int, FloatArray] = {}
+        for psi in (self.psi, self.larger):
+            sizes, means = np.array([len(s) for s in psi.subsets]), psi.psi.mean(axis=2)
+            found |= {int(k): means[:, sizes == k].max(axis=1) for k in np.unique(sizes)}
+        return found
+
+    @property
+    def sets(self) -> int:
+        """Number of all sets."""
+        return len(self.psi.subsets) + len(self.larger.subsets)
+
+    def models(self, sets: int) -> int:
+        """Return the number of models that so many sets make."""
+        return sets * len(self.rows) * len(self.psi.psi)
 
 
 def appendix_b(seed: int, progress: Progress) -> Selection:
@@ -70,10 +95,8 @@ def appendix_b(seed: int, progress: Progress) -> Selection:
     progress(0.0, "23 data sets on the resting tool")
     recordings = record("wessel-sets", seed=seed)
     data = [DataSet(r.name, r.values(r.temperatures), r.values(r.displacements)) for r in recordings]
-    n_temperatures, n_displacements = len(recordings[0].temperatures), len(recordings[0].displacements)
-    every = subsets_up_to(n_temperatures)
+    every = subsets_up_to(len(recordings[0].temperatures))
     sets, larger = [s for s in every if len(s) <= MOST], [s for s in every if len(s) > MOST]
-    models = len(every) * len(data) * n_displacements
     progress(0.2, f"maximal correlation of {len(every)} sets")
     begin = time.perf_counter()
     psi = maximal_correlations(data, sets, converged=False, tolerance=TOLERANCE, jobs=-1)
@@ -85,35 +108,21 @@ def appendix_b(seed: int, progress: Progress) -> Selection:
     small, holm, converged = (
         equivalents(list(found.psi), sets, holm=h) for found, h in ((psi, False), (psi, True), (limit, False))
     )
-    chosen = _choice(small)
-    rows = [len(r) for r in recordings]
-    matches = (len(every), models, len(sets)) == (PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS)
-    by_size = _best_by_size(psi) | _best_by_size(more)
-    claims = (
-        Claim(
-            ("W-10",),
-            "Nine temperatures, 23 data sets and three displacements make more models than can be calculated",
-            f"{PAPER_SETS} sets, {PAPER_MODELS} models; of at most {MOST}: {PAPER_SMALL_SETS} sets",
-            f"{len(every)} sets, {models} models in {seconds:.1f} s; of at most {MOST}: {len(sets)} sets, "
-            f"{len(sets) * len(data) * n_displacements} models",
-            None if matches else False,
-            f"Data sets of {min(rows)} to {max(rows)} rows. The number is the paper's, the limit has gone."
-            if matches
-            else "The experiment has other numbers of sensors, probes or data sets than the paper's.",
-        ),
-        _enough(by_size),
-        *_equal_claims(small, holm, converged),
-    )
+    return Selection(psi, more, small, holm, converged, [len(r) for r in recordings], seconds)
+
+
+def told(s: Selection) -> Part:
+    """Return what is told of Appendix B."""
     numbers = {
-        "sets_models": float(models),
-        "sets_small": float(len(sets)),
-        "sets_common": float(len(small.common)),
-        "sets_common_holm": float(len(holm.common)),
-        "sets_common_converged": float(len(converged.common)),
-        "sets_best_psi": float(by_size[MOST].min()),
+        "sets_models": float(s.models(s.sets)),
+        "sets_small": float(len(s.psi.subsets)),
+        "sets_common": float(len(s.small.common)),
+        "sets_common_holm": float(len(s.holm.common)),
+        "sets_common_converged": float(len(s.converged.common)),
+        "sets_best_psi": float(s.by_size[MOST].min()),
     }
-    numbers |= {f"sets_equivalent_s{d + 1}": float(n) for d, n in enumerate(small.equivalent.sum(axis=1))}
-    return Selection(psi, small, chosen, Part(claims, _tables(by_size, psi, small, chosen), (), numbers))
+    numbers |= {f"sets_equivalent_s{d}": float(n) for d, n in enumerate(s.small.equivalent.sum(axis=1), start=1)}
+    return Part(claims(s), _tables(s), (), numbers)
 
 
 def _choice(small: Equivalents) -> tuple[int, ...]:
@@ -123,86 +132,102 @@ def _choice(small: Equivalents) -> tuple[int, ...]:
     return max(equals, key=lambda s: total[s])
 
 
-def _enough(by_size: _BySize) -> Claim:
-    told = "; ".join(f"{k}: {', '.join(f'{v:.4f}' for v in by_size[k])}" for k in (1, 2, MOST, max(by_size)))
-    least = next((k for k, best in by_size.items() if (best > ENOUGH_PSI).all()), None)
-    return Claim(
-        ("W-12",),
-        f"Three temperatures are enough: the best triples have a maximal correlation above {ENOUGH_PSI}",
-        f"> {ENOUGH_PSI}",
-        f"mean Psi of the best set for each displacement, by its size: {told}",
-        bool((by_size[MOST] > ENOUGH_PSI).all()),
-        f"Least number of temperatures with a mean above {ENOUGH_PSI} for every displacement: {least or 'none'}.",
-    )
-
-
-def _best_by_size(psi: MaximalCorrelations) -> _BySize:
-    """Return the mean Psi of the best set of each size, for each displacement."""
-    sizes = np.array([len(s) for s in psi.subsets])
-    means = psi.psi.mean(axis=2)
-    return {int(k): means[:, sizes == k].max(axis=1) for k in np.unique(sizes)}
-
-
-def _equal_claims(small: Equivalents, holm: Equivalents, converged: Equivalents) -> tuple[Claim, Claim]:
-    common = small.common
-    shared = set.intersection(*(set(s) for s in common)) if common else set()
-    pair = tuple(sorted(shared))
-    worse = bool(shared) and pair not in common
-    if not common:
-        why = "No set is as good as the best for all displacements."
-    elif not shared:
-        why = "No temperature is in all of the common sets."
-    elif not worse:
-        why = f"{called(pair)} by itself is as good as the best for all displacements."
-    else:
-        p_values = small.p_values[:, small.subsets.index(pair)]
-        told = ", ".join(f"{p:.2g}" for p in p_values)
-        why = f"{called(pair)} by itself is told from the best: p = {told} for the displacements in turn."
-    return (
-        Claim(
-            ("W-11", "E-W6"),
-            "Several sets are as good as the best, and some are for all displacements",
-            f"{', '.join(str(n) for n in PAPER_EQUIVALENT)} sets for S1, S2, S3; {len(PAPER_COMMON)} common: "
-            + " ".join(called(tuple(j - 1 for j in s)) for s in PAPER_COMMON),
-            f"{_counted(small)}: "
-            + (" ".join(called(s) for s in common[:6]) + (" ..." if len(common) > 6 else "") or "none"),
-            len(common) > 0,
-            f"Level 0.05, which the paper does not state, without correction for the number of sets; by Holm's rule "
-            f"{_counted(holm)}; with sweeps to the limit instead of the paper's rule {_counted(converged)}.",
-        ),
-        Claim(
-            ("W-11",),
-            "Some temperatures are in all common sets, but do not suffice by themselves",
-            "T2 and T8",
-            called(pair) if shared else "none",
-            worse,
-            why,
-        ),
-    )
-
-
-def _counted(found: Equivalents) -> str:
-    return f"{', '.join(str(n) for n in found.equivalent.sum(axis=1))} sets, {len(found.common)} common"
-
-
-def called(places: tuple[int, ...]) -> str:
+def called(places: Sequence[int]) -> str:
     """Write a set as the paper does: ``{T1, T2, T8}``."""
     return "{" + ", ".join(f"T{j + 1}" for j in places) + "}"
 
 
-def _tables(
-    by_size: _BySize, psi: MaximalCorrelations, small: Equivalents, chosen: tuple[int, ...]
-) -> tuple[Table, ...]:
-    n_tests = len(psi.tests)
-    targets = [f"S{d + 1}" for d in range(len(psi.psi))]
-    paper = tuple(j - 1 for j in PAPER_SET)
-    rows = small.table()
-    listed = [r for k, r in enumerate(rows) if k < 12 or r.subset in (paper, chosen)]
+# -- claims --------------------------------------------------------------------------------------------------------
+
+claims = Claims[Selection]()
+
+
+@claims.add(
+    "W-10",
+    "Nine temperatures, 23 data sets and three displacements make more models than can be calculated",
+    f"{PAPER_SETS} sets, {PAPER_MODELS} models; of at most {MOST}: {PAPER_SMALL_SETS} sets",
+)
+def _calculated(s: Selection) -> Ours:
+    small, models = len(s.psi.subsets), s.models(s.sets)
+    matches = (s.sets, models, small) == (PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS)
+    limit = f"Data sets of {min(s.rows)} to {max(s.rows)} rows. The number is the paper's, the limit has gone."
+    return Ours(
+        f"{s.sets} sets, {models} models in {s.seconds:.1f} s; of at most {MOST}: {small} sets, "
+        f"{s.models(small)} models",
+        None if matches else False,
+        "The experiment has other numbers of sensors, probes or data sets than the paper's.",
+        note=limit if matches else "",
+    )
+
+
+@claims.add(
+    "W-12",
+    f"Three temperatures are enough: the best triples have a maximal correlation above {ENOUGH_PSI}",
+    f"> {ENOUGH_PSI}",
+)
+def _enough(s: Selection) -> Ours:
+    best = s.by_size
+    listed = "; ".join(f"{k}: {', '.join(f'{v:.4f}' for v in best[k])}" for k in (1, 2, MOST, max(best)))
+    least = next((k for k, psi in best.items() if (psi > ENOUGH_PSI).all()), None)
+    return Ours(
+        f"mean Psi of the best set for each displacement, by its size: {listed}",
+        bool((best[MOST] > ENOUGH_PSI).all()),
+        note=f"Least number of temperatures with a mean above {ENOUGH_PSI} for every displacement: {least or 'none'}.",
+    )
+
+
+def _counted(equivalent: Sequence[int], common: int) -> str:
+    return f"{', '.join(str(n) for n in equivalent)} sets, {common} common"
+
+
+@claims.add(
+    "W-11 E-W6",
+    "Several sets are as good as the best, and some are for all displacements",
+    f"{', '.join(str(n) for n in PAPER_EQUIVALENT)} sets for S1, S2, S3; {len(PAPER_COMMON)} common: "
+    + " ".join(map(called, PAPER_COMMON)),
+)
+def _several(s: Selection) -> Ours:
+    common = s.small.common
+    small, holm, converged = (
+        _counted(e.equivalent.sum(axis=1).tolist(), len(e.common)) for e in (s.small, s.holm, s.converged)
+    )
+    return Ours(
+        f"{small}: {' '.join(map(called, common[:6])) + (' ...' if len(common) > 6 else '') or 'none'}",
+        len(common) > 0,
+        note=f"Level 0.05, which the paper does not state, without correction for the number of sets; by Holm's rule "
+        f"{holm}; with sweeps to the limit instead of the paper's rule {converged}.",
+    )
+
+
+@claims.add("W-11", "Some temperatures are in all common sets, but do not suffice by themselves", "T2 and T8")
+def _shared(s: Selection) -> Ours:
+    small, common = s.small, s.small.common
+    pair = tuple(sorted(set.intersection(*map(set, common)))) if common else ()
+    worse = bool(pair) and pair not in common
+    if not common:
+        why = "No set is as good as the best for all displacements."
+    elif not pair:
+        why = "No temperature is in all of the common sets."
+    elif not worse:
+        why = f"{called(pair)} by itself is as good as the best for all displacements."
+    else:
+        p_values = ", ".join(f"{p:.2g}" for p in small.p_values[:, small.subsets.index(pair)])
+        why = f"{called(pair)} by itself is told from the best: p = {p_values} for the displacements in turn."
+    return Ours(called(pair) if pair else "none", worse, note=why)
+
+
+# -- tables --------------------------------------------------------------------------------------------------------
+
+
+def _tables(s: Selection) -> tuple[Table, ...]:
+    targets = [f"S{d + 1}" for d in range(len(s.psi.psi))]
+    special = {"the paper's": PAPERS_OWN, "chosen": s.chosen}
+    listed = [r for k, r in enumerate(s.small.table()) if k < 12 or r.subset in special.values()]
     return (
         Table(
             "Appendix B: mean Psi of the best set of each size",
             ("temperatures", *targets),
-            [[str(k), *(f"{v:.4f}" for v in best)] for k, best in by_size.items()],
+            [[str(k), *(f"{v:.4f}" for v in best)] for k, best in s.by_size.items()],
         ),
         Table(
             "Appendix B: sets of at most three, first those as good as the best for most displacements",
@@ -210,10 +235,10 @@ def _tables(
             [
                 [
                     called(r.subset),
-                    *(f"{v / n_tests:.4f}" for v in r.summed),
+                    *(f"{v / len(s.psi.tests):.4f}" for v in r.summed),
                     f"{min(r.p_values):.2g}",
                     " ".join(targets[d] for d in r.equivalent),
-                    " ".join(w for w, s in (("the paper's", paper), ("chosen", chosen)) if s == r.subset),
+                    " ".join(word for word, subset in special.items() if subset == r.subset),
                 ]
                 for r in listed
             ],

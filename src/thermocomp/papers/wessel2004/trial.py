@@ -2,25 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.assessment.replay import replay
 from thermocomp.core.model import Support
-from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.ace import ACE
 from thermocomp.models.ace_monotone import MonotoneACE
+from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.ols import LeastSquares
-from thermocomp.papers.common import Errors, errors_table, fitted, predicted
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Table
+from thermocomp.papers import common
+from thermocomp.papers.common import errors_table, every, fitted, predicted, rms
+from thermocomp.papers.pictures import curves
+from thermocomp.papers.study import BoolArray, FloatArray, Panel, Table
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.starts import COLD
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from thermocomp.recording.samples import Samples
 
 ACE_NAME = "ACE"
 MLR_NAME = "multiple linear regression"
@@ -31,25 +29,6 @@ FROM_START = "{}, from each start"
 SWEEPS = 20_000
 #: a difference is slight up to this share of the displacement's span: what the eye sees in a figure
 SLIGHT = 0.01
-
-
-@dataclass(frozen=True)
-class Part:
-    """What one experiment adds to the study.
-
-    Parameters
-    ----------
-    claims : tuple of Claim
-    tables : tuple of Table
-    figures : tuple of Figure
-    numbers : dict of str to float
-        See `thermocomp.papers.study.Study`.
-    """
-
-    claims: tuple[Claim, ...]
-    tables: tuple[Table, ...]
-    figures: tuple[Figure, ...]
-    numbers: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,24 +88,27 @@ class Trial:
         return self.measured - self.estimates[method]
 
     def rms(self, method: str) -> float:
-        """Return the root mean square of the residual in the unseen test [um].
-
-        Parameters
-        ----------
-        method : str
-            Key of `estimates`.
-        """
-        return Errors.of(self.residual(method)).rms
+        """Return the root mean square of the residual of one of `estimates` in the unseen test [um]."""
+        return rms(self.residual(method))
 
     def fit_rms(self, method: str) -> float:
-        """Return the root mean square of the residual in the tests that were learned [um].
+        """Return the root mean square of the residual of one of `fits` in the tests that were learned [um]."""
+        return rms(self.learned.deviations[:, 0] - self.fits[method])
 
-        Parameters
-        ----------
-        method : str
-            Key of `fits`.
-        """
-        return Errors.of(self.learned.deviations[:, 0] - self.fits[method]).rms
+    def numbers(self, prefix: str) -> dict[str, float]:
+        """Return what is told of every trial as numbers, each name with a prefix."""
+        return {
+            f"{prefix}_psi": self.ace.psi_,
+            f"{prefix}_falling_theta": self.ace.falling_theta_,
+            f"{prefix}_loop_width": loop_width(self.learned),
+            f"{prefix}_flagged": float(self.flagged.mean()),
+            f"{prefix}_none_rms_um": rms(self.measured),
+        }
+
+    def rms_by_method(self, prefix: str) -> dict[str, float]:
+        """Return `rms` by the short names of the methods, each with a prefix."""
+        short = {"ace": ACE_NAME, "mlr": MLR_NAME, "ace_monotone": "ace-monotone", "dynamic": "dynamic"}
+        return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
     def table(self, caption: str) -> Table:
         """Lay out the errors of all methods in the unseen test.
@@ -167,10 +149,10 @@ class Trial:
             f"can tell; theta falls over {self.ace.falling_theta_:.0%} of its steps. {self.straight()} Unseen: "
         )
         if out.any():
-            inside = f", {Errors.of(error[~out]).rms:.2f} um in the others" if not out.all() else ""
+            inside = f", {rms(error[~out]):.2f} um in the others" if not out.all() else ""
             text += (
                 f"{out.sum()} of {len(out)} rows have a temperature outside what was learned, the RMS of ACE is "
-                f"{Errors.of(error[out]).rms:.2f} um in them{inside}"
+                f"{rms(error[out]):.2f} um in them{inside}"
             )
         else:
             text += "no temperature lies outside what was learned"
@@ -207,9 +189,7 @@ def stacked(
     """
     first = recordings[0]
     inputs = [first.temperatures[j].name for j in temperatures]
-    return stack(
-        recordings, [first.displacements[displacement].name], inputs, rezero=rezero, zeroing=FIRST_READING, starts=COLD
-    )
+    return common.stacked(recordings, [first.displacements[displacement].name], inputs, rezero=rezero)
 
 
 def trial(
@@ -235,46 +215,32 @@ def trial(
     -------
     Trial
     """
-    learned, unseen = (stacked(r, displacement, temperatures) for r in (recordings[:-1], recordings[-1:]))
+    parts = (recordings[:-1], recordings[-1:])
+    learned, unseen = (stacked(r, displacement, temperatures) for r in parts)
+    target = learned.targets[0].name
     ace = ACE(max_sweeps=SWEEPS)
-    (model,) = fitted(ace, learned, [learned.targets[0].name], support=Support(margin=0.0)).values()
-    estimate, flagged = replay(model, unseen, np.ones(len(unseen), dtype=np.bool_))
+    model = fitted(ace, learned, [target], support=Support(margin=0.0))[target]
+    estimate, flagged = replay(model, unseen, every(unseen))
     estimates, fits = {ACE_NAME: estimate}, {ACE_NAME: predicted(model, learned)}
 
-    def also(name: str, estimator: ACE | LeastSquares | MonotoneACE, samples: tuple[Samples, Samples]) -> None:
-        (found,) = fitted(estimator, samples[0], [samples[0].targets[0].name]).values()
-        fits[name], estimates[name] = predicted(found, samples[0]), predicted(found, samples[1])
+    def also(name: str, estimator: ThermalRegressor, samples: Sequence[Samples], **fit: Any) -> None:
+        found = fitted(estimator, samples[0], [target], **fit)[target]
+        fits[name], estimates[name] = (predicted(found, s) for s in samples)
 
     also(MLR_NAME, LeastSquares(), (learned, unseen))
     if beside:
-        start = [stacked(r, displacement, temperatures, rezero=True) for r in (recordings[:-1], recordings[-1:])]
-        zeroed = (start[0], start[1])
+        zeroed = [stacked(r, displacement, temperatures, rezero=True) for r in parts]
         begins = np.vstack([s.reference() for s in zeroed])
         if np.ptp(begins, axis=0).max() > 0.01 * np.ptp(learned.values, axis=0).max():
             also(FROM_START.format(ACE_NAME), ACE(max_sweeps=SWEEPS), zeroed)
             also(FROM_START.format(MLR_NAME), LeastSquares(), zeroed)
         also("ace-monotone", MonotoneACE(), zeroed)
-        fits["dynamic"], estimates["dynamic"] = _dynamic(recordings, zeroed)
+        # the same temperatures, and the spindle speed where there is one
+        speeds = [c.name for c in recordings[0].of_quantity("spindle_speed")]
+        timed = [common.stacked(r, [target], [*(c.name for c in learned.inputs), *speeds]) for r in parts]
+        memory = DynamicRidge(speed=speeds, time="routed")
+        also("dynamic", memory, timed, support=Support(), dt=timed[0].dt(), cycle=timed[0].cycle)
     return Trial(learned, unseen, ace, estimates, fits, flagged)
-
-
-def _dynamic(recordings: Sequence[Recording], zeroed: tuple[Samples, Samples]) -> tuple[FloatArray, FloatArray]:
-    """Fit `dynamic` to the same temperatures, and the spindle speed where there is one."""
-    speeds = [c.name for c in recordings[0].of_quantity("spindle_speed")]
-    names = [*(c.name for c in zeroed[0].inputs), *speeds]
-    target = zeroed[0].targets[0].name
-    learned, unseen = (
-        stack(r, [target], names, zeroing=FIRST_READING, starts=COLD) for r in (recordings[:-1], recordings[-1:])
-    )
-    (model,) = fitted(
-        DynamicRidge(speed=speeds, time="routed"),
-        learned,
-        [target],
-        support=Support(),
-        dt=learned.dt(),
-        cycle=learned.cycle,
-    ).values()
-    return predicted(model, learned), predicted(model, unseen)
 
 
 def loop_width(samples: Samples, steps: int = 20) -> float:
@@ -301,24 +267,14 @@ def loop_width(samples: Samples, steps: int = 20) -> float:
     return min(widths) / float(np.ptp(y))
 
 
-def series(samples: Samples, values: FloatArray, labels: Sequence[str], *, points: bool = False) -> list[Curve]:
-    """Return columns of values over the hours of a test, or over the number of the measuring point.
+def points(samples: Samples) -> FloatArray:
+    """Return the number of each measuring point."""
+    return np.arange(1, len(samples) + 1, dtype=np.float64)
 
-    Parameters
-    ----------
-    samples : Samples
-    values : ndarray of shape (n_rows, n_columns)
-    labels : sequence of str
-        One per column.
-    points : bool
-        True: over the number of the measuring point.
 
-    Returns
-    -------
-    list of Curve
-    """
-    x = np.arange(1, len(samples) + 1, dtype=np.float64) if points else samples.time / 3600
-    return [Curve(label, x, column) for label, column in zip(labels, values.T, strict=True)]
+def named(samples: Samples) -> dict[str, FloatArray]:
+    """Return the temperatures by their place, as the paper calls it."""
+    return {place(c.name): column for c, column in zip(samples.inputs, samples.values.T, strict=True)}
 
 
 def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> list[Panel]:
@@ -336,37 +292,22 @@ def recorded(recordings: Sequence[Recording], temperatures: Sequence[int]) -> li
     list of Panel
     """
     first = recordings[0]
-    chosen = [first.temperatures[j] for j in temperatures]
-    everything = stack(
-        recordings,
-        [c.name for c in first.displacements],
-        [c.name for c in chosen],
-        rezero=False,
-        zeroing=FIRST_READING,
-        starts=COLD,
-    )
-    names = [place(c.name) for c in chosen], [place(c.name) for c in first.displacements]
+    names = [c.name for c in first.displacements], [first.temperatures[j].name for j in temperatures]
+    shown = common.stacked(recordings, *names, rezero=False)
+    moved = {place(c.name): column for c, column in zip(shown.targets, shown.deviations.T, strict=True)}
     return [
-        Panel(
-            "", "measuring point", "temperature [degC]", series(everything, everything.values, names[0], points=True)
-        ),
-        Panel(
-            "", "measuring point", "displacement [um]", series(everything, everything.deviations, names[1], points=True)
-        ),
+        Panel("", "measuring point", y, curves(points(shown), values))
+        for y, values in (("temperature [degC]", named(shown)), ("displacement [um]", moved))
     ]
 
 
+def loops(samples: Samples) -> list[Panel]:
+    """Return the displacement against each temperature: what is open in these curves is the hysteresis."""
+    axis, y = f"{place(samples.targets[0].name)} [um]", samples.deviations[:, 0]
+    return [Panel("", f"{name} [degC]", axis, curves(x, {"": y})) for name, x in named(samples).items()]
+
+
 def place(channel: str) -> str:
-    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1.
-
-    Parameters
-    ----------
-    channel : str
-        Name of a channel.
-
-    Returns
-    -------
-    str
-    """
+    """Return the place in a channel's name, as the paper calls it: ``t_t1_C`` is T1."""
     short = channel.removeprefix("t_").rpartition("_")[0]
     return short.upper() if short[:1] in "ts" and short[1:].isdigit() else short

@@ -1,0 +1,88 @@
+"""What the studies draw alike: curves over the same axis, figures of one panel, tests one after the other."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from thermocomp.papers.study import Curve, Figure, FloatArray, Panel, Style
+from thermocomp.recording.samples import Samples
+
+
+def curves(
+    x: FloatArray,
+    values: Mapping[str, FloatArray],
+    style: Style = "line",
+    *,
+    dashed: Sequence[str] = (),
+    points: Sequence[str] = (),
+) -> list[Curve]:
+    """Return curves over the same x.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n,)
+    values : mapping of str to ndarray of shape (n,)
+        By their label.
+    style : {'line', 'dashed', 'points'}
+        Of those that are not named further on.
+    dashed, points : sequence of str
+        Labels of curves drawn so.
+
+    Returns
+    -------
+    list of Curve
+    """
+    styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
+    styles.update(dict.fromkeys(points, "points"))
+    return [Curve(label, x, y, styles.get(label, style)) for label, y in values.items()]
+
+
+def single(
+    key: str, caption: str, axes: tuple[str, str], curves: Sequence[Curve], *, title: str = "", columns: int = 1
+) -> Figure:
+    """Return a figure with one panel.
+
+    Parameters
+    ----------
+    key, caption : str
+        See `thermocomp.papers.study.Figure`.
+    axes : tuple of str
+        What stands at x and y.
+    curves : sequence of Curve
+    title : str
+        Of the panel.
+    columns : int
+        Of 2 it fills one.
+
+    Returns
+    -------
+    Figure
+    """
+    return Figure(key, caption, [Panel(title, *axes, curves)], columns)
+
+
+def end_to_end(samples: Samples, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Put the tests of samples one after the other on one axis of time, with a break in the line between them.
+
+    Parameters
+    ----------
+    samples : Samples
+    values : ndarray of shape (n_rows,)
+
+    Returns
+    -------
+    hours, values : ndarray of shape (n_rows + n_tests - 1,)
+        A nan between two tests.
+    """
+    x: list[FloatArray] = []
+    y: list[FloatArray] = []
+    begin = 0.0
+    for test in dict.fromkeys(samples.test.tolist()):
+        mine = samples.test == test
+        if x:
+            x.append(np.array([begin]))
+            y.append(np.array([np.nan]))
+        x.append(begin + samples.time[mine] / 3600.0)
+        y.append(values[mine])
+        begin = float(x[-1][-1])
+    return np.concatenate(x), np.concatenate(y)
