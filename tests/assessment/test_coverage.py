@@ -89,7 +89,7 @@ def test_an_idle_sensor_makes_no_two_tests_different() -> None:
 
 def test_one_test_at_two_rates_is_one() -> None:
     plain = small_machine()
-    thin = replace(plain, name="thin", table=plain.table.iloc[::3].reset_index(drop=True))
+    thin = Recording.from_dataframe(plain.table.assign(time_s=plain.time).iloc[::3], name="thin")
     assert covered([plain, thin], "files").independent == 1
 
 
