@@ -152,9 +152,9 @@ def revise(program: Path, proof: str) -> dict[str, float]:
 
 def revisions() -> bool:
     """Revise programs of growing length and say whether their memory is bounded."""
-    from thermocomp.adapters.linuxcnc.rs274 import installed
+    from thermocomp.adapters.linuxcnc.rs274 import find_obstacle
 
-    jobs = [(size, "unproved") for size in SIZES] + ([(PROVED, "proved")] if installed() is None else [])
+    jobs = [(size, "unproved") for size in SIZES] + ([(PROVED, "proved")] if find_obstacle() is None else [])
     memory: dict[tuple[int, str], float] = {}
     reached = True
     print(f"{'revise':<32} {'lines':>9} {'us/line':>8} {'CPU':>6} {'changed':>9} {'proof us/line':>14} {'MB':>5}")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench_stepwise import network
-from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.selection.subsetrun import run
 from thermocomp.models.selection.subsets import Subsets, best_subsets
 from thermocomp.models.selection.subsetsearch import Problem
@@ -77,7 +77,7 @@ def compare(p: int, seed: int, repeats: tuple[int, int], goal: float, ratio: flo
     X, y = network(N_ROWS, p, seed, bending=0.0)
 
     def search() -> None:
-        run(Problem.of(triangle(table(X, y), intercept=True), range(p)), "dropping", p, 1, 1, None, None, None)
+        run(Problem.of(triangle(join_columns(X, y), intercept=True), range(p)), "dropping", p, 1, 1, None, None, None)
 
     found = best_subsets(X, y)
     ours, whole = timed(search, repeats[0]), timed(lambda: best_subsets(X, y), max(repeats[0] // 5, 1))

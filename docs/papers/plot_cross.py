@@ -17,7 +17,7 @@ from thermocomp.report import papers as page
 study = cross.run(0)
 numbers = study.numbers
 overview, *details = study.tables
-print(page.laid_out(overview))
+print(page.format_table(overview))
 assert numbers["chen1996, z_um, dynamic: rms_um"] < 0.2 * numbers["chen1996, z_um, none: rms_um"]
 
 # %%
@@ -25,9 +25,9 @@ assert numbers["chen1996, z_um, dynamic: rms_um"] < 0.2 * numbers["chen1996, z_u
 # the last ones before trusting any of them: what noise does, and what the worst sensor does if it reads no rise at all
 # and nobody notices.
 
-print(page.laid_out(details[0]))
+print(page.format_table(details[0]))
 print()
-print(page.laid_out(details[-1]))
+print(page.format_table(details[-1]))
 
 # %%
 # The same as a picture: what is left of the drift.

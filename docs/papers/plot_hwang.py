@@ -64,7 +64,7 @@ print(page.text(study, "H-05", "H-06", "H-15"))
 
 draw("hwang-fig5")
 print(page.text(study, "H-13", "E-C12"))
-print(page.laid_out(study.tables[3]))
+print(page.format_table(study.tables[3]))
 assert numbers["r_squared"] > 0.95
 assert numbers["rms_new_um"] < 0.2 * numbers["rms_new_none_um"]
 
@@ -76,7 +76,7 @@ assert numbers["rms_new_um"] < 0.2 * numbers["rms_new_none_um"]
 # variance goes with the sum of 1/eigenvalue of X'X. Grouping is meant to help against that.
 
 print(page.text(study, "H-16", "H-17"))
-print(page.laid_out(study.tables[1]))
+print(page.format_table(study.tables[1]))
 assert numbers["smallest_eigenvalue_degC2"] > numbers["smallest_eigenvalue_without_grouping_degC2"] > 0
 
 # %%
@@ -94,5 +94,5 @@ draw("hwang-thresholds")
 
 draw("hwang-fig6")
 print(page.text(study, "H-18"))
-print(page.laid_out(study.tables[2]))
+print(page.format_table(study.tables[2]))
 assert numbers["std_r_squared_linear"] < 0.1

@@ -41,9 +41,9 @@ print(page.headline(study))
 # one step ahead, made worse for every coefficient.
 
 print(page.text(study, "P-02"))
-print(page.laid_out(study.tables[0]))
+print(page.format_table(study.tables[0]))
 print()
-print(page.laid_out(study.tables[2]))
+print(page.format_table(study.tables[2]))
 assert numbers["k"] >= 1
 
 # %%
@@ -86,9 +86,9 @@ assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_differenc
 # other spindle speeds, four more faces. It is revised as a file, read back as a controller reads it, and what it
 # commands is added to the true drift of that moment and place.
 
-print(page.laid_out(study.tables[4]))
+print(page.format_table(study.tables[4]))
 print()
-print(page.laid_out(study.tables[5]))
+print(page.format_table(study.tables[5]))
 draw("precompensation-surfaces")
 assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["program_depth_difference_cold_um"]
 
@@ -106,7 +106,7 @@ assert numbers["room_peak_to_peak_um"] > 1
 # The same with NC programs: a start state that is wrong by half an hour does more harm than no revision; the state that
 # the last job has left does none.
 
-print(page.laid_out(study.tables[6]))
+print(page.format_table(study.tables[6]))
 draw("precompensation-programs")
 wrong, carried = (
     numbers[f"program_depth_difference_warm_{what}_revised_um"] for what in ("taken_for_cold", "carried_over")

@@ -48,7 +48,7 @@ assert numbers["temperatures"] == 24
 # A temperature enters with a partial F of 100 or more, and leaves below 50.
 
 print(page.text(study, "T-01", "T-03", "T-06"))
-print(page.laid_out(study.tables[0]))
+print(page.format_table(study.tables[0]))
 assert 1 <= numbers["chosen"] < 24
 
 # %%
@@ -59,7 +59,7 @@ assert 1 <= numbers["chosen"] < 24
 
 draw("stepwise2017-fig6")
 print(page.text(study, "T-08", "T-10"))
-print(page.laid_out(study.tables[1]))
+print(page.format_table(study.tables[1]))
 assert numbers["rms_online_um"] < 0.5 * numbers["rms_online_none_um"]
 
 # %%
@@ -79,5 +79,5 @@ print(page.text(study, "E-T5"))
 
 draw("stepwise2017-rows")
 print(page.text(study, "E-T3", "E-C12"))
-print(page.laid_out(study.tables[2]))
+print(page.format_table(study.tables[2]))
 assert numbers["chosen_of_fewest_rows"] <= numbers["chosen"]

@@ -33,7 +33,7 @@ def draw(key: str) -> None:
 
 def show(*numbers: int) -> None:
     """Print tables of the study."""
-    print("\n\n".join(page.laid_out(study.tables[n]) for n in numbers))
+    print("\n\n".join(page.format_table(study.tables[n]) for n in numbers))
 
 
 print(page.headline(study))

@@ -22,7 +22,7 @@ from thermocomp.datasets import virtual
 from thermocomp.files import codecolumns
 from thermocomp.files.profiles import from_recording
 from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import suited
+from thermocomp.models.positionoptions import fill_options
 from thermocomp.models.training import train
 from thermocomp.recording.samples import stack
 from thermocomp.simulation.centre import MachiningCentre
@@ -50,16 +50,16 @@ assert len(codes) == 18
 # 2. From profiles to components
 # ------------------------------
 #
-# `~thermocomp.models.positionoptions.suited` looks at the profiles, never at a temperature, and says what each of them
-# asks for: how many powers of the position move with the temperatures (none, if heat does nothing but noise), whether
-# the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and the slopes are
-# learned from the temperatures. These are absolute: a laser reads the machine as it is that morning, and mornings
-# differ.
+# `~thermocomp.models.positionoptions.fill_options` looks at the profiles, never at a temperature, and says what each of
+# them asks for: how many powers of the position move with the temperatures (none, if heat does nothing but noise),
+# whether the profile shifts as a whole, and about which position it turns. Then the cold profile is fitted, and
+# the slopes are learned from the temperatures. These are absolute: a laser reads the machine as it is that
+# morning, and mornings differ.
 
 fits = {}
 for code in codes:
     profiles = [from_recording(t, code) for t in tests]
-    options = suited(profiles, PositionOptions(method="dynamic", rezero=False))
+    options = fill_options(profiles, PositionOptions(method="dynamic", rezero=False))
     fits[code] = fit_position(profiles, options)
 
 print(f"{'':5} {'powers':8} {'about':>6}  {'thermal part':>12}  left")
@@ -104,8 +104,8 @@ print(len(components), "of 32 components,", len(model.inputs), "inputs")
 # Other weather, speeds and feed rates. The model is replayed over it, reading by reading, from temperatures and speed
 # alone.
 
-day = next(simulate(virtual.find("volumetric-new"), seed=5, whole=True))
-unseen = virtual.recording(day)
+day = next(simulate(virtual.find_experiment("volumetric-new"), seed=5, whole=True))
+unseen = virtual.make_recording(day)
 states = model.replay(unseen.time, {name: unseen.table[name].to_numpy() for name in model.inputs})
 hours = unseen.time / 3600
 print(f"{len(unseen)} rows, {hours[-1]:.1f} h")

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.adapters.linuxcnc.expansion.expand import expand
-from thermocomp.adapters.linuxcnc.expansion.proof import compare, kept
+from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.adapters.linuxcnc.rs274 import HIGHEST_TOOL, Stored, read
 from thermocomp.core.exceptions import InputError, ProgramError
 
@@ -283,9 +283,9 @@ def test_the_proof_tells_a_full_circle_from_none(tmp_path: Path) -> None:
 
 
 def test_the_proof_looks_at_what_is_left_in_the_controller() -> None:
-    kept({5221: 1.0, 100: 5.0, 5162: 0.0}, {5221: 1.0})
+    compare_parameters({5221: 1.0, 100: 5.0, 5162: 0.0}, {5221: 1.0})
     with pytest.raises(ProgramError, match="another parameter #5221"):
-        kept({5221: 1.0}, {5221: 1.00001})
+        compare_parameters({5221: 1.0}, {5221: 1.00001})
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,11 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.parser.tokens import split_lines
-from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.frame import Vector
-from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import Revised, Revision
 from thermocomp.nc.rewrite.text import DIGITS
@@ -38,7 +38,7 @@ class Trial(NamedTuple):
     ledger: Ledger
 
 
-def method(way: str) -> Method:
+def method(way: str) -> CorrectionMethod:
     digits = DIGITS["fanuc"]
     return Coordinates(digits, 1.0, helix=False) if way == "coordinates" else Offset(digits, 1.0, safe_z=5.0)
 
@@ -47,7 +47,7 @@ def revise(path: Path, folder: Path, way: str) -> Trial:
     """Write a program out and revise it by a drift that grows fast; `ProgramError` if it is refused."""
     lines = [text for text, _ in unroll(split_lines(path.read_text("ascii")), SETUP)]
     drift = Growing(rate=(0.3, -0.2, 0.6), slope=0.0)
-    run = Revision(SETUP, Kinematics(), drift, method(way), Demand(1.0, None))
+    run = Revision(SETUP, MotionLimits(), drift, method(way), Demand(1.0, None))
     ledger, rows = Ledger(), []
     for row in run.revise(lines):
         ledger.take(row)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.verification.states import stated
+from thermocomp.adapters.linuxcnc.verification.states import build_stored
 from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Shift, prove
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Block, Modal, Setup
@@ -83,7 +83,7 @@ def test_a_ramp_takes_little_room() -> None:
 
 def test_what_stands_at_the_controller() -> None:
     setup = Setup(offsets={1: (1.0, 2.0, 3.0), 103: (9.0, 9.0, 9.0)}, tools={4: 120.0}, home=(0.0, 0.0, 400.0))
-    given = stated(setup)
+    given = build_stored(setup)
     assert given.origins == {1: (1.0, 2.0, 3.0)}
     assert given.lengths == {4: 120.0}
     assert given.home28 == (0.0, 0.0, 400.0)
@@ -233,6 +233,6 @@ def test_an_original_that_is_not_run_proves_nothing(tmp_path: Path) -> None:
 
 
 def test_without_the_interpreter_nothing_is_proved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rs274, "installed", lambda: "it is not here")
+    monkeypatch.setattr(rs274, "find_obstacle", lambda: "it is not here")
     with pytest.raises(InputError, match="it is not here"):
         prove(*write(tmp_path, "M2\n", "M2\n"), Ledger(), Setup())

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.adapters.linuxcnc import rs274, rs274process
-from thermocomp.adapters.linuxcnc.rs274 import Canonical, Frame, Stored, read
+from thermocomp.adapters.linuxcnc.rs274 import Canonical, ProgramFrame, Stored, read
 from thermocomp.core.exceptions import InputError, ProgramError
 
 pytestmark = pytest.mark.usefixtures("interpreter")
@@ -225,18 +225,18 @@ def test_the_child_dies_with_the_reader(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_why_it_cannot_be_used(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert rs274.installed() is None
+    assert rs274.find_obstacle() is None
     monkeypatch.setattr(rs274process, "PYTHON", tmp_path / "python3")
-    assert "install the Debian package linuxcnc-uspace" in str(rs274.installed.__wrapped__())
+    assert "install the Debian package linuxcnc-uspace" in str(rs274.find_obstacle.__wrapped__())
     (tmp_path / "python3").symlink_to("/usr/bin/false")
-    assert "cannot import gcode" in str(rs274.installed.__wrapped__())
+    assert "cannot import gcode" in str(rs274.find_obstacle.__wrapped__())
     monkeypatch.setattr(rs274process, "PYTHON", Path("/usr/bin/python3"))
     child = tmp_path / "mute.py"
     rows = "RECORD.pack(RAPID, 9, 7, *(0.0,) * 10), RECORD.pack(CODES['done'], 0, 0, *(0.0,) * 10)"
     end = "os.write(1, struct.pack('<II', 0, 3) + b'[0]')"
     child.write_text(f"{TELLS}tell({rows})\n{end}\n", encoding="ascii")
     monkeypatch.setattr(rs274process, "CHILD", child)
-    assert "does not tell of end, m3, m5, speed" in str(rs274.installed.__wrapped__())
+    assert "does not tell of end, m3, m5, speed" in str(rs274.find_obstacle.__wrapped__())
 
 
 def test_no_such_file(tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ place = st.tuples(*[coordinate] * 9)
 
 @given(place, place, place, place, st.floats(-360, 360))
 def test_frame_there_and_back(origin: Any, shift: Any, length: Any, point: Any, angle: float) -> None:
-    frame = Frame()
+    frame = ProgramFrame()
     for kind, values in (("g5x", (2.0, *origin)), ("g92", shift), ("length", length), ("rotation", (angle,))):
         frame.take(kind, values)
     assert frame.system == 2
@@ -298,7 +298,7 @@ def test_nothing_beside_a_program_is_run(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setenv("PYTHONSTARTUP", str(tmp_path / "gcode.py"))
     path = tmp_path / "p.ngc"
     path.write_text("G21\nM101\nG0 X1\n(LOGOPEN,mark)\n(LOG,x)\n(PROBEOPEN mark)\nM2\n", encoding="ascii")
-    assert rs274.installed.__wrapped__() is None
+    assert rs274.find_obstacle.__wrapped__() is None
     assert [c.kind for c in read(path) if c.kind in ("user", "rapid")] == ["user", "rapid"]
     assert not mark.exists()
     assert {f.name for f in tmp_path.iterdir()} == {
@@ -318,8 +318,8 @@ def test_python_in_a_comment_is_not_run(run: Run, tmp_path: Path, comment: str) 
 def test_states_of_one_program_are_run_by_one_child(tmp_path: Path) -> None:
     path = tmp_path / "p.ngc"
     path.write_text("G21\nG54 G0 X1\n#5221 = 7\nM2\n", encoding="ascii")
-    jobs = [rs274process.Job(path, Stored(origins={1: (x,)})) for x in (1.0, 2.0)]
-    with rs274process.Run(*jobs) as running:
+    jobs = [rs274process.InterpreterJob(path, Stored(origins={1: (x,)})) for x in (1.0, 2.0)]
+    with rs274process.InterpreterRun(*jobs) as running:
         for _ in jobs:
             kinds = [code for block in running.blocks() for code in block.records["kind"].tolist()]
             assert kinds[-1] == running.codes["done"]

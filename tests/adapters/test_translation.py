@@ -13,7 +13,7 @@ from thermocomp.adapters.linuxcnc.verification.translation import Translator, Un
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import PLANES, Block, Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 pytestmark = pytest.mark.usefixtures("interpreter")
@@ -89,7 +89,7 @@ def joined(moves: list[Went]) -> list[Went]:
 def agrees(text: str, folder: Path, setup: Setup = SETUP) -> int:
     """Compare what the two make of a program; return how much there was to compare."""
     lines = [line for line, _ in unroll(split_lines(text), setup)]
-    blocks = list(follow(read_lines(lines, "fanuc"), setup))
+    blocks = list(follow_program(read_lines(lines, "fanuc"), setup))
     translator = Translator(setup)
     told = list(translator.translate(lines))
     path = folder / "translated.ngc"

@@ -9,8 +9,8 @@ from smallmachine import small_machine
 
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.compare import ALL, compare, judge, n_pieces
-from thermocomp.assessment.replay import replay, run
-from thermocomp.assessment.robustness import Robustness, pooled, stress
+from thermocomp.assessment.replay import replay, replay_compensated
+from thermocomp.assessment.robustness import Robustness, pool_robustness, stress
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
@@ -222,7 +222,7 @@ def test_a_slowly_recorded_test_does_not_hold_the_compensator_back(recording: Re
     samples = stack([sparse], ["z_um"])
     model = train("ols", samples, 0, np.ones(len(samples), np.bool_)).model
     everything = np.ones(len(samples), np.bool_)
-    ran = run(model, samples, everything, Limits(rate=0.1))
+    ran = replay_compensated(model, samples, everything, Limits(rate=0.1))
     assert np.abs(np.diff(ran.deviation)).max() > 0.1 * 60.0  # the travel of one reading that comes on time
     assert np.array_equal(ran.compensated[1:], ran.deviation[1:])
 
@@ -234,7 +234,7 @@ def test_an_angle_has_no_limits_of_micrometres(recording: Recording) -> None:
     samples = stack([tilt], ["z_urad"])
     everything = np.ones(len(samples), np.bool_)
     model = train("dynamic", samples, 0, everything).model
-    ran = run(model, samples, everything, Limits(magnitude=0.01))
+    ran = replay_compensated(model, samples, everything, Limits(magnitude=0.01))
     assert ran.limits is None
     assert np.array_equal(ran.compensated, ran.deviation)
 
@@ -277,7 +277,7 @@ def test_what_makes_a_model_worse_than_none_is_named() -> None:
     assert sensors.harm.endswith("loss of c (9.00 um), loss of b (4.50 um), loss of a (3.50 um)")
     assert sensors.worse_than_none[1:] == ("loss of c", "loss of b", "loss of a")
     # several blocks: of all their rows together
-    together = pooled([(found(3.1, 2.0), 100), (found(1.0, 1.0, 9.0), 100)])
+    together = pool_robustness([(found(3.1, 2.0), 100), (found(1.0, 1.0, 9.0), 100)])
     assert together is not None
     assert together.none_rms == pytest.approx(np.sqrt((9 + 81) / 2))
     assert together.worse_than_none == ()

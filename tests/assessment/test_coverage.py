@@ -26,7 +26,7 @@ def with_room(start: str = "2024-03-01T20:00:00") -> Recording:
 def covered(recordings: list[Recording], judging: str = "cycles") -> Validity:
     samples = stack(recordings, ["z_um"])
     by = {"cycles": splits.leave_one_cycle_out, "files": splits.leave_one_file_out}[judging]
-    return coverage.cover(samples, by(samples), recordings)
+    return coverage.find_validity(samples, by(samples), recordings)
 
 
 def test_conditions_are_found_again() -> None:
@@ -46,7 +46,7 @@ def test_conditions_are_found_again() -> None:
 def test_only_what_was_judged_counts() -> None:
     recording = with_room()
     samples = stack([recording], ["z_um"])
-    last = coverage.cover(samples, splits.parse("0.75/0.25", samples), [recording])
+    last = coverage.find_validity(samples, splits.parse("0.75/0.25", samples), [recording])
     assert (last.units, last.independent, last.nearest) == (1, 1, None)
     assert last.speeds == (0.0, 3000.0)
     assert last.ambient is not None
@@ -118,7 +118,7 @@ def test_constant_inputs_and_no_units_are_no_trouble() -> None:
     assert found.days == 0
     assert found.ambient is None
     samples = stack([plain], ["z_um"])
-    nothing = coverage.cover(samples, splits.Judging("none", ()))
+    nothing = coverage.find_validity(samples, splits.Judging("none", ()))
     assert (nothing.units, nothing.independent, nothing.hours) == (0, 0, 0.0)
     with pytest.raises(InputError, match="5 independent of 4"):
         replace(found, independent=5)
@@ -127,7 +127,7 @@ def test_constant_inputs_and_no_units_are_no_trouble() -> None:
 def test_the_model_file_carries_it_and_assess_tells_both(samples: Samples, recording: Recording) -> None:
     judging = splits.leave_one_cycle_out(samples)
     (first, *_) = fitted = study.fit(samples, "ols", judging, recordings=[recording]).models
-    assert first.validity == coverage.cover(samples, judging, [recording])
+    assert first.validity == coverage.find_validity(samples, judging, [recording])
     assert modelfile.loads(modelfile.dumps(fitted)) == fitted
     other = replace(small_machine([2000.0, 900.0], seed=9), name="other")
     judged = study.assess(fitted, [other])

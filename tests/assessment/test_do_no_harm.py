@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from thermocomp.assessment import do_no_harm
-from thermocomp.assessment.do_no_harm import Unit, Verdict, holm, margin_of, measure, together
+from thermocomp.assessment.do_no_harm import JudgedUnit, Verdict, holm, join_verdicts, margin_of, measure
 from thermocomp.core.learned import Learned, probe_noise
 
 FloatArray = NDArray[np.float64]
@@ -23,7 +23,7 @@ def drift(size: float = 20.0, n: int = 200) -> FloatArray:
     return size * np.sin(np.linspace(0, 7, n))
 
 
-def unit(left: float, name: str = "a", size: float = 20.0) -> Unit:
+def unit(left: float, name: str = "a", size: float = 20.0) -> JudgedUnit:
     """A unit of which a model leaves a share."""
     return measure(name, drift(size), (1 - left) * drift(size), NOTHING)
 
@@ -168,7 +168,7 @@ def test_correction_takes_a_lucky_one_back() -> None:
 
 def test_together_keeps_caps_and_refusals() -> None:
     parts = [Verdict((unit(0.1, "a"),)), Verdict((unit(0.2, "b"),), caps=("c",)), Verdict((), refusal="r")]
-    whole = together(parts)
+    whole = join_verdicts(parts)
     assert [u.name for u in whole.units] == ["a", "b"]
     assert (whole.caps, whole.refusal) == (("c",), "r")
 

@@ -10,11 +10,11 @@ from smallmachine import small_machine
 from thermocomp.assessment import splits, study
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare
-from thermocomp.assessment.leaks import learned_from
+from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.selecting import select
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.recording.cycles import Cycle, find_cycles, whole
+from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD, Start
@@ -117,7 +117,7 @@ def test_what_little_is_left_of_a_copy_is_no_test(models: tuple[ErrorModel, ...]
     day = small_machine(DAY, seed=5).table
     for rows, honest in ((30, False), (100, True)):
         long = of(pd.concat([recording.table, day.iloc[:rows]], ignore_index=True), recording)
-        known = learned_from(models[0], stack([long], ["z_um"]))
+        known = find_learned_rows(models[0], stack([long], ["z_um"]))
         assert known.all() != honest
         assert known[:800].all()
 
@@ -125,7 +125,7 @@ def test_what_little_is_left_of_a_copy_is_no_test(models: tuple[ErrorModel, ...]
 def test_other_days_are_judged_whole(models: tuple[ErrorModel, ...]) -> None:
     for seed in range(1, 40):
         samples = stack([small_machine(seed=seed)], ["z_um"])
-        assert not learned_from(models[0], samples).any()
+        assert not find_learned_rows(models[0], samples).any()
 
 
 def repeated(recording: Recording, first: int, stop: int) -> Recording:
@@ -159,7 +159,7 @@ def test_a_stretch_that_comes_twice_within_what_is_learned_or_judged_is_no_leak(
 
 def test_two_files_that_share_rows_are_refused_with_both_names(recording: Recording) -> None:
     other = replace(after(small_machine(DAY, seed=5), of(recording.table.iloc[300:500], recording)), name="other")
-    tests = [replace(r, cycles=whole(len(r))) for r in (recording, other)]
+    tests = [replace(r, cycles=make_single_cycle(len(r))) for r in (recording, other)]
     samples = samples_of(*tests)
     with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small, about"):
         compare(samples, ["ols"], splits.leave_one_file_out(samples))

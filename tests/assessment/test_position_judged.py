@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Support
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import SETTINGS, suited
+from thermocomp.models.positionoptions import SETTINGS, fill_options
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.profiles import Profiles
 
@@ -164,7 +164,7 @@ def test_settings_left_open_are_chosen_in_each_split_from_what_is_learned_there(
     found = study(made, OLS, left_open=SETTINGS)
     assert found.options.slopes == 2
     assert len(found.fit.model.slopes) == 2
-    others = suited(made, OLS, learn=~last)
+    others = fill_options(made, OLS, learn=~last)
     assert others.slopes == 1
     blind = fit_position(made, others, learn=~last)
     change = (made.states.table - made.states.table.iloc[0]).to_numpy()[last]
@@ -211,7 +211,7 @@ def test_a_thermal_part_that_is_refused_leaves_the_cold_profile() -> None:
     slope = np.concatenate([[0.0], 1.5 * rng.normal(size=71)])
     wild = replace(made, values=made.cold() + np.outer(slope, 1e-3 * made.position) + 20.0)
     options = PositionOptions(method="ols")
-    assert suited(wild, options).slopes == 1
+    assert fill_options(wild, options).slopes == 1
     refused = study(wild, options)
     assert not refused.assessment.accepted
     found = study(wild, options, left_open=SETTINGS)

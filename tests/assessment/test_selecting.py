@@ -7,7 +7,7 @@ import pytest
 from smallmachine import crowded_machine
 
 from thermocomp.assessment import selecting, splits
-from thermocomp.assessment.choice import Choice, Settings, Table, written
+from thermocomp.assessment.choice import Choice, Settings, Table, format_cell
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection import subsetsearch
@@ -124,7 +124,7 @@ def test_nothing_to_choose_from_is_an_error() -> None:
 
 
 def test_cells_as_text() -> None:
-    assert [written(c) for c in (None, float("nan"), 3, 0.123456, 1e6, "t1_C")] == [
+    assert [format_cell(c) for c in (None, float("nan"), 3, 0.123456, 1e6, "t1_C")] == [
         "",
         "",
         "3",

@@ -57,9 +57,11 @@ def test_cycles_too_short_to_judge_by_go_with_the_one_before() -> None:
             cycle += [k] * rows
             test += [n] * rows
             k += 1
-    found = splits.stretches(np.array(cycle), np.array(test), least=20)
+    found = splits.join_short_cycles(np.array(cycle), np.array(test), least=20)
     assert [block.tolist() for block in found] == [[0, 1, 2, 3], [4, 5], [6, 7], [8], [9]]
-    assert [b.tolist() for b in splits.stretches(np.array(cycle), np.array(test), least=1)] == [[j] for j in range(k)]
+    assert [b.tolist() for b in splits.join_short_cycles(np.array(cycle), np.array(test), least=1)] == [
+        [j] for j in range(k)
+    ]
 
 
 def test_short_cycles_are_left_out_together(recording: Recording) -> None:

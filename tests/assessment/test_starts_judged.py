@@ -12,7 +12,7 @@ from smallmachine import small_machine
 
 from thermocomp.assessment import study
 from thermocomp.assessment.compare import judge
-from thermocomp.assessment.replay import replay, run
+from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import stress
 from thermocomp.assessment.splits import Split, by_rows, by_time, leave_one_cycle_out
 from thermocomp.core.correction import Limits
@@ -78,8 +78,8 @@ def test_a_continuation_is_the_whole(method: str, row: int, limits: Limits) -> N
     everything = np.ones(len(whole), np.bool_)
     assert own.sum() == len(second)
     assert late.row[own].tolist() == list(range(len(second)))
-    full, ran = replay(model, whole, everything)[0], run(model, whole, everything, limits)
-    part, part_ran = replay(model, late, own)[0], run(model, late, own, limits)
+    full, ran = replay(model, whole, everything)[0], replay_compensated(model, whole, everything, limits)
+    part, part_ran = replay(model, late, own)[0], replay_compensated(model, late, own, limits)
     assert np.abs(part - full[row:]).max() <= 1e-9
     assert np.abs(part_ran.deviation - ran.deviation[row:]).max() <= 1e-9
     assert np.abs(part_ran.compensated - ran.compensated[row:]).max() <= 1e-9
@@ -98,7 +98,7 @@ def test_begun_anew_it_would_be_wrong(method: str) -> None:
     }.items():
         samples = stack([second], [TARGET], starts=start)
         own = samples.cycle >= 0
-        ran = run(model, samples, own)
+        ran = replay_compensated(model, samples, own)
         rms[name] = float(np.sqrt(np.mean((samples.deviations[own, 0] - ran.deviation) ** 2)))
     assert abs(measured[0]) > 10.0
     assert rms["cold"] > 3 * rms["continued"]
@@ -118,7 +118,7 @@ def test_rezeroed_is_counted_from_there(method: str, known: bool) -> None:
         window = list(range(6))
     raw = second.table[TARGET].to_numpy()
     assert samples.deviations[own, 0] == pytest.approx(raw - raw[window].mean(), abs=0.2)
-    ran = run(model, samples, own)
+    ran = replay_compensated(model, samples, own)
     assert ran.deviation[window].mean() == pytest.approx(0.0, abs=1e-9)
     assert replay(model, samples, own)[0] == pytest.approx(ran.deviation, abs=1e-9)
     assert (ran.compensated[: len(window) - 1] == 0.0).all()
@@ -138,7 +138,7 @@ def test_a_known_zero_is_counted_from() -> None:
     everything = np.ones(len(samples), np.bool_)
     full, _ = replay(model, whole, np.ones(len(whole), np.bool_))  # without memory: nothing but the zero is needed
     assert replay(model, samples, everything)[0] == pytest.approx(full[200:], abs=1e-9)
-    assert run(model, samples, everything).deviation == pytest.approx(full[200:], abs=1e-9)
+    assert replay_compensated(model, samples, everything).deviation == pytest.approx(full[200:], abs=1e-9)
     assert samples.reference()[0].tolist() == whole.reference()[0].tolist()
     del zero["t2_C"]
     with pytest.raises(InputError, match="the known zero does not tell t2_C"):
@@ -155,7 +155,7 @@ def test_assess_of_the_second_half_is_the_replay_of_the_whole() -> None:
     (found,) = judged.overall()
     whole = stack([resting()], [TARGET])
     assert found.predicted == pytest.approx(
-        run(models[0], whole, np.ones(len(whole), np.bool_)).compensated[310:], abs=1e-9
+        replay_compensated(models[0], whole, np.ones(len(whole), np.bool_)).compensated[310:], abs=1e-9
     )
     assert found.measured.tolist() == second.table[TARGET].tolist()
     with pytest.raises(InputError, match=r"b: z_um begins at \d+\.\d um, so it was not zeroed"):
@@ -173,7 +173,10 @@ def test_a_thermal_test_that_goes_on() -> None:
     (z,) = (c for c in test.curves if c.name == TARGET)
     assert z.after is not None
     whole = stack([resting()], [TARGET])
-    left = resting().table[TARGET].to_numpy() - run(models[0], whole, np.ones(len(whole), np.bool_)).compensated
+    left = (
+        resting().table[TARGET].to_numpy()
+        - replay_compensated(models[0], whole, np.ones(len(whole), np.bool_)).compensated
+    )
     assert z.after - z.after[0] == pytest.approx(left[260:] - left[260], abs=1e-9)
     assert any(n.startswith("b: continued from a (") and "at most 500 um" in n for n in test.notes)
 

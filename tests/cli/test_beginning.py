@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment.replay import run as replayed
+from thermocomp.assessment.replay import replay_compensated as replayed
 from thermocomp.cli.app import run
 from thermocomp.core.model import HonestError
 from thermocomp.files import modelfile, recordings

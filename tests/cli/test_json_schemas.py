@@ -14,7 +14,7 @@ from smallmill import write_mill
 from thermocomp.cli.app import COMMANDS, run
 from thermocomp.files import recordings
 from thermocomp.papers import studies
-from thermocomp.papers.study import Claim, Study, Table
+from thermocomp.papers.study import Claim, Study, StudyTable
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMAS = DOCS / "files" / "json"
@@ -156,7 +156,7 @@ def test_the_demo_prints_what_compare_prints(tmp_path: Path, capsys: pytest.Capt
 
 def test_papers(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     claims = (Claim(("H-16",), "It rises", "3.3", "2.5", True), Claim(("H-18",), "It falls", "", "0.4", None))
-    table = Table("Errors", ("model", "RMS"), [["a", "1.25"]])
+    table = StudyTable("Errors", ("model", "RMS"), [["a", "1.25"]])
     done = Study("hwang", "Title", claims, (table,), (), {"rms_um": 1.25, "unknown_um": float("nan")})
     monkeypatch.setattr(studies, "run", lambda *_, **__: done)
     assert held("papers", capsys, "hwang", "--repeats", "2")["studies"]

@@ -13,7 +13,7 @@ from thermocomp.cli import papers
 from thermocomp.cli.app import run
 from thermocomp.files import recordings
 from thermocomp.papers import cross, studies
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Progress, Study, Table
+from thermocomp.papers.study import Claim, Figure, Panel, PlotCurve, Progress, Study, StudyTable
 from thermocomp.recording.recording import Recording
 
 CLAIMS = (
@@ -30,8 +30,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     def made(name: str, *, seed: int, progress: Progress) -> Study:
         found.append((name, seed))
         progress(0.5, "half of it")
-        panel = Panel("", "time [h]", "z [um]", [Curve("z", np.arange(3.0), np.arange(3.0))])
-        table = Table("Errors", ("model", "RMS"), [["a", "1.25"]])
+        panel = Panel("", "time [h]", "z [um]", [PlotCurve("z", np.arange(3.0), np.arange(3.0))])
+        table = StudyTable("Errors", ("model", "RMS"), [["a", "1.25"]])
         numbers = {"rms_um": 1.25, "unknown_um": float("nan")}
         figures = (Figure(f"{name}-fig", "Fig. 1", [panel]),)
         return Study(name, f"Title of {name}", CLAIMS, (table,), figures, numbers)
@@ -133,7 +133,7 @@ def test_cross_judges_on_measured_recordings_too(
         targets: Sequence[str] | None,
     ) -> Study:
         given.append((seed, [t.name for t in tests], tuple(methods), targets))
-        return Study("cross", "All methods", (), (Table("RMS", ("method", "drift"), [["ols", "1.25"]]),), (), {})
+        return Study("cross", "All methods", (), (StudyTable("RMS", ("method", "drift"), [["ols", "1.25"]]),), (), {})
 
     monkeypatch.setattr(cross, "run", made)
     assert run(["papers", "cross"]) == 0

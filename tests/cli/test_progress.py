@@ -14,7 +14,7 @@ WORK = """
 import time
 from thermocomp.cli import progress
 progress.OFTEN = 0.05
-with progress.by_share("proving", hidden=False) as tell:
+with progress.show_share("proving", hidden=False) as tell:
     for k in range(10):
         time.sleep(0.02)
         tell(k / 9, f"line {k}")
@@ -51,7 +51,7 @@ def test_short_or_still_work_tells_nothing(
 ) -> None:
     if hidden:
         monkeypatch.setattr(progress, "OFTEN", 0.0)
-    with progress.by_steps(3, hidden=hidden) as step, progress.by_share("proving", hidden=hidden) as tell:
+    with progress.show_steps(3, hidden=hidden) as step, progress.show_share("proving", hidden=hidden) as tell:
         for k in range(3):
             step("fitting")
             tell(k / 2)
@@ -60,7 +60,7 @@ def test_short_or_still_work_tells_nothing(
 
 def test_steps_are_counted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(progress, "OFTEN", 0.0)
-    with progress.by_steps(5, hidden=False) as step:
+    with progress.show_steps(5, hidden=False) as step:
         step("fitting\x1b[31m")
         step("judging", 3)
     assert capsys.readouterr().err == "fitting?[31m: 1 of 5 after 0 s\njudging: 4 of 5 after 0 s\n"

@@ -11,7 +11,7 @@ import pytest
 from driftmodels import lags
 from reviseruns import PLATE, judged, revise, table, without_header, write_models
 
-from thermocomp.nc.rewrite.header import MARK, WIDTH, blank, filled, wrapped
+from thermocomp.nc.rewrite.header import MARK, WIDTH, fill, make_blank, wrap_text
 
 ENDINGS = ["\n", "\r", "\r\n", "\x0b", "\x0c", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029"]
 NASTY = [
@@ -28,9 +28,9 @@ LINE = re.compile(rf"\({MARK} [ !-$&'*-:<-~]*\)")  # no ( ) % ;
 @pytest.mark.parametrize("name", NASTY)
 @pytest.mark.parametrize("upper", [False, True])
 def test_a_header_is_plain_comments(name: str, upper: bool) -> None:
-    facts = [f"program {name}", name * 40, *wrapped(name * 20, 2)]
-    lines = filled(facts, "\r\n", 9, upper=upper)
-    assert len(lines) == len(blank("\r\n", 9)) == 9
+    facts = [f"program {name}", name * 40, *wrap_text(name * 20, 2)]
+    lines = fill(facts, "\r\n", 9, upper=upper)
+    assert len(lines) == len(make_blank("\r\n", 9)) == 9
     for line in lines:
         assert line.endswith("\r\n")
         text = line.removesuffix("\r\n")

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet, Ticking, slowest
+from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet, Ticking, find_largest_root
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.model import ErrorModel, Input
 from thermocomp.core.network import Affine, Perceptron
@@ -176,16 +176,16 @@ def test_a_net_cannot_run_away(seed: int, scale: float) -> None:
 
 @pytest.mark.parametrize("a", [(1.0,), (1.01,), (-1.2,), (2.0, -0.99), (0.0, 0.0, 1.1)])
 def test_a_polynomial_that_runs_away_is_refused(a: tuple[float, ...]) -> None:
-    assert slowest(a) >= 1
+    assert find_largest_root(a) >= 1
     with pytest.raises(InputError, match="does not decay"):
         linear(a=a)
 
 
 def test_roots() -> None:
-    assert slowest(()) == 0.0
-    assert slowest((0.9,)) == pytest.approx(0.9)
-    assert slowest((1.7, -0.72)) == pytest.approx(0.9)  # (z - 0.9) (z - 0.8)
-    assert slowest((0.0, -0.81)) == pytest.approx(0.9)
+    assert find_largest_root(()) == 0.0
+    assert find_largest_root((0.9,)) == pytest.approx(0.9)
+    assert find_largest_root((1.7, -0.72)) == pytest.approx(0.9)  # (z - 0.9) (z - 0.8)
+    assert find_largest_root((0.0, -0.81)) == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize("model", MODELS, ids=IDS)

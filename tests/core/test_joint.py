@@ -21,7 +21,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.core.stack import Stack
 from thermocomp.core.terms import Variable
 from thermocomp.files import modelfile
-from thermocomp.models.covering import cover
+from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
 from thermocomp.recording.samples import stack
 from thermocomp.runtime.compensator import TOGETHER, Compensator
@@ -85,7 +85,9 @@ def test_training_rows_are_never_outside(seed: int, n_temperatures: int, n_cycle
     speed = rng.choice(rng.uniform(0, 6000, 4), rows) + rng.choice([0.0, 1.0]) * rng.normal(size=rows)
     change = np.column_stack([heat, speed])
     channels = [Channel(f"t{k}_C", "temperature", "degC") for k in range(n_temperatures)]
-    joint = cover(change, [*channels, Channel("s", "spindle_speed", "1/min")], np.arange(rows) * n_cycles // rows)
+    joint = find_joint_support(
+        change, [*channels, Channel("s", "spindle_speed", "1/min")], np.arange(rows) * n_cycles // rows
+    )
     assert joint is not None
     assert (joint.distance(change) <= 1.0).all()
 
@@ -212,11 +214,11 @@ def test_limit_is_that_of_cycles_left_out() -> None:
     other = np.column_stack([rise, rise * np.repeat(rng.uniform(0.2, 2.0, 6), 100)])
     limits = []
     for change in (alike, other):
-        joint = cover(change, channel, cycle)
+        joint = find_joint_support(change, channel, cycle)
         assert joint is not None
         limits.append(joint.limit)
     assert limits[1] > 2 * limits[0]
-    tight = cover(alike, channel, cycle)
+    tight = find_joint_support(alike, channel, cycle)
     assert tight is not None
     corners: Callable[[float, float], bool] = lambda a, b: bool(tight.distance(np.array([a, b])) > 1.0)  # noqa: E731
     assert corners(10.0, 0.0)
@@ -228,10 +230,12 @@ def test_size_in_the_file_is_limited() -> None:
     rng = np.random.default_rng(1)
     for n in (1, 17, 60):
         change = np.cumsum(rng.normal(size=(2000, n)), axis=0)
-        joint = cover(change, [Channel(f"t{k}_C", "temperature", "degC") for k in range(n)], np.arange(2000) // 400)
+        joint = find_joint_support(
+            change, [Channel(f"t{k}_C", "temperature", "degC") for k in range(n)], np.arange(2000) // 400
+        )
         assert joint is not None
         assert len(json.dumps(asdict(joint), indent=1)) < 8192
-    assert cover(np.zeros((9, 1)), [Channel("t_C", "temperature", "degC")], np.zeros(9, np.intp)) is None
+    assert find_joint_support(np.zeros((9, 1)), [Channel("t_C", "temperature", "degC")], np.zeros(9, np.intp)) is None
 
 
 def test_the_online_step_says_it() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from thermocomp.core.exceptions import UnitError
-from thermocomp.core.units import measured, unit
+from thermocomp.core.units import find_unit, read_with_unit
 
 
 @pytest.mark.parametrize(
@@ -25,27 +25,27 @@ from thermocomp.core.units import measured, unit
     ],
 )
 def test_conversion(symbol: str, quantity: str, value: float, expected: float) -> None:
-    u = unit(symbol, quantity)
+    u = find_unit(symbol, quantity)
     assert u.scale * value + u.shift == pytest.approx(expected, abs=1e-9)
 
 
 def test_bare_mm_is_a_displacement() -> None:
-    assert unit("mm").quantity == "displacement"
+    assert find_unit("mm").quantity == "displacement"
 
 
 def test_unknown_unit_names_the_nearest() -> None:
     with pytest.raises(UnitError, match=r"unknown unit 'degc'.*did you mean .*degC"):
-        unit("degc")
+        find_unit("degc")
 
 
 def test_wrong_quantity_says_what_it_measures() -> None:
     with pytest.raises(UnitError, match=r"'rpm' measures spindle_speed, not temperature; .*degC, K, degF"):
-        unit("rpm", "temperature")
+        find_unit("rpm", "temperature")
 
 
 def test_unknown_quantity() -> None:
     with pytest.raises(UnitError, match="unknown quantity 'colour'"):
-        unit("degC", "colour")
+        find_unit("degC", "colour")
 
 
 @pytest.mark.parametrize(
@@ -65,16 +65,16 @@ def test_unknown_quantity() -> None:
     ],
 )
 def test_a_value_with_its_unit(text: str, quantity: str, value: float) -> None:
-    assert measured(text, quantity) == pytest.approx(value, rel=1e-12)
+    assert read_with_unit(text, quantity) == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("text", [250, 250.0, None, True, ["250 mm"], "", "mm", "250", "12,5 mm", "1 2 mm", "1.2.3 mm"])
 def test_what_is_no_value_with_its_unit(text: object) -> None:
-    assert measured(text, "position") is None
+    assert read_with_unit(text, "position") is None
 
 
 def test_a_value_with_a_wrong_unit_or_without_end() -> None:
     with pytest.raises(UnitError, match="'degC' measures temperature, not position"):
-        measured("250 degC", "position")
+        read_with_unit("250 degC", "position")
     with pytest.raises(UnitError, match="is no finite number"):
-        measured("1e999 mm", "position")
+        read_with_unit("1e999 mm", "position")

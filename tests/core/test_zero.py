@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.zero import FIRST_READING, MOST, Gathered, Zeroing, centre, first_rows
+from thermocomp.core.zero import FIRST_READING, MOST, Gathered, Zeroing, first_rows, robust_mean
 
 ZEROING = Zeroing()
 
@@ -79,14 +79,14 @@ def test_one_outlier_moves_it_no_further_than_the_others_spread(values: list[flo
     spoiled = np.array(values)
     spoiled[where % len(values)] = dead
     rest = np.delete(spoiled, where % len(values))
-    assert rest.min() - 1e-9 <= centre(spoiled) <= rest.max() + 1e-9
+    assert rest.min() - 1e-9 <= robust_mean(spoiled) <= rest.max() + 1e-9
 
 
 def test_noise_gets_less_by_the_number_of_readings() -> None:
     rng = np.random.default_rng(0)
-    means = [centre(20 + 0.4 * rng.normal(size=(21, 3))) for _ in range(500)]
+    means = [robust_mean(20 + 0.4 * rng.normal(size=(21, 3))) for _ in range(500)]
     assert np.std(means) == pytest.approx(0.4 / math.sqrt(21), rel=0.1)
-    assert centre(np.array([[20.1, 21.7]])).tolist() == [20.1, 21.7]
+    assert robust_mean(np.array([[20.1, 21.7]])).tolist() == [20.1, 21.7]
 
 
 def test_only_a_number_near_zero_stands() -> None:

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.datasets.virtual import EXPERIMENTS, find, record
+from thermocomp.datasets.virtual import EXPERIMENTS, find_experiment, record
 from thermocomp.recording.recording import Recording
 from thermocomp.simulation.experiments import SimulatedTest, simulate
 from thermocomp.simulation.kits import CHEN_PLACES, HWANG_PLACES
@@ -235,7 +235,7 @@ def test_a_recording_of_each_test() -> None:
     quiet, noisy = (record("hwang", sensor_noise=s)[0] for s in (0.0, 0.4))
     assert not np.array_equal(quiet.table["t_x_nut_C"], noisy.table["t_x_nut_C"])
     np.testing.assert_array_equal(quiet.table["z_um"], noisy.table["z_um"])
-    assert record(find("hwang"), sensor_noise=0.0)[0].fingerprint == quiet.fingerprint
+    assert record(find_experiment("hwang"), sensor_noise=0.0)[0].fingerprint == quiet.fingerprint
 
 
 def test_an_unknown_experiment_is_refused() -> None:

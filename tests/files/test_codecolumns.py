@@ -37,7 +37,7 @@ def test_codes_in_the_order_of_the_house(tmp_path: Path) -> None:
     assert found == {"EAX_-50_urad": -50.0, "EAX_0_urad": 0.0, "EAX_50.5_urad": 50.5}
     assert elsewhere == ()
     assert codecolumns.columns_of(recording, "EYY") == ({}, ())
-    assert [codecolumns.is_one(c) for c in recording.channels[:2]] == [False, True]
+    assert [codecolumns.is_code_column(c) for c in recording.channels[:2]] == [False, True]
 
 
 def test_several_components_from_one_reading(tmp_path: Path) -> None:

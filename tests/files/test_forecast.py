@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import forecast
-from thermocomp.nc.thermal.inputs import Signal
+from thermocomp.nc.thermal.inputs import InputSignal
 
 
 def written(folder: Path, text: str) -> Path:
@@ -28,7 +28,7 @@ def test_units_and_gaps(tmp_path: Path) -> None:
     assert found.columns["room_C"][1] == pytest.approx((10.0, 20.0))
     assert found.columns["spindle_rpm"] == ((1800.0,), (100.0,))
     assert any("note" in text for text in found.left_out)
-    assert Signal(*found.columns["t3_C"]).at(2700.0) == 21
+    assert InputSignal(*found.columns["t3_C"]).at(2700.0) == 21
 
 
 @pytest.mark.parametrize("delimiter", [";", "\t"])
@@ -79,4 +79,4 @@ def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, t
     except InputError:
         return
     for time, values in found.columns.values():
-        Signal(time, values)
+        InputSignal(time, values)

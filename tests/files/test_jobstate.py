@@ -20,7 +20,7 @@ NOON = datetime(2026, 11, 21, 12, 0, 0, 250000, tzinfo=UTC)
 @pytest.fixture
 def left() -> JobState:
     stations = [Station("X", net("x_um")), Station("Y", ticking("y_um")), Station("Z", lags())]
-    drift = Drift(stations, start.cold(stations, {}))
+    drift = Drift(stations, start.begin_cold(stations, {}))
     drift.advance(1234.5, 3210.0)
     drift.advance(0.3, 0.0)
     return drift.state()

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ModelFileError
-from thermocomp.core.fingerprints import Prints, Runs, packed
+from thermocomp.core.fingerprints import Prints, Runs, pack_marks
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import RULES, HonestError, Input, Provenance, Support
 from thermocomp.files import jsonfile, modelfile
@@ -23,9 +23,9 @@ PRINTS = Prints(
     runs=(
         Runs(
             stride=1,
-            rows=packed(np.array([3, 40, 2**20], dtype=np.uint32) % 800),
-            moving=packed(np.array([1, 0, 1], dtype=np.uint32)),
-            marks={n: packed(np.array([7, 2**32 - 1, k], dtype=np.uint32)) for k, n in enumerate(("z_um", "t1_C"))},
+            rows=pack_marks(np.array([3, 40, 2**20], dtype=np.uint32) % 800),
+            moving=pack_marks(np.array([1, 0, 1], dtype=np.uint32)),
+            marks={n: pack_marks(np.array([7, 2**32 - 1, k], dtype=np.uint32)) for k, n in enumerate(("z_um", "t1_C"))},
         ),
     ),
 )
@@ -169,8 +169,8 @@ def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
         ({}, {"rows": "AA*="}, "not base64"),
         ({}, {"rows": "Äöü="}, "not base64"),
         ({}, {"rows": "AAAA"}, "3 bytes are no whole number of 32-bit numbers"),
-        ({}, {"rows": packed(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not rise"),
-        ({}, {"rows": packed(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
+        ({}, {"rows": pack_marks(np.array([5, 4, 6], dtype=np.uint32))}, "their rows do not rise"),
+        ({}, {"rows": pack_marks(np.array([5, 6, 810], dtype=np.uint32))}, "of row 810, where 810 rows were recorded"),
         ({}, {"moving": "AAAAAA=="}, "1 of moving for 3 rows"),
         ({}, {"marks": {}}, "want those of a target at least"),
         ({}, {"marks": {"z_um": "", "t1_C": ""}}, "0 of z_um for 3 rows"),

@@ -13,7 +13,7 @@ from thermocomp.simulation.climate import CLIMATES, STABLE, Climate
 from thermocomp.simulation.instruments import Touch
 from thermocomp.simulation.kits import KITS
 from thermocomp.simulation.protocol import Experiment, Plan
-from thermocomp.simulation.segments import Feed, Lot, Segment, Stretch, Stroke
+from thermocomp.simulation.segments import Feed, Lot, SteadySegment, Stretch, Stroke
 from thermocomp.simulation.sensors import Fault
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -128,7 +128,7 @@ def test_a_test_goes_over_what_all_share(tmp_path: Path) -> None:
 )
 def test_times_are_written_with_their_unit(text: str, seconds: float, tmp_path: Path) -> None:
     (programme,) = read_protocol(written(tmp_path, f'sampling = "30 s"\nduration = "{text}"')).programmes()
-    assert programme.segments == (Segment(float(seconds)),)
+    assert programme.segments == (SteadySegment(float(seconds)),)
 
 
 HEAD = 'sampling = "10 s"\n'

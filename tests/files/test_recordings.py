@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.files.recordings import read, read_all
-from thermocomp.recording.cycles import Cycle, whole
+from thermocomp.recording.cycles import Cycle, make_single_cycle
 from thermocomp.recording.quality import check
 
 VORON = Path(__file__).parent / "voron.toml"
@@ -274,7 +274,7 @@ def test_cycles_come_from_a_column_or_the_speed_or_are_one(tmp_path: Path) -> No
     assert [c.start for c in read(path, ignoring).cycles] == [0, 4]
     long_stops = Mapping(columns={"cycle": ColumnMap(role="ignore")}, cycles=CycleRule(min_stop_s=2000.0))
     assert len(read(path, long_stops).cycles) == 1
-    assert read(plain).cycles == whole(2)
+    assert read(plain).cycles == make_single_cycle(2)
 
 
 def test_several_files_are_several_tests(tmp_path: Path) -> None:

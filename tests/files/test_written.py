@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.files.recordings import read, write
-from thermocomp.recording.cycles import Cycle, whole
+from thermocomp.recording.cycles import Cycle, make_single_cycle
 from thermocomp.recording.recording import Recording
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=False)
@@ -67,7 +67,11 @@ def test_writing_keeps_what_is_there_unless_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no folder"):
         write(recording, tmp_path / "no" / "rec.csv")
     named = Recording(
-        "r", recording.time, recording.table.set_axis(["cycle"], axis=1), (Channel("cycle", "angle", "urad"),), whole(1)
+        "r",
+        recording.time,
+        recording.table.set_axis(["cycle"], axis=1),
+        (Channel("cycle", "angle", "urad"),),
+        make_single_cycle(1),
     )
     write(named, tmp_path / "odd.csv")
     assert read(tmp_path / "odd.csv").channels == named.channels

@@ -51,7 +51,7 @@ class Running:
                 return self.value(of) ** exponent
             case e.Sigmoid(of):
                 return 1.0 / (1.0 + math.exp(-self.value(of)))
-            case e.Table(of, x, y, kind):
+            case e.Lookup(of, x, y, kind):
                 return _curve(self.value(of), x, y, kind)
             case e.Named(_, of):
                 return self.value(of)

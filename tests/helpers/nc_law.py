@@ -6,11 +6,11 @@ from pathlib import Path
 from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.nc.interpreter.block import Point, Setup
-from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand, Field
 from thermocomp.nc.rewrite.frame import Vector
-from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import Revised, Revision
 from thermocomp.nc.rewrite.text import DIGITS
@@ -69,7 +69,7 @@ class Still(Steady):
         return 0.0, 0.0, 0.0
 
 
-def method(name: str, step: float = 1.0) -> Method:
+def method(name: str, step: float = 1.0) -> CorrectionMethod:
     """Return a way of revising by its name."""
     digits = DIGITS["linuxcnc"]
     return Coordinates(digits, step) if name == "coordinates" else Offset(digits, step, safe_z=5.0)
@@ -123,7 +123,7 @@ def revise(
     split: bool = True,
 ) -> Trial:
     """Revise a program; `ProgramError` if it is refused."""
-    run = Revision(setup, Kinematics(), drift, method(way, step), Demand(1.0, every), split=split)
+    run = Revision(setup, MotionLimits(), drift, method(way, step), Demand(1.0, every), split=split)
     ledger, rows = Ledger(), []
     with original.open(encoding="latin-1", newline="") as file:
         for row in run.revise(file):

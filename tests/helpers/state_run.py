@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.rs274process import Job, Run
+from thermocomp.adapters.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 from thermocomp.core.exceptions import ThermocompError
 
 #: states that are drawn
@@ -124,8 +124,8 @@ def run(text: str, drawn: Sequence[State], folder: Path) -> list[Ran | Thermocom
         lines, numbers = _jogged(plain, jog) if jog else (plain, range(1, len(plain) + 1))
         path.write_text("\n".join(lines), encoding="ascii")
         modes = [mode.feed for mode in followed(lines)]
-        jobs = [Job(path, state.stored, block_delete=state.skip) for state in group]
-        with Run(*jobs) as runs:
+        jobs = [InterpreterJob(path, state.stored, block_delete=state.skip) for state in group]
+        with InterpreterRun(*jobs) as runs:
             for _ in jobs:
                 try:
                     found.append(_told(runs, modes, numbers))
@@ -134,7 +134,7 @@ def run(text: str, drawn: Sequence[State], folder: Path) -> list[Ran | Thermocom
     return found
 
 
-def _told(runs: Run, modes: Sequence[int], numbers: Sequence[int]) -> Ran:
+def _told(runs: InterpreterRun, modes: Sequence[int], numbers: Sequence[int]) -> Ran:
     ran, machine = Ran(), _Machine()
     for call in rs274.calls(runs):
         line = numbers[min(call.line, len(numbers)) - 1] if call.line else 0
@@ -157,7 +157,7 @@ class _Machine:
     """Where it stands, and what tells how long its moves take."""
 
     def __init__(self) -> None:
-        self.frame = rs274.Frame()
+        self.frame = rs274.ProgramFrame()
         self.here = rs274.ORIGIN
         self.feed = 0.0, 0.0
         self.speed = self.pitch = 0.0

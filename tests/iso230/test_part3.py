@@ -17,9 +17,9 @@ from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record
 from thermocomp.iso230.part3 import assess, detect, find_pairs, find_stations
 from thermocomp.iso230.tables import thermal_content, thermal_tables, with_uncertainty
-from thermocomp.iso230.thermaltest import Curve, Pair, ThermalTest, figures
+from thermocomp.iso230.thermaltest import Pair, ThermalCurve, ThermalTest, evaluate_curve
 from thermocomp.models.training import train
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
 
@@ -33,7 +33,7 @@ UNITS |= {"urad": ("angle", "urad"), "min": ("feed", "mm/min")}
 def recorded(columns: dict[str, FloatArray], step: float = MIN) -> Recording:
     table = pd.DataFrame(columns)
     channels = tuple(Channel(n, *UNITS[n.rsplit("_", 1)[1]]) for n in columns)
-    return Recording("test", np.arange(0.0, step * len(table), step), table, channels, whole(len(table)))
+    return Recording("test", np.arange(0.0, step * len(table), step), table, channels, make_single_cycle(len(table)))
 
 
 def spindle_test(tau: float = 30 * MIN) -> Recording:
@@ -55,7 +55,7 @@ def spindle_test(tau: float = 30 * MIN) -> Recording:
     )
 
 
-def of(test: ThermalTest, name: str) -> Curve:
+def of(test: ThermalTest, name: str) -> ThermalCurve:
     return next(c for c in test.all_curves if c.name == name)
 
 
@@ -111,19 +111,19 @@ def test_tilt_has_the_sign_of_the_house() -> None:
 def test_ranges_of_a_step_and_a_peak() -> None:
     time = np.arange(0.0, 7201.0, 600.0)
     step = np.where(time > 3600, 5.0, 0.0)
-    assert figures(time, step, len(time) - 1).range_60 == 0
-    assert figures(time, step, len(time) - 1).range_run == 5
+    assert evaluate_curve(time, step, len(time) - 1).range_60 == 0
+    assert evaluate_curve(time, step, len(time) - 1).range_run == 5
     peak = np.where(time == 1800, -7.0, 0.0)
-    f = figures(time, peak, 9)
+    f = evaluate_curve(time, peak, 9)
     assert (f.range_60, f.largest, f.at_60, f.at_end, f.cool_down) == (7, -7, 0, 0, 0)
     # 60 min between two rows: linear
-    assert figures(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).at_60 == 15
-    assert figures(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).range_60 == 15
+    assert evaluate_curve(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).at_60 == 15
+    assert evaluate_curve(np.array([0.0, 3000.0, 4200.0]), np.array([0.0, 10.0, 20.0]), 2).range_60 == 15
     # a probing cycle now and then
     holes = np.array([0.0, np.nan, np.nan, np.nan, np.nan, np.nan, 3.0, *[np.nan] * 5, 4.0])
-    assert figures(time, holes, 12).at_60 == 3
-    assert np.isnan(figures(time, np.full(13, np.nan), 12).range_all)
-    short = figures(time[:4], step[:4], 3)
+    assert evaluate_curve(time, holes, 12).at_60 == 3
+    assert np.isnan(evaluate_curve(time, np.full(13, np.nan), 12).range_all)
+    short = evaluate_curve(time[:4], step[:4], 3)
     assert np.isnan(short.range_60)
     assert np.isnan(short.at_60)
 
@@ -162,7 +162,7 @@ def test_the_last_hour_against_the_first() -> None:
     assert any(f"z_um {share:.0f} %; not all are within the 15 %" in n for n in slow.notes)
     assert thermal_content(slow)["curves"][-1]["range_last"] == of(slow, "z_um").figures.range_last
     time = np.arange(0.0, 100 * MIN, MIN)
-    assert np.isnan(figures(time, time, len(time) - 1).range_last)
+    assert np.isnan(evaluate_curve(time, time, len(time) - 1).range_last)
 
 
 def test_stations_of_profiles_are_no_probes() -> None:
@@ -189,7 +189,7 @@ def test_several_runs_are_several_tests() -> None:
     once = spindle_test()
     table = pd.concat([once.table, once.table], ignore_index=True)
     time = np.arange(0.0, MIN * len(table), MIN)
-    first, second = assess(replace(once, time=time, table=table, cycles=whole(len(table))))
+    first, second = assess(replace(once, time=time, table=table, cycles=make_single_cycle(len(table))))
     assert (first.name, second.name) == ("test, 1", "test, 2")
     assert second.recording.time[second.start] == (366 + 5) * MIN
     assert second.running == first.running
@@ -413,7 +413,7 @@ def test_what_must_be_said_of_a_model() -> None:
 
 
 def test_rows_that_a_model_has_learned_from_are_counted() -> None:
-    recording, other = (replace(small_machine(seed=k), cycles=whole(800)) for k in (0, 4))
+    recording, other = (replace(small_machine(seed=k), cycles=make_single_cycle(800)) for k in (0, 4))
     samples = stack([recording], ["z_um"])
     learn = np.arange(len(samples)) < 500
     learned = train("ols", samples, 0, learn, prints=True).model

@@ -11,9 +11,9 @@ from smallmachine import small_machine
 from thermocomp.core.machine import Channel
 from thermocomp.iso230.averaging import scatter
 from thermocomp.iso230.exponentials import fit
-from thermocomp.iso230.settling import Phase, drive, find_phases, settle, time_constants
+from thermocomp.iso230.settling import Phase, find_driven_rows, find_phases, settle, time_constants
 from thermocomp.iso230.tables import settling_content, time_constant_tables
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -32,7 +32,7 @@ def speeds(*stretches: tuple[int, float], feed: bool = False) -> Recording:
     channel = Channel("feed_mm_min", "feed", "mm/min") if feed else Channel("s_rpm", "spindle_speed", "1/min")
     table = pd.DataFrame({channel.name: values})
     time = np.arange(0.0, 60.0 * len(values), 60.0)
-    return Recording("r", time, table, (channel,), whole(len(values)))
+    return Recording("r", time, table, (channel,), make_single_cycle(len(values)))
 
 
 # -- one channel --------------------------------------------------------------------------------------------------
@@ -181,7 +181,7 @@ def test_feeds_count_and_blips_do_not() -> None:
     assert [p.kind for p in find_phases(speeds((30, 0), (60, 6000), (30, 0), feed=True))] == ["warm-up", "cool-down"]
     assert find_phases(speeds((60, 0), (3, 500), (60, 0))) == ()
     assert find_phases(speeds((60, 0))) == ()
-    on = drive(speeds((2, 0), (2, 1000)))
+    on = find_driven_rows(speeds((2, 0), (2, 1000)))
     assert on is not None
     assert on.tolist() == [False, False, True, True]
 

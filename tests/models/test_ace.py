@@ -17,7 +17,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import Input, Support
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
-from thermocomp.models.ace import ACE, Table, TransformRegressor, half_window, nearest
+from thermocomp.models.ace import ACE, SampledFunction, TransformRegressor, half_window, nearest
 from thermocomp.models.ace_monotone import MonotoneACE
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.ols import LeastSquares
@@ -169,13 +169,15 @@ def test_step_curve_is_the_nearest_neighbours(k: int) -> None:
     rng = np.random.default_rng(k)
     x, y = np.sort(rng.normal(size=40)), rng.normal(size=40)
     at = rng.uniform(-4, 4, 500)
-    np.testing.assert_allclose(nearest(Table(x, y), k)(at), twin_ace.neighbours(at, x.tolist(), y.tolist(), k))
+    np.testing.assert_allclose(
+        nearest(SampledFunction(x, y), k)(at), twin_ace.neighbours(at, x.tolist(), y.tolist(), k)
+    )
     tied = np.round(x, 1)
     level = np.array([y[tied == v].mean() for v in tied])
     np.testing.assert_allclose(
-        nearest(Table(tied, y), k)(at), twin_ace.neighbours(at, tied.tolist(), level.tolist(), k), atol=1e-12
+        nearest(SampledFunction(tied, y), k)(at), twin_ace.neighbours(at, tied.tolist(), level.tolist(), k), atol=1e-12
     )
-    assert nearest(Table(x, y), 99)(at).tolist() == [y.mean()] * 500
+    assert nearest(SampledFunction(x, y), 99)(at).tolist() == [y.mean()] * 500
 
 
 # -- the estimators --------------------------------------------------------------------------------------------------

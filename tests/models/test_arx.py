@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 from twin_arx import SYSTEMS, clock, series
 
-from thermocomp.core.autoregressive import slowest
+from thermocomp.core.autoregressive import find_largest_root
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.selection import orders
 from thermocomp.recording.samples import Samples
 
@@ -84,7 +84,7 @@ def test_table_of_orders_equals_plain_fits(intercept: bool) -> None:
         assert o.fpe == pytest.approx(sse / len(y) * (len(y) + d) / (len(y) - d))
         assert o.aic == pytest.approx(len(y) * np.log(sse / len(y)) + 2 * d)
         assert o.bic == pytest.approx(len(y) * np.log(sse / len(y)) + d * np.log(len(y)))
-        assert o.largest_root == pytest.approx(slowest(w[: o.k]), rel=1e-6, abs=1e-9)
+        assert o.largest_root == pytest.approx(find_largest_root(w[: o.k]), rel=1e-6, abs=1e-9)
 
 
 def test_without_noise_the_smallest_exact_order_wins() -> None:
@@ -337,7 +337,7 @@ def test_constant_and_copied_inputs_and_a_dead_probe() -> None:
 
 def test_orders_of_a_table_that_is_too_short() -> None:
     rng = np.random.default_rng(0)
-    tri = triangle(table(rng.normal(size=(3, 4)), rng.normal(size=3)), intercept=False)
-    found = orders.table(tri, 1, range(3), range(2))
+    tri = triangle(join_columns(rng.normal(size=(3, 4)), rng.normal(size=3)), intercept=False)
+    found = orders.compute_orders(tri, 1, range(3), range(2))
     assert [o.admissible for o in found if o.n_parameters >= 3] == [False] * 3
     assert orders.best([o for o in found if not o.admissible], "fpe") is None

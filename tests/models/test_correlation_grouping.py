@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.numerics.leastsquares import lstsq, table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, lstsq, triangle
 from thermocomp.models.selection import exhaustive
 from thermocomp.models.selection.collinearity import spectrum
 
@@ -153,7 +153,7 @@ def test_grouping_lessens_collinearity(seed: int) -> None:
     (test,) = record("hwang", seed=seed)
     T = test.values(test.temperatures)
     differences, z = T[:, :13] - T[:, [13]], test.values([test.channel("z_um")])[:, 0]
-    free = exhaustive.search_subsets(triangle(table(differences, z), intercept=True), range(13)).best
+    free = exhaustive.search_subsets(triangle(join_columns(differences, z), intercept=True), range(13)).best
     found = CorrelationGrouping(reference=13).fit(T, z)
     ungrouped = spectrum(differences[:, free.columns])
     assert len(found.selected_) < len(free.columns)

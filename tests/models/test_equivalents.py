@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.models.selection.equivalents import Row, equivalents, signed_rank_p
+from thermocomp.models.selection.equivalents import SensorSet, equivalents, signed_rank_p
 from thermocomp.models.selection.maximal_correlation import MaximalCorrelations
 
 FloatArray = NDArray[np.float64]
@@ -92,7 +92,7 @@ def test_table() -> None:
     keys = [(-len(r.equivalent), -sum(r.summed)) for r in rows]
     assert keys == sorted(keys)
     k = subsets.index(rows[5].subset)
-    assert rows[5] == Row(
+    assert rows[5] == SensorSet(
         subsets[k],
         tuple(float(v[k].sum()) for v in psi),
         tuple(found.p_values[:, k].tolist()),

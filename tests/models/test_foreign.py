@@ -20,8 +20,8 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input, Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.dynamic import DynamicRidge
-from thermocomp.models.foreign import ForeignRegressor, adopted
-from thermocomp.models.methods import METHODS, Named, deployable, expand
+from thermocomp.models.foreign import ForeignRegressor, adopt_estimator
+from thermocomp.models.methods import METHODS, NamedEstimator, deployable, expand
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.pipelines import PipelineRegressor, freeze
@@ -126,7 +126,7 @@ def test_the_replay_is_its_prediction(samples: Samples) -> None:
 def test_a_named_estimator_survives_the_way_to_another_process() -> None:
     (name,) = expand([DYNAMIC])
     back = pickle.loads(pickle.dumps(name))
-    assert isinstance(back, Named)
+    assert isinstance(back, NamedEstimator)
     assert back == "DynamicRidge"
     assert back.estimator.get_params() == DYNAMIC.get_params() | {"time": "routed", "speed": ("spindle_rpm",)}
     assert expand([name, "all"]) == ["DynamicRidge", *METHODS]
@@ -326,4 +326,4 @@ def test_pipelines_that_cannot_be_frozen(samples: Samples) -> None:
         freeze(Ridge().fit(X, y), target="z")
     with pytest.raises(FitError, match="StandardScaler before a model of the family polynomial cannot be frozen"):
         freeze(make_pipeline(StandardScaler(), SecondOrderRegression(fit_intercept=True)).fit(X, y), target="z")
-    assert isinstance(adopted(make_pipeline(PolynomialFeatures(), LeastSquares())), ForeignRegressor)
+    assert isinstance(adopt_estimator(make_pipeline(PolynomialFeatures(), LeastSquares())), ForeignRegressor)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from twin_arx import SYSTEMS, clock, series
 
-from thermocomp.core.autoregressive import slowest
+from thermocomp.core.autoregressive import find_largest_root
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.model import ErrorModel
 from thermocomp.files import modelfile
@@ -49,7 +49,7 @@ def test_free_run_equals_the_twin(seed: int, interval: float, k: int, m: int) ->
     for rows in (slice(0, half), slice(half, None)):
         time = np.cumsum(np.r_[0.0, dt[rows][1:]])
         expected.append(twin_arx.free_run(time, u[rows], interval, twin_arx.linear(c.a, c.b, 0.3)))
-    got = np.concatenate([c.at_rows(r) for r in ticks.on_clock(u, dt, interval)])
+    got = np.concatenate([c.at_rows(r) for r in ticks.put_on_clock(u, dt, interval)])
     np.testing.assert_allclose(got, np.concatenate(expected), rtol=1e-9, atol=1e-9)
 
 
@@ -143,7 +143,7 @@ def test_averaged_onto_a_coarser_clock() -> None:
 def test_a_double_stamp_and_a_gap_are_not_a_grid() -> None:
     """As many rows as ticks, and every row on a tick: still not one row per tick."""
     dt, u = np.array([np.inf, 0.0, 120.0]), np.array([[1.0], [5.0], [3.0]])
-    (run,) = ticks.on_clock(u, dt, 60.0)
+    (run,) = ticks.put_on_clock(u, dt, 60.0)
     assert run.count.tolist() == [0, 0, 2]
     assert run.drive[:, 0].tolist() == [1.0, 3.0, 3.0]
     c = freerun.Coefficients(np.array([0.5]), np.array([[1.0]]))
@@ -152,9 +152,9 @@ def test_a_double_stamp_and_a_gap_are_not_a_grid() -> None:
 
 def test_rounding_of_a_clock_is_no_jitter() -> None:
     u: FloatArray = np.linspace(0.0, 5.0, 6)[:, None]
-    (exact,) = ticks.on_clock(u, clock(6, 0.1), 0.1)
+    (exact,) = ticks.put_on_clock(u, clock(6, 0.1), 0.1)
     for factor in (1 - 1e-9, 1 + 1e-9):
-        (rounded,) = ticks.on_clock(u, clock(6, 0.1 * factor), 0.1)
+        (rounded,) = ticks.put_on_clock(u, clock(6, 0.1 * factor), 0.1)
         assert rounded.row_by_row
         assert np.array_equal(rounded.drive, exact.drive)
 
@@ -164,7 +164,7 @@ def test_displacements_are_not_interpolated_over_gaps() -> None:
     y: FloatArray = np.linspace(0.0, 7.0, 8)
     known = np.ones(8, dtype=np.bool_)
     known[5] = False
-    (run,) = runs = ticks.on_clock(np.ones((8, 1)), dt, 60.0)
+    (run,) = runs = ticks.put_on_clock(np.ones((8, 1)), dt, 60.0)
     (found,) = ticks.displacements(runs, y, dt, known, 60.0)
     nan = np.nan
     #                      0 1 2  the gap: nine ticks are not known   12   13 14 15: row 5, then half way from 6 to 7
@@ -182,7 +182,7 @@ def test_gradient_of_the_free_run(intercept: bool, by_poles: bool) -> None:
     rng = np.random.default_rng(8)
     dt = clock(60)
     dt[25] = np.inf
-    runs = ticks.on_clock(rng.normal(size=(60, 2)), dt, 600.0)
+    runs = ticks.put_on_clock(rng.normal(size=(60, 2)), dt, 600.0)
     targets = [np.where(rng.random(len(r.drive)) < 0.8, rng.normal(size=len(r.drive)), np.nan) for r in runs]
     problem = freerun._Problem(runs, targets, 2, 2, intercept, 0.99, by_poles=by_poles)
     theta = rng.normal(size=problem.size)
@@ -198,7 +198,7 @@ def test_output_error_is_a_minimum() -> None:
     u, z = series((2, 1), 9, n=300)
     noisy = z + np.random.default_rng(9).normal(0, 1.0, len(z))
     dt = clock(len(z))
-    data = Clocked(600.0, ticks.on_clock(u, dt, 600.0), noisy, dt, np.zeros(len(z), dtype=np.intp))
+    data = Clocked(600.0, ticks.put_on_clock(u, dt, 600.0), noisy, dt, np.zeros(len(z), dtype=np.intp))
     best = freerun.output_error(data.runs, data.targets(), 2, 1, intercept=False, largest_root=0.999)
     assert best is not None
 
@@ -243,9 +243,9 @@ def test_a_free_run_never_runs_away() -> None:
         ARX(time="routed", k=1, m=0).fit(u, z, dt=dt)
     chosen = ARX(time="routed").fit(u, z, dt=dt)
     assert [o.admissible for o in chosen.orders_ if o.k == 1] == [False] * 6
-    assert slowest(chosen.a_) < 1
+    assert find_largest_root(chosen.a_) < 1
     free = ARX(time="routed", k=2, m=1, criterion="free-run").fit(u, z, dt=dt)
-    assert slowest(free.a_) < np.exp(-1 / len(z))
+    assert find_largest_root(free.a_) < np.exp(-1 / len(z))
     net = NetARX(time="routed", **QUICK).fit(u, z, dt=dt)
     far = net.predict(np.full((3, 1), 1000.0), dt=[np.inf, 1e5, 1e7])
     assert (np.abs(far) <= 1.25 * z.max()).all()
@@ -263,6 +263,6 @@ def test_whatever_the_data_the_polynomial_decays(seed: int, criterion: str) -> N
     fixed: dict[str, Any] = {"k": 2, "m": 1} if criterion == "free-run" else {}
     e = ARX(time="routed", criterion=criterion, **fixed)  # type: ignore[arg-type]
     e.fit(u, z, dt=clock(n))
-    assert slowest(e.a_) < 1
+    assert find_largest_root(e.a_) < 1
     assert np.isfinite(e.predict(u, dt=clock(n))).all()
     e.freeze(target="z")

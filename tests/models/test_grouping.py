@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.numerics.leastsquares import Triangle, lstsq, table, triangle
+from thermocomp.models.numerics.leastsquares import Triangle, join_columns, lstsq, triangle
 from thermocomp.models.selection import exhaustive, grouping
 from thermocomp.models.selection.collinearity import contributions, correlation, spectrum
 
@@ -22,7 +22,7 @@ TABLE_1 = ((6,), (8, 9, 10, 11), (12,), (7, 3), (4,), (1,), (0, 5), (2,))
 
 
 def tri(X: FloatArray, y: FloatArray, intercept: bool = True) -> Triangle:
-    return triangle(table(X, y), intercept=intercept)
+    return triangle(join_columns(X, y), intercept=intercept)
 
 
 def warm(rng: np.random.Generator, n: int, p: int, sources: int, own: float) -> tuple[FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq, solve, table, triangle
+from thermocomp.models.numerics.leastsquares import effective_sample_size, join_columns, lstsq, solve, triangle
 from thermocomp.models.ols import LeastSquares
 
 FloatArray = NDArray[np.float64]
@@ -69,7 +69,7 @@ def test_filip_is_hard_but_not_called_deficient(shared_data: Path) -> None:
 
 def test_columns_of_a_wider_table(shared_data: Path) -> None:
     _, _, X, y = read_nist(shared_data / "nist_strd" / "Longley.dat")
-    whole = triangle(table(X, y), intercept=True)
+    whole = triangle(join_columns(X, y), intercept=True)
     part = solve(X, y, whole, columns=[4, 0, 2])
     alone = lstsq(X[:, [4, 0, 2]], y)
     np.testing.assert_allclose(part.coefficients, alone.coefficients, rtol=1e-9)

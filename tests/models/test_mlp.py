@@ -17,7 +17,7 @@ from thermocomp.files import modelfile
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.mlp import PATIENCE, SigmoidNet
 from thermocomp.models.mlp_sklearn import SklearnNet
-from thermocomp.models.nets import NetRegressor, thinned
+from thermocomp.models.nets import NetRegressor, thin_rows
 from thermocomp.models.numerics.backprop import scaling_in, scaling_out, train_net
 from thermocomp.models.ols import LeastSquares
 
@@ -49,8 +49,8 @@ def test_scaling_per_channel_and_common() -> None:
 
 
 def test_thinning_is_even() -> None:
-    assert thinned(9, 5).tolist() == [0, 2, 4, 6, 8]
-    assert thinned(4, 10).tolist() == [0, 1, 2, 3]
+    assert thin_rows(9, 5).tolist() == [0, 2, 4, 6, 8]
+    assert thin_rows(4, 10).tolist() == [0, 1, 2, 3]
     X, y = drift(400)
     few = SigmoidNet(n_epochs=50, max_patterns=100).fit(X, y[:, 0])
     assert few.n_patterns_ == 100

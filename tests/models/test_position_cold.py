@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
 
@@ -29,7 +29,7 @@ def a_day(name: str, morning: float, positions: FloatArray = POSITIONS) -> Profi
         np.linspace(0.0, 24.0 * 1200.0, 25),
         pd.DataFrame({"t": temperature}),
         (Channel("t", "temperature", "degC"),),
-        whole(25),
+        make_single_cycle(25),
     )
     return Profiles("EYY", "um", "Y", points, values, states)
 

@@ -11,14 +11,14 @@ from profilemachine import EQ6, along_y, profiles, states
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.machine import Channel
 from thermocomp.models.position import PositionOptions, fit_position
-from thermocomp.models.positionoptions import suited
+from thermocomp.models.positionoptions import fill_options
 from thermocomp.recording.profiles import Profiles
 
 FloatArray = NDArray[np.float64]
 
 
 def found(made: Profiles) -> tuple[int, bool, float | None]:
-    options = suited(made)
+    options = fill_options(made)
     return options.slopes, options.offset, options.reference_position
 
 
@@ -50,7 +50,7 @@ def test_a_laser_that_was_set_to_zero_somewhere(zero: float) -> None:
 
 def test_profiles_that_shift() -> None:
     made = warmed(np.outer(warmth(), np.ones(12)))
-    options = suited(made)
+    options = fill_options(made)
     assert (options.slopes, options.offset) == (0, True)
     fit = fit_position(made, replace(options, method="ols"))
     assert fit.model.powers == (0,)
@@ -59,36 +59,36 @@ def test_profiles_that_shift() -> None:
     assert fit.model.offset.coefficients_by_name()["t1_C"] == pytest.approx(1.0, abs=0.02)
     q = np.linspace(-0.2, 0.35, 12)
     # nowhere still within the travel: the line crosses zero 1 m further on
-    far = suited(warmed(np.outer(warmth(), 1.0 + q)))
+    far = fill_options(warmed(np.outer(warmth(), 1.0 + q)))
     assert (far.slopes, far.offset) == (1, True)
 
 
 def test_what_is_given_stays() -> None:
     made = profiles(noise=0.1, second=20.0)
     given = PositionOptions(slopes=1, offset=True, reference_position=100.0)
-    assert suited(made, given, ()) == given
-    assert suited(made, given, ("slopes",)) == replace(given, slopes=2)
-    assert suited(made, given, ("reference_position",)).slopes == 1
-    assert suited(made, replace(given, offset=False, slopes=2), ("offset",)).reference_position == 100.0
+    assert fill_options(made, given, ()) == given
+    assert fill_options(made, given, ("slopes",)) == replace(given, slopes=2)
+    assert fill_options(made, given, ("reference_position",)).slopes == 1
+    assert fill_options(made, replace(given, offset=False, slopes=2), ("offset",)).reference_position == 100.0
 
 
 def test_only_states_that_may_be_learned_from_are_looked_at() -> None:
     straight, bent = profiles(noise=0.1), profiles(noise=0.1, second=20.0)
     learn = np.arange(72) < 48
     later = replace(straight, values=np.where(learn[:, None], straight.values, bent.values))
-    assert suited(later).slopes == 2
-    assert suited(later, learn=learn) == suited(straight, learn=learn)
-    assert suited(later, learn=learn).slopes == 1
+    assert fill_options(later).slopes == 2
+    assert fill_options(later, learn=learn) == fill_options(straight, learn=learn)
+    assert fill_options(later, learn=learn).slopes == 1
     with pytest.raises(FitError, match="no state is left to learn from"):
-        suited(later, learn=np.zeros(72, dtype=np.bool_))
+        fill_options(later, learn=np.zeros(72, dtype=np.bool_))
 
 
 def test_days_of_one_cold_state_are_looked_at_as_they_are_fitted() -> None:
     """Two mornings apart by a slope, each day without any: only from one cold state is there a thermal part."""
     q = 1e-3 * np.linspace(0.0, 550.0, 12)
     days = [warmed(np.outer(np.full(72, size), q)) for size in (-20.0, 20.0)]
-    assert suited(days).slopes == 0
-    assert suited(days, PositionOptions(rezero=False)).slopes == 1
+    assert fill_options(days).slopes == 0
+    assert fill_options(days, PositionOptions(rezero=False)).slopes == 1
 
 
 def test_the_cold_profile_alone() -> None:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.numerics.stepwise import (
     AlphaThresholds,
     FThresholds,
     Rule,
-    Selection,
+    StepwiseSelection,
     alpha_of_f,
     f_of_alpha,
     r_squared_of_f,
@@ -29,9 +29,9 @@ FloatArray = NDArray[np.float64]
 Threshold = Callable[[int], float]
 
 
-def run(X: FloatArray, y: FloatArray, rule: Rule, *, intercept: bool = True, **options: object) -> Selection:
+def run(X: FloatArray, y: FloatArray, rule: Rule, *, intercept: bool = True, **options: object) -> StepwiseSelection:
     names = [f"x{i}" for i in range(X.shape[1])]
-    return stepwise(triangle(table(X, y), intercept=intercept), rule, names, **options)  # type: ignore[arg-type]
+    return stepwise(triangle(join_columns(X, y), intercept=intercept), rule, names, **options)  # type: ignore[arg-type]
 
 
 def sse(X: FloatArray, y: FloatArray, columns: list[int], intercept: bool) -> float:
@@ -85,7 +85,7 @@ def problems(draw: st.DrawFn) -> tuple[FloatArray, FloatArray]:
     return X, y + draw(st.floats(0.01, 1)) * rng.normal(size=n)
 
 
-def same(found: Selection, expected: list[tuple[str, int, float]]) -> None:
+def same(found: StepwiseSelection, expected: list[tuple[str, int, float]]) -> None:
     assert [(s.action, s.index) for s in found.steps] == [(a, k) for a, k, _ in expected]
     # the transcription subtracts two sums of squares, so that its own smallest F have few digits
     np.testing.assert_allclose([s.f for s in found.steps], [f for *_, f in expected], rtol=1e-6, atol=1e-9)

@@ -22,7 +22,7 @@ from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.methods import METHODS
-from thermocomp.models.timed import TimedRegressor, from_column
+from thermocomp.models.timed import TimedRegressor, derive_steps
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples, stack
 
@@ -226,9 +226,9 @@ def test_a_scaled_time_or_none_at_all_is_refused(tests: Samples) -> None:
 def test_a_pause_is_refused_in_a_column_and_told_by_dt() -> None:
     time = np.r_[np.arange(0, 600, 10.0), np.arange(4200, 4800, 10.0)]
     with pytest.raises(InputError, match=r"3610 s pass before row 60, 10 s as a rule.*needs time='routed'"):
-        from_column(time)
-    assert from_column(np.r_[0.0, 10, 20, 0, 30, 60]).tolist() == [np.inf, 10, 10, np.inf, 30, 30]
-    assert from_column(np.r_[0.0, 95, 100]).tolist() == [np.inf, 95, 5]
+        derive_steps(time)
+    assert derive_steps(np.r_[0.0, 10, 20, 0, 30, 60]).tolist() == [np.inf, 10, 10, np.inf, 30, 30]
+    assert derive_steps(np.r_[0.0, 95, 100]).tolist() == [np.inf, 95, 5]
 
 
 def test_the_end_of_a_test_alone_is_refused_when_routed(tests: Samples) -> None:

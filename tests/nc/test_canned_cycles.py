@@ -4,14 +4,14 @@ import pytest
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Block, Setup
-from thermocomp.nc.interpreter.cycles import Cycle, CycleError
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.cycles import CannedCycle, CycleError
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 
 def run(text: str, setup: Setup | None = None) -> list[Block]:
     setup = setup or Setup(inch=False)
-    return list(follow(read_lines(split_lines(text), setup.controller), setup))
+    return list(follow_program(read_lines(split_lines(text), setup.controller), setup))
 
 
 def ways(block: Block) -> list[tuple[str, float, float, float]]:
@@ -116,7 +116,7 @@ def test_what_is_known_after_a_cycle() -> None:
 @pytest.mark.parametrize("shift", [0.0, 0.0123456, -1 / 3])
 def test_the_number_of_moves_does_not_depend_on_a_shift(shift: float) -> None:
     made = [
-        len(list(Cycle("G81", 17, True, to_r, False, (0.0, 0.0, start), {"X": 1.0}, sticky, start, 2).steps()))
+        len(list(CannedCycle("G81", 17, True, to_r, False, (0.0, 0.0, start), {"X": 1.0}, sticky, start, 2).steps()))
         for to_r in (True, False)
         for start in (2.0 + shift, 5.0)
         for sticky in ({"R": 2.0 + shift, "Z": -1.0 + shift},)
@@ -126,6 +126,8 @@ def test_the_number_of_moves_does_not_depend_on_a_shift(shift: float) -> None:
 
 def test_impossible_cycles() -> None:
     with pytest.raises(CycleError, match="below the bottom"):
-        list(Cycle("G81", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 2.0}, 5.0).steps())
+        list(CannedCycle("G81", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 2.0}, 5.0).steps())
     with pytest.raises(CycleError, match="pecks"):
-        list(Cycle("G83", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 0.0, "Q": 1e-9}, 5.0).steps())
+        list(
+            CannedCycle("G83", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 0.0, "Q": 1e-9}, 5.0).steps()
+        )

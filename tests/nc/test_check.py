@@ -4,7 +4,7 @@ import pytest
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.rewrite.check import Check
 from thermocomp.nc.rewrite.frame import Vector
@@ -18,7 +18,7 @@ NONE: Vector = (0.0, 0.0, 0.0)
 def checked(line: str, becomes: str, after: Vector = NONE, inner: Vector | None = None) -> None:
     """Let one line of a program become another one."""
     check = Check(Setup())
-    for block in follow(read_lines([*BEGIN, line]), Setup()):
+    for block in follow_program(read_lines([*BEGIN, line]), Setup()):
         last = block.line.number == len(BEGIN) + 1
         carried = after if last else NONE
         check.check(block, Change((becomes if last else block.line.text,), NONE, carried, inner or carried))

@@ -7,7 +7,7 @@ from nc_law import Growing, Steady
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.rewrite.demand import Demand, opposed
+from thermocomp.nc.rewrite.demand import Demand, oppose_deviation
 from thermocomp.nc.rewrite.frame import Vector
 
 HERE = (0.0, 0.0, 0.0)
@@ -15,7 +15,7 @@ HERE = (0.0, 0.0, 0.0)
 
 def test_a_growth_of_ten_um_is_answered_by_minus_ten() -> None:
     """Deviation is actual minus commanded: what is added to the program is its opposite (E-P4)."""
-    assert opposed((0.0, 0.0, 10.0)) == (0.0, 0.0, -10.0)
+    assert oppose_deviation((0.0, 0.0, 10.0)) == (0.0, 0.0, -10.0)
 
 
 def test_by_tolerance_it_is_renewed_when_the_drift_has_moved() -> None:

@@ -18,9 +18,9 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.arx import ARX
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import SOON, Drift
-from thermocomp.nc.thermal.inputs import Inputs, Signal, constants
+from thermocomp.nc.thermal.inputs import Inputs, InputSignal, constants
 from thermocomp.nc.thermal.stations import Station
-from thermocomp.papers.common import fitted, predicted
+from thermocomp.papers.common import fit_and_freeze, predict_deviation
 from thermocomp.papers.precompensation.setup import POSITIONS, samples_of
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -29,7 +29,7 @@ REMEMBERING: list[Callable[[], ErrorModel]] = [lags, ticking, net]
 
 def alone(model: ErrorModel, others: Inputs | None = None, **options: float) -> Drift:
     station = [Station("Z", model)]
-    return Drift(station, start.cold(station, others or {}), others, zero="cold", **options)
+    return Drift(station, start.begin_cold(station, others or {}), others, zero="cold", **options)
 
 
 def ladder(models: Sequence[ErrorModel], places: Sequence[float], axis: str = "Z") -> list[Station]:
@@ -62,8 +62,8 @@ def test_free_run_is_the_replay_that_judges_models() -> None:
     learn, judge = (samples_of(r) for r in record("precompensation", seed=1))
     target = learn.targets[1].name
     arx = ARX(inputs=("spindle_rpm",), time="routed", interval=600.0, k=1, m=0)
-    model = fitted(arx, learn, [target], dt=learn.dt(), cycle=learn.cycle)[target]
-    replayed = predicted(model, judge)
+    model = fit_and_freeze(arx, learn, [target], dt=learn.dt(), cycle=learn.cycle)[target]
+    replayed = predict_deviation(model, judge)
     assert judge.values[0, 0] == 0  # a cold start
     drift, found = alone(model), [0.0]
     for k, dt in enumerate(np.diff(judge.time).tolist(), start=1):
@@ -160,7 +160,7 @@ def test_a_speed_that_is_no_number_is_refused() -> None:
 def four() -> Drift:
     stations = ladder([lags(size=s) for s in (1.0, 1.3, 0.4, -0.5)], (0.0, 200.0, 400.0, 600.0))
     both = [Station("X", ticking("x_um")), *stations]
-    drift = Drift(both, start.cold(both, {}), {})
+    drift = Drift(both, start.begin_cold(both, {}), {})
     drift.advance(1800.0, 4000.0)
     return drift
 
@@ -189,7 +189,7 @@ def test_beyond_the_outermost_model_its_value_is_held_and_told() -> None:
 
 def test_the_drift_of_x_can_vary_along_z() -> None:
     stations = ladder([ticking(size=1.0), ticking(size=3.0)], (-400.0, -100.0), axis="X")
-    drift = Drift(stations, start.cold(stations, {}), {})
+    drift = Drift(stations, start.begin_cold(stations, {}), {})
     drift.advance(3600.0, 3000.0)
     upper, lower = drift.deviation((0.0, 0.0, -100.0)), drift.deviation((-100.0, 0.0, -400.0))
     assert upper[0] == pytest.approx(3 * lower[0])
@@ -214,7 +214,7 @@ def test_an_input_without_influence_is_not_asked_for() -> None:
 
 
 def test_a_forecast_is_followed() -> None:
-    forecast = Signal((0.0, 1000.0, 2000.0), (20.0, 23.0, 21.0))
+    forecast = InputSignal((0.0, 1000.0, 2000.0), (20.0, 23.0, 21.0))
     drift = alone(lags(room=True), {"t3_C": forecast})
     drift.advance(3000.0, 2000.0)
     model = lags(room=True)
@@ -257,7 +257,7 @@ def test_constants_are_read() -> None:
 @given(st.lists(st.tuples(st.integers(-50, 50), st.floats(-1e3, 1e3)), min_size=1, unique_by=lambda p: p[0]))
 def test_a_signal_is_linear_and_held(points: list[tuple[int, float]]) -> None:
     time, values = zip(*sorted((float(t), v) for t, v in points), strict=True)
-    signal = Signal(time, values)
+    signal = InputSignal(time, values)
     asked = np.linspace(-60.0, 60.0, 121)
     np.testing.assert_allclose([signal.at(t) for t in asked.tolist()], np.interp(asked, time, values), atol=1e-9)
     assert signal.held(10.0) == 0 if len(time) == 1 else signal.held(0.0) == max(0.0, -time[-1])
@@ -268,7 +268,7 @@ def test_a_signal_is_linear_and_held(points: list[tuple[int, float]]) -> None:
 )
 def test_signals_that_are_refused(time: tuple[float, ...], values: tuple[float, ...]) -> None:
     with pytest.raises(InputError, match="forecast"):
-        Signal(time, values)
+        InputSignal(time, values)
 
 
 # -- zero, range, bound ------------------------------------------------------------------------------------------------
@@ -276,7 +276,7 @@ def test_signals_that_are_refused(time: tuple[float, ...], values: tuple[float, 
 
 def test_the_drift_counts_from_the_stated_zero() -> None:
     station = [Station("Z", lags())]
-    warm = start.measured(station, {"Z": 7.0}, {})
+    warm = start.begin_measured(station, {"Z": 7.0}, {})
     from_start, from_cold = Drift(station, warm), Drift(station, warm, zero="cold")
     assert from_start.deviation(ORIGIN)[2] == 0
     assert from_cold.deviation(ORIGIN)[2] == pytest.approx(7.0, abs=1e-6)
@@ -319,7 +319,7 @@ def test_the_bound_of_an_axis_is_that_of_its_worst_model() -> None:
     def bound(*errors: float | None) -> float:
         models = [lags() if e is None else judged(lags(), e) for e in errors]
         stations = ladder(models, [100.0 * k for k in range(len(models))])
-        return Drift(stations, start.cold(stations, {})).uncertainty()[2]
+        return Drift(stations, start.begin_cold(stations, {})).uncertainty()[2]
 
     assert bound(2.0, 5.0, 3.0) == 5
     assert math.isnan(bound(2.0, None, 3.0))
@@ -328,9 +328,9 @@ def test_the_bound_of_an_axis_is_that_of_its_worst_model() -> None:
 
 def test_a_zero_that_is_predicted_doubles_the_bound() -> None:
     station = [Station("Z", judged(lags(), 2.0))]
-    first = Drift(station, start.cold(station, {}))
+    first = Drift(station, start.begin_cold(station, {}))
     first.advance(1000.0, 4000.0)
-    left = start.carried(station, first.state(), 60.0)
+    left = start.carry_over(station, first.state(), 60.0)
     assert Drift(station, left, zero="start").uncertainty()[2] == 4
     assert Drift(station, left, zero="last").uncertainty()[2] == 2
     assert Drift(station, left, zero="cold").uncertainty()[2] == 2
@@ -344,4 +344,4 @@ def test_refused_models_do_not_run() -> None:
 def test_stations_come_in_their_order() -> None:
     stations = ladder([lags(), lags()], (0.0, 200.0))[::-1]
     with pytest.raises(InputError, match="ordered"):
-        Drift(stations, start.cold(stations, {}))
+        Drift(stations, start.begin_cold(stations, {}))

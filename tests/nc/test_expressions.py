@@ -9,7 +9,7 @@ from oracle_run import ends
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.parser.expressions import Parameters, evaluate
 from thermocomp.nc.parser.line import Assignment
-from thermocomp.nc.parser.systemparameters import what_is
+from thermocomp.nc.parser.systemparameters import explain_unset
 
 KNOWN: dict[int | str, float] = {1: 2.0, 2: 5.0, 3: -0.5, "depth": 7.25, "_way": 3.0}
 
@@ -200,11 +200,11 @@ def test_targets_that_are_none(target: str) -> None:
 
 
 def test_every_parameter_is_told() -> None:
-    assert what_is(12) == what_is("depth") == "the program has not set it before"
-    assert all("only the machine knows" in what_is(number) for number in range(5061, 5071))
-    assert "reserved" in what_is(5700)
-    assert "system variable" in what_is(9000, "fanuc")
-    assert "has not set" in what_is(500, "fanuc")
+    assert explain_unset(12) == explain_unset("depth") == "the program has not set it before"
+    assert all("only the machine knows" in explain_unset(number) for number in range(5061, 5071))
+    assert "reserved" in explain_unset(5700)
+    assert "system variable" in explain_unset(9000, "fanuc")
+    assert "has not set" in explain_unset(500, "fanuc")
 
 
 @given(st.text("0123456789.+-*/[]#<>abcosinexrmd \t", max_size=40))

@@ -97,7 +97,7 @@ def test_a_feature_is_revised_rightly_or_refused(feature: Feature, way: str, tmp
 def test_a_feature_without_drift_stays_byte_for_byte(feature: Feature, tmp_path: Path) -> None:
     trial = revise(program(tmp_path, feature), tmp_path, Still(), "coordinates")
     written = trial.revised.read_bytes()
-    marks = "".join(header.blank("\n")).encode()
+    marks = "".join(header.make_blank("\n")).encode()
     assert written == marks + trial.original.read_bytes()
     assert trial.run.changed == 0
 

@@ -10,7 +10,7 @@ from random_programs import programs
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Block, Setup
-from thermocomp.nc.interpreter.interpret import Follower, follow
+from thermocomp.nc.interpreter.interpret import Follower, follow_program
 from thermocomp.nc.parser.tokens import program_lines, read_lines, split_lines
 
 NC_FILES = Path("/usr/share/linuxcnc/ncfiles")
@@ -21,7 +21,7 @@ needs_linuxcnc = pytest.mark.usefixtures("interpreter")
 
 
 def run(text: str, setup: Setup = MM) -> list[Block]:
-    return list(follow(read_lines(split_lines(text), setup.controller), setup))
+    return list(follow_program(read_lines(split_lines(text), setup.controller), setup))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_moves_of_the_nc_files_are_those_of_the_interpreter(oracle: Oracle) -> N
     for path in sorted(NC_FILES.rglob("*.ngc")):
         with path.open(encoding="latin-1", newline="") as stream:
             try:
-                blocks = list(follow(read_lines(program_lines(stream)), Setup(inch=False, tools=LENGTHS)))
+                blocks = list(follow_program(read_lines(program_lines(stream)), Setup(inch=False, tools=LENGTHS)))
             except ProgramError as error:
                 assert error.reason  # noqa: PT017
                 continue

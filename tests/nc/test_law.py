@@ -72,7 +72,7 @@ def test_the_programs_of_linuxcnc_as_they_are(way: str, tmp_path: Path) -> None:
 
 @needs_programs
 def test_without_drift_the_programs_stay_as_they_are(tmp_path: Path) -> None:
-    marks = "".join(header.blank("\n")).encode()
+    marks = "".join(header.make_blank("\n")).encode()
     compared = 0
     for path in sorted(PROGRAMS.glob("*.ngc")):
         try:

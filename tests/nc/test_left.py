@@ -10,11 +10,11 @@ from nc_law import STATED, Growing, Trial, revise
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Move, Point, Setup
-from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.frame import Vector
-from thermocomp.nc.rewrite.path import at, length
+from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.revise import Revision
 from thermocomp.nc.rewrite.text import DIGITS
 
@@ -153,13 +153,13 @@ def test_along_an_arc() -> None:
 
     half = Move(False, (10.0, 0.0, 0.0), (-10.0, 0.0, 6.0), Arc(17, (0.0, 0.0), False, 1))
     assert length(half) == pytest.approx(math.hypot(10 * math.pi, 6))
-    assert at(half, 0.5) == pytest.approx((0.0, 10.0, 3.0))
+    assert find_point(half, 0.5) == pytest.approx((0.0, 10.0, 3.0))
     other = Move(False, (10.0, 0.0, 0.0), (-10.0, 0.0, 6.0), Arc(17, (0.0, 0.0), True, 2))
     assert length(other) == pytest.approx(math.hypot(30 * math.pi, 6))
-    assert at(other, 1.0) == pytest.approx((-10.0, 0.0, 6.0))
+    assert find_point(other, 1.0) == pytest.approx((-10.0, 0.0, 6.0))
     full = Move(False, (10.0, 0.0, 0.0), (10.0, 0.0, 0.0), Arc(17, (0.0, 0.0), True, 1))
     assert length(full) == pytest.approx(20 * math.pi)
-    assert at(full, 0.25) == pytest.approx((0.0, -10.0, 0.0))
+    assert find_point(full, 0.25) == pytest.approx((0.0, -10.0, 0.0))
 
 
 class Fixed(Growing):
@@ -188,7 +188,7 @@ def test_a_least_increment_coarser_than_the_step_is_used(tmp_path: Path) -> None
     path = tmp_path / "program.ngc"
     path.write_text("G20 G90 G17 G94\nS3000 M3 F12.\nG0 X0. Y0. Z.4\nG1 Z-.04\n" + "X8.\nX0.\n" * 9 + "G0 Z.4\nM30\n")
     setup = Setup(controller="fanuc", inch=False, speed=3000.0, integers="refuse")
-    run = Revision(setup, Kinematics(), Ending(), Coordinates(DIGITS["fanuc"], 1.0), Demand(1.0))
+    run = Revision(setup, MotionLimits(), Ending(), Coordinates(DIGITS["fanuc"], 1.0), Demand(1.0))
     with path.open(newline="") as file:
         list(run.revise(file))
     assert run.left.most[2] < 5.0

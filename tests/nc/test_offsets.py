@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.nc.interpreter.block import Block, Point, Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.interpreter.offsets import Offsets
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
@@ -15,7 +15,7 @@ coordinates = st.tuples(*[st.floats(-1e3, 1e3)] * 3)
 
 def run(text: str, setup: Setup | None = None) -> list[Block]:
     setup = setup or Setup(inch=False)
-    return list(follow(read_lines(split_lines(text), setup.controller), setup))
+    return list(follow_program(read_lines(split_lines(text), setup.controller), setup))
 
 
 @given(coordinates, coordinates, coordinates, coordinates, st.floats(-360.0, 360.0))

@@ -8,7 +8,7 @@ from nc_law import STATED, Growing, Steady, method
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.revise import Revision
 
@@ -16,7 +16,7 @@ HEAD = "G21 G90 G17 G94 G54\nS3000 M3 F300\nG0 X0 Y0 Z10\nG1 Z-1\n"
 
 
 def revision(way: str = "coordinates", setup: Setup = STATED, drift: Steady | None = None) -> Revision:
-    return Revision(setup, Kinematics(), drift or Growing(), method(way), Demand(1.0))
+    return Revision(setup, MotionLimits(), drift or Growing(), method(way), Demand(1.0))
 
 
 def refused(text: str, way: str = "coordinates", setup: Setup = STATED) -> str:

@@ -15,7 +15,7 @@ from thermocomp.core.jobstate import JobState
 from thermocomp.core.model import ErrorModel
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
-from thermocomp.nc.thermal.inputs import Signal
+from thermocomp.nc.thermal.inputs import InputSignal
 from thermocomp.nc.thermal.stations import Station
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -32,8 +32,8 @@ def one(model: ErrorModel) -> list[Station]:
 @given(cut=st.integers(0, 2700), pause=st.integers(0, 3600))
 def test_two_jobs_and_a_pause_are_one_long_run(make: Callable[[], ErrorModel], cut: int, pause: int) -> None:
     stations = one(make())
-    first = Drift(stations, start.cold(stations, {}))
-    whole = Drift(stations, start.cold(stations, {}))
+    first = Drift(stations, start.begin_cold(stations, {}))
+    whole = Drift(stations, start.begin_cold(stations, {}))
     rest = float(cut)
     second = None
     for seconds, speed in WARM:
@@ -44,7 +44,7 @@ def test_two_jobs_and_a_pause_are_one_long_run(make: Callable[[], ErrorModel], c
         if mine < seconds:
             if second is None:
                 whole.advance(pause, 0.0)
-                second = Drift(stations, start.carried(stations, first.state(), pause), zero="last")
+                second = Drift(stations, start.carry_over(stations, first.state(), pause), zero="last")
                 assert second.time == 0
             second.advance(seconds - mine, speed)
             whole.advance(seconds - mine, speed)
@@ -56,11 +56,11 @@ def test_two_jobs_and_a_pause_are_one_long_run(make: Callable[[], ErrorModel], c
 
 def test_work_offsets_set_anew_count_from_the_end_of_the_pause() -> None:
     stations = one(lags())
-    first = Drift(stations, start.cold(stations, {}))
+    first = Drift(stations, start.begin_cold(stations, {}))
     first.advance(1800.0, 5000.0)
     left = first.state()
-    anew = Drift(stations, start.carried(stations, left, 600.0))
-    cold = Drift(stations, start.carried(stations, left, 600.0), zero="cold")
+    anew = Drift(stations, start.carry_over(stations, left, 600.0))
+    cold = Drift(stations, start.carry_over(stations, left, 600.0), zero="cold")
     assert anew.deviation(ORIGIN)[2] == 0
     assert 0 < cold.deviation(ORIGIN)[2] < first.deviation(ORIGIN)[2]
     anew.advance(3600.0, 0.0)
@@ -69,11 +69,11 @@ def test_work_offsets_set_anew_count_from_the_end_of_the_pause() -> None:
 
 def test_a_pause_follows_a_forecast_of_its_time() -> None:
     stations = one(lags(room=True))
-    steady = {"t3_C": Signal.constant(20.0)}
-    first = Drift(stations, start.cold(stations, steady), steady)
+    steady = {"t3_C": InputSignal.constant(20.0)}
+    first = Drift(stations, start.begin_cold(stations, steady), steady)
     first.advance(60.0, 0.0)
-    falling = {"t3_C": Signal((-3600.0, 0.0), (20.0, 18.0))}
-    second = Drift(stations, start.carried(stations, first.state(), 3600.0), falling, zero="last")
+    falling = {"t3_C": InputSignal((-3600.0, 0.0), (20.0, 18.0))}
+    second = Drift(stations, start.carry_over(stations, first.state(), 3600.0), falling, zero="last")
     model = lags(room=True)
     state, deviation = model.step(model.init(), np.array([0.0, 20.0]), 0.0)
     for k in range(1, 721):
@@ -84,16 +84,16 @@ def test_a_pause_follows_a_forecast_of_its_time() -> None:
 
 def test_a_state_of_other_models_is_refused() -> None:
     stations = one(lags())
-    left = Drift(stations, start.cold(stations, {})).state()
+    left = Drift(stations, start.begin_cold(stations, {})).state()
     with pytest.raises(InputError, match="another model of z_um"):
-        start.carried(one(lags(size=1.1)), left)
+        start.carry_over(one(lags(size=1.1)), left)
     with pytest.raises(InputError, match="left the state of Z; this one has models of X"):
-        start.carried([Station("X", lags())], left)
+        start.carry_over([Station("X", lags())], left)
     with pytest.raises(InputError, match="pause"):
-        start.carried(stations, left, -1.0)
+        start.carry_over(stations, left, -1.0)
     short = JobState((replace(left.stations[0], memory=(1.0,)),), left.zero_known)
     with pytest.raises(InputError, match="not complete"):
-        start.carried(stations, short)
+        start.carry_over(stations, short)
 
 
 def test_how_a_model_was_judged_does_not_make_it_another_one() -> None:
@@ -104,10 +104,10 @@ def test_how_a_model_was_judged_does_not_make_it_another_one() -> None:
 
 def test_what_was_doubted_stays_so_in_the_next_job() -> None:
     stations = one(judged(strict(lags()), 2.0))
-    first = Drift(stations, start.cold(stations, {}))
+    first = Drift(stations, start.begin_cold(stations, {}))
     first.advance(600.0, 9000.0)
     said = first.deviation(ORIGIN)[2]
-    second = Drift(stations, start.carried(stations, first.state(), 60.0), zero="last")
+    second = Drift(stations, start.carry_over(stations, first.state(), 60.0), zero="last")
     assert second.uncertainty()[2] >= 2 + said > 3
     assert second.outside == ()
 
@@ -119,7 +119,7 @@ def test_what_was_doubted_stays_so_in_the_next_job() -> None:
 @pytest.mark.parametrize("deviation", [0.0, 0.7, 12.3])
 def test_a_measured_start_says_what_was_measured(make: Callable[[], ErrorModel], deviation: float) -> None:
     stations = one(make())
-    drift = Drift(stations, start.measured(stations, {"Z": deviation}, {}), zero="cold")
+    drift = Drift(stations, start.begin_measured(stations, {"Z": deviation}, {}), zero="cold")
     assert drift.deviation(ORIGIN)[2] == pytest.approx(deviation, abs=1e-6)
     drift.advance(5.0, 0.0)
     fastest = 5.0 if make is net else 0.04 * deviation + 1e-6
@@ -130,14 +130,14 @@ def test_a_measured_lag_bank_has_settled_at_one_speed() -> None:
     model = lags()
     state, _ = model.step(model.init(), np.array([2500.0]), 0.0)
     _, deviation = model.step(state, np.zeros(1), 0.0)
-    (found,) = start.measured(one(model), {"Z": float(deviation)}, {}).states
+    (found,) = start.begin_measured(one(model), {"Z": float(deviation)}, {}).states
     assert found.memory is not None
     assert state.memory is not None
     np.testing.assert_allclose(found.memory, state.memory, rtol=1e-6)
 
 
 def test_a_measured_autoregressive_model_stood_still_before() -> None:
-    drift = Drift(one(net()), start.measured(one(net()), {"Z": 12.3}, {}), zero="cold")
+    drift = Drift(one(net()), start.begin_measured(one(net()), {"Z": 12.3}, {}), zero="cold")
     state, deviation = net().begin_at(12.3, np.zeros(1)), np.array(0.0)
     for _ in range(12):
         drift.advance(5.0, 4000.0)
@@ -153,7 +153,7 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
         Station("Z", lags("z_at_200_um"), "Z", 200.0),
     ]
     texts = ["x=3um", "z_at_0 = 0.004 mm", "z_at_200_um=5 um"]
-    found = start.measured(stations, start.deviations(texts), {})
+    found = start.begin_measured(stations, start.deviations(texts), {})
     drift = Drift(stations, found, zero="cold")
     assert drift.deviation((0.0, 0.0, 100.0)) == pytest.approx((3.0, 0.0, 4.5), abs=1e-6)
     assert found.assumed == ()
@@ -164,16 +164,16 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
         ({"X": 3.0, "Z": 50.0}, r"Z \(the mean of 2 models\): 50 um; no speed from 0 to 6000 1/min leaves it"),
     ]:
         with pytest.raises(InputError, match=says):
-            start.measured(stations, wrong, {})
+            start.begin_measured(stations, wrong, {})
     three = [*stations, Station("Z", lags("z_at_400_um"), "Z", 400.0)]
     with pytest.raises(InputError, match="that of Z at Z 400 mm is missing; give z_at_400=VALUEum"):
-        start.measured(three, {"X": 3.0, "z_at_0": 4.0, "z_at_200": 5.0}, {})
+        start.begin_measured(three, {"X": 3.0, "z_at_0": 4.0, "z_at_200": 5.0}, {})
 
 
 @pytest.mark.parametrize("other", [lags, ticking])
 def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., ErrorModel]) -> None:
     stations = [Station("Z", lags("z_at_0_um"), "Z", 0.0), Station("Z", other("z_at_600_um", 0.4), "Z", 600.0)]
-    whole = start.measured(stations, {"Z": 7.0}, {})
+    whole = start.begin_measured(stations, {"Z": 7.0}, {})
     low, high = (float(s.deviation) for s in whole.states)
     assert 0.5 * (low + high) == pytest.approx(7.0, abs=1e-6)
     assert 0 < high < low
@@ -182,10 +182,10 @@ def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., Erro
     assert "the mean of its 2 models is 7 um" in said
     # one station tells the same speed, and so the same of the other
     for name, value, told in [("z_at_0", low, 1), ("z_at_600_um", high, 0)]:
-        found = start.measured(stations, {name: value}, {})
+        found = start.begin_measured(stations, {name: value}, {})
         assert float(found.states[told].deviation) == pytest.approx((low, high)[told], abs=1e-5)
         assert f"there {name} is {value:g} um" in found.assumed[0]
-    both = Drift(stations, start.measured(stations, {"z_at_0": low, "z_at_600": high}, {}), zero="cold")
+    both = Drift(stations, start.begin_measured(stations, {"z_at_0": low, "z_at_600": high}, {}), zero="cold")
     mine = Drift(stations, whole, zero="cold")
     assert mine.assumed == whole.assumed
     both.advance(300.0, 3000.0)
@@ -197,7 +197,7 @@ def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., Erro
 
 def test_stations_that_are_proportional_stay_so() -> None:
     stations = [Station("Z", lags("a_um", -1.0), "Z", 0.0), Station("Z", lags("b_um", -3.0), "Z", 600.0)]
-    one_of_them, other = start.measured(stations, {"Z": -12.0}, {}).states
+    one_of_them, other = start.begin_measured(stations, {"Z": -12.0}, {}).states
     assert float(one_of_them.deviation) == pytest.approx(-6.0, abs=1e-6)
     assert float(other.deviation) == pytest.approx(-18.0, abs=1e-6)
 
@@ -205,9 +205,9 @@ def test_stations_that_are_proportional_stay_so() -> None:
 def test_a_station_without_memory_or_speed_cannot_be_fixed_by_another() -> None:
     stations = [Station("Z", lags("a_um"), "Z", 0.0), Station("Z", static("b_um"), "Z", 600.0)]
     with pytest.raises(InputError, match="model of b_um has no memory"):
-        start.measured(stations, {"Z": 2.0}, {})
+        start.begin_measured(stations, {"Z": 2.0}, {})
     with pytest.raises(InputError, match="model of b_um has no memory"):
-        start.measured(stations, {"a": 2.0}, {})
+        start.begin_measured(stations, {"a": 2.0}, {})
 
 
 @pytest.mark.parametrize(
@@ -221,16 +221,16 @@ def test_measured_texts_that_are_refused(texts: list[str], says: str) -> None:
 
 def test_measured_deviations_that_no_speed_explains_are_refused() -> None:
     with pytest.raises(InputError, match=r"no speed from 0 to 6000 1/min leaves it: the model goes from 0 to 37"):
-        start.measured(one(lags()), {"Z": 50.0}, {})
+        start.begin_measured(one(lags()), {"Z": 50.0}, {})
     with pytest.raises(InputError, match="check sign"):
-        start.measured(one(lags()), {"Z": -5.0}, {})
+        start.begin_measured(one(lags()), {"Z": -5.0}, {})
     with pytest.raises(InputError, match="finite"):
-        start.measured(one(lags()), {"Z": math.nan}, {})
+        start.begin_measured(one(lags()), {"Z": math.nan}, {})
 
 
 def test_a_model_without_memory_cannot_start_warm() -> None:
     with pytest.raises(InputError, match="no memory"):
-        start.measured(one(static()), {"Z": 2.0}, {})
+        start.begin_measured(one(static()), {"Z": 2.0}, {})
 
 
 def test_a_model_of_the_room_alone_cannot_start_measured() -> None:
@@ -245,4 +245,4 @@ def test_a_model_of_the_room_alone_cannot_start_measured() -> None:
         lagged=(0.5,),
     )
     with pytest.raises(InputError, match="not driven by the spindle speed"):
-        start.measured(one(only), {"Z": 2.0}, {"t3_C": Signal.constant(20.0)})
+        start.begin_measured(one(only), {"Z": 2.0}, {"t3_C": InputSignal.constant(20.0)})

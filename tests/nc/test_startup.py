@@ -2,13 +2,13 @@
 
 import pytest
 
-from thermocomp.adapters.linuxcnc.verification.states import stated
+from thermocomp.adapters.linuxcnc.verification.states import build_stored
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Modal, Setup
-from thermocomp.nc.interpreter.interpret import follow
-from thermocomp.nc.interpreter.startup import modal, tidy, whole
+from thermocomp.nc.interpreter.interpret import follow_program
+from thermocomp.nc.interpreter.startup import complete_codes, modal, tidy
 from thermocomp.nc.parser.tokens import Controller, read_lines
-from thermocomp.nc.planner.timeline import Kinematics, timed
+from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 
 
 @pytest.mark.parametrize(
@@ -62,18 +62,18 @@ def test_other_codes_are_refused(text: str, controller: Controller, message: str
 )
 def test_the_follower_starts_as_if_the_program_had_said_it(startup: str, expected: Modal) -> None:
     setup = Setup(inch=False, startup=startup)
-    (block,) = follow(read_lines(["(nothing)\n"]), setup)
+    (block,) = follow_program(read_lines(["(nothing)\n"]), setup)
     assert block.modal == modal(setup) == expected
     if startup:
-        (block,) = follow(read_lines([f"{startup}\n"]), Setup(inch=False))
+        (block,) = follow_program(read_lines([f"{startup}\n"]), Setup(inch=False))
         assert block.modal == expected
 
 
 def test_startup_codes_are_in_mm_also_where_the_program_is_in_inches() -> None:
-    (block,) = follow(read_lines(["(nothing)\n"]), Setup(inch=True, startup="G64 P0.1"))
+    (block,) = follow_program(read_lines(["(nothing)\n"]), Setup(inch=True, startup="G64 P0.1"))
     assert (block.modal.inch, block.modal.blend) == (True, 0.1)
     lines = ["G20 G64 P0.01 Q0.005\n", "G21 G64 P0.01\n"]
-    inch, mm = (b.modal for b in follow(read_lines(lines), Setup()))
+    inch, mm = (b.modal for b in follow_program(read_lines(lines), Setup()))
     assert (inch.blend, inch.naive) == pytest.approx((0.254, 0.127))
     assert (mm.blend, mm.naive) == (0.01, 0.01)
 
@@ -84,7 +84,7 @@ def test_the_program_takes_as_long_as_if_it_had_said_it(startup: str) -> None:
     program = ["G21\n", "F3000 S1000 M3\n", "G1 X0 Y0\n", *zigzag, "M2\n"]
 
     def seconds(lines: list[str], setup: Setup) -> float:
-        *_, last = timed(follow(read_lines(lines), setup), Kinematics())
+        *_, last = time_blocks(follow_program(read_lines(lines), setup), MotionLimits())
         return last.end
 
     found = seconds(program, Setup(startup=startup))
@@ -93,8 +93,8 @@ def test_the_program_takes_as_long_as_if_it_had_said_it(startup: str) -> None:
 
 
 def test_the_interpreter_starts_as_the_follower() -> None:
-    assert stated(Setup()).startup == "G64 G99"
-    assert stated(Setup(startup="G64 P0.01 G98")).startup == "G64 P0.01 G98"
-    assert whole(Setup(startup="G61")) == "G61 G99"
-    assert whole(Setup(startup="G98")) == "G64 G98"
-    assert whole(Setup(controller="fanuc")) == "G64 G98"
+    assert build_stored(Setup()).startup == "G64 G99"
+    assert build_stored(Setup(startup="G64 P0.01 G98")).startup == "G64 P0.01 G98"
+    assert complete_codes(Setup(startup="G61")) == "G61 G99"
+    assert complete_codes(Setup(startup="G98")) == "G64 G98"
+    assert complete_codes(Setup(controller="fanuc")) == "G64 G98"

@@ -13,7 +13,7 @@ from thermocomp.nc.parser.line import Line, Word
 from thermocomp.nc.rewrite import header
 from thermocomp.nc.rewrite.diff import CONTEXT, unified
 from thermocomp.nc.rewrite.frame import Frame
-from thermocomp.nc.rewrite.text import DIGITS, LONGEST, number, parted, shifted
+from thermocomp.nc.rewrite.text import DIGITS, LONGEST, format_number, part_comments, shift_words
 
 
 def block(text: str, *words: tuple[str, str, float | None, float]) -> Block:
@@ -36,37 +36,37 @@ def block(text: str, *words: tuple[str, str, float | None, float]) -> Block:
     [(1.0, "1.0"), (-0.025, "-0.025"), (-0.00001, "0.0"), (12.34567, "12.3457"), (100.0, "100.0"), (0.0, "0.0")],
 )
 def test_a_number_has_a_point_and_no_idle_zeros(value: float, text: str) -> None:
-    assert number(value, 4) == text
+    assert format_number(value, 4) == text
 
 
 def test_untouched_words_stay_as_they_are() -> None:
     b = block("n10 g1 x1.50 Z - 1 . 5 (to Z)\r\n", ("x", "1.50", 1.5, 1.5), ("Z", " - 1 . 5", -1.5, -1.5))
-    assert shifted(b, {"X": 0.0, "Z": 0.0}, {}, 4) == b.line.text
-    assert shifted(b, {"Z": -0.025}, {}, 4) == "n10 g1 x1.50 Z-1.525 (to Z)\r\n"
+    assert shift_words(b, {"X": 0.0, "Z": 0.0}, {}, 4) == b.line.text
+    assert shift_words(b, {"Z": -0.025}, {}, 4) == "n10 g1 x1.50 Z-1.525 (to Z)\r\n"
 
 
 def test_decimals_that_were_written_stay() -> None:
     b = block("X1.2345678", ("X", "1.2345678", 1.2345678, 1.2345678))
-    assert shifted(b, {"X": 0.001}, {}, 4) == "X1.2355678"
+    assert shift_words(b, {"X": 0.001}, {}, 4) == "X1.2355678"
 
 
 def test_an_expression_is_wrapped() -> None:
     b = block("G1 Z[#1+2]F100", ("Z", "[#1+2]", None, 7.0), ("F", "100", 100.0, 100.0))
-    assert shifted(b, {"Z": -0.025}, {}, 4) == "G1 Z[[#1+2]-0.025]F100"
-    assert shifted(b, {"Z": 0.025}, {}, 4) == "G1 Z[[#1+2]+0.025]F100"
+    assert shift_words(b, {"Z": -0.025}, {}, 4) == "G1 Z[[#1+2]-0.025]F100"
+    assert shift_words(b, {"Z": 0.025}, {}, 4) == "G1 Z[[#1+2]+0.025]F100"
 
 
 def test_a_word_is_added_behind_the_last_one() -> None:
     b = block("X5 (note)\n", ("X", "5", 5.0, 5.0))
-    assert shifted(b, {"X": 0.01}, {"Z": -1.02}, 4) == "X5.01 Z-1.02 (note)\n"
+    assert shift_words(b, {"X": 0.01}, {"Z": -1.02}, 4) == "X5.01 Z-1.02 (note)\n"
 
 
 def test_a_long_comment_gets_a_line_of_its_own() -> None:
     long = "a" * 230
-    assert parted(f"N5 G1 X1.0 (b) Y2.0 ({long})\r\n") == (f"(b) ({long})\r\n", "N5 G1 X1.0  Y2.0\r\n")
-    assert parted(f"G1 X1.0 ; {long} \n") == (f"; {long}\n", "G1 X1.0\n")
+    assert part_comments(f"N5 G1 X1.0 (b) Y2.0 ({long})\r\n") == (f"(b) ({long})\r\n", "N5 G1 X1.0  Y2.0\r\n")
+    assert part_comments(f"G1 X1.0 ; {long} \n") == (f"; {long}\n", "G1 X1.0\n")
     for same in (f"G1 X1.0 (short){' ' * 200}\n", "G1" + " " * LONGEST + "X1\n"):
-        assert parted(same) == (same,)
+        assert part_comments(same) == (same,)
 
 
 def test_digits_of_the_controllers() -> None:
@@ -139,11 +139,11 @@ def test_a_missing_last_newline_is_told() -> None:
 
 
 def test_headers_have_the_same_number_of_lines() -> None:
-    empty, full = header.blank("\r\n"), header.filled(["model (z.json)", "start: cold", "µm"], "\r\n")
+    empty, full = header.make_blank("\r\n"), header.fill(["model (z.json)", "start: cold", "µm"], "\r\n")
     assert len(empty) == len(full) == header.LINES
     assert full[1] == "(THERMOCOMP model [z.json])\r\n"
     assert all(line.isascii() and line.count("(") == line.count(")") == 1 for line in full)
-    assert all(len(line) <= header.WIDTH + 2 for line in header.filled(["x" * 200], "\n"))
+    assert all(len(line) <= header.WIDTH + 2 for line in header.fill(["x" * 200], "\n"))
 
 
 def test_a_revised_program_is_refused() -> None:

@@ -13,10 +13,12 @@ from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
 from thermocomp.nc.interpreter.block import Arc, Block, Modal, Move, Point
 from thermocomp.nc.parser.line import Line, Word
-from thermocomp.nc.planner.timeline import ACCELERATION, AHEAD, CHUNK, RAPID, Kinematics, timed
+from thermocomp.nc.planner.timeline import ACCELERATION, AHEAD, CHUNK, RAPID, MotionLimits, time_blocks
 
 #: 100, 80, 50 mm/s; a cycle that no figure feels
-MILL = Kinematics((6000.0, 4800.0, 3000.0), (1000.0, 800.0, 500.0), tool_change=7.0, stop=30.0, spindle=2.0, cycle=1e-9)
+MILL = MotionLimits(
+    (6000.0, 4800.0, 3000.0), (1000.0, 800.0, 500.0), tool_change=7.0, stop=30.0, spindle=2.0, cycle=1e-9
+)
 EXACT = Modal(blend=None)
 
 
@@ -29,8 +31,8 @@ def path(points: Sequence[Point], feed: float, modal: Modal = EXACT) -> Iterator
         yield block(Move(feed == 0.0, start, end, None, feed), modal=modal)
 
 
-def lasting(*blocks: Block, kinematics: Kinematics = MILL) -> float:
-    return list(timed(blocks, kinematics))[-1].end
+def lasting(*blocks: Block, kinematics: MotionLimits = MILL) -> float:
+    return list(time_blocks(blocks, kinematics))[-1].end
 
 
 def from_rest(length: float, speed: float, acceleration: float) -> float:
@@ -55,7 +57,7 @@ def test_the_slowest_axis_limits_a_rapid_and_a_feed() -> None:
 
 
 def test_most_feed_along_the_path_is_the_machines() -> None:
-    slow = Kinematics((6000.0,) * 3, (1000.0,) * 3, feed=1200.0, cycle=1e-9)
+    slow = MotionLimits((6000.0,) * 3, (1000.0,) * 3, feed=1200.0, cycle=1e-9)
     move = Move(False, (0.0, 0.0, 0.0), (100.0, 0.0, 0.0), None, 3000.0)
     assert lasting(block(move), kinematics=slow) == pytest.approx(from_rest(100.0, 20.0, 1000.0), rel=1e-6)
 
@@ -72,7 +74,7 @@ def test_a_right_angle_is_a_stop_if_the_path_is_exact_and_is_cut_if_it_is_not() 
         modal = Modal(blend=blend)
         corner = path([(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, 50.0, 0.0)], 3000.0, modal)
         rapid = path([(100.0, 50.0, 0.0), (100.0, 50.0, 9.0)], 0.0, modal)
-        return list(timed([*corner, *rapid], MILL))[1].end
+        return list(time_blocks([*corner, *rapid], MILL))[1].end
 
     # a tenth of the acceleration is kept back for the corner
     assert cut(None) == pytest.approx(from_rest(100.0, 50.0, 900.0) + from_rest(50.0, 50.0, 720.0), rel=1e-6)
@@ -89,7 +91,7 @@ def test_how_fast_a_right_angle_is_cut() -> None:
 
     points = [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0), (100.0, 80.0, 0.0), (100.0, 80.0, 1.0)]
     blocks = [*path(points[:3], 3000.0, Modal(blend=0.1)), *path(points[2:], 0.0, Modal(blend=0.1))]
-    ends = [t.end for t in timed(blocks, MILL)]
+    ends = [t.end for t in time_blocks(blocks, MILL)]
     corner = cut * math.pi / 2.0 / speed
     assert ends[0] == pytest.approx(run_in(100.0 - cut, 1000.0), rel=1e-4)
     assert ends[1] - ends[0] == pytest.approx(corner + run_in(80.0 - cut, 800.0), rel=1e-4)
@@ -98,7 +100,7 @@ def test_how_fast_a_right_angle_is_cut() -> None:
 def test_turning_back_is_a_stop() -> None:
     points = [(0.0, 0.0, 0.0), (50.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     blocks = [*path(points[:3], 3000.0, Modal()), *path(points[2:], 0.0, Modal())]
-    assert list(timed(blocks, MILL))[1].end == pytest.approx(2.0 * from_rest(50.0, 50.0, 1000.0), rel=1e-6)
+    assert list(time_blocks(blocks, MILL))[1].end == pytest.approx(2.0 * from_rest(50.0, 50.0, 1000.0), rel=1e-6)
 
 
 def test_an_arc_goes_no_faster_than_it_can_turn() -> None:
@@ -148,7 +150,7 @@ def test_pauses_tool_changes_stops_and_the_spindle_add_up() -> None:
         block(stops=True, codes=("M0",)),
         block(ends=True, codes=("M2",)),
     ]
-    lengths = [t.end - t.start for t in timed(blocks, MILL)]
+    lengths = [t.end - t.start for t in time_blocks(blocks, MILL)]
     assert lengths == pytest.approx([2.0, alone, 1.5, 9.0, alone + 0.5, 30.0, 0.0], rel=1e-6)
 
 
@@ -197,14 +199,14 @@ def test_a_move_in_feed_without_a_feed_is_refused() -> None:
 
 def test_kinematics_of_a_machine_file() -> None:
     axes = (Axis("X", (0.0, 1.0), rapid=12_000.0), Axis("Z", (0.0, 1.0), acceleration=700.0))
-    found = Kinematics.of(Machine("m", Structure(("X",), ("Z",)), axes), tool_change=4.0)
-    assert found == Kinematics((12_000.0, RAPID, RAPID), (ACCELERATION, ACCELERATION, 700.0), tool_change=4.0)
+    found = MotionLimits.of(Machine("m", Structure(("X",), ("Z",)), axes), tool_change=4.0)
+    assert found == MotionLimits((12_000.0, RAPID, RAPID), (ACCELERATION, ACCELERATION, 700.0), tool_change=4.0)
     for wrong in ({"feed": 0.0}, {"cycle": -1.0}, {"stop": -1.0}, {"spindle": math.nan}, {"rotary_rapid": math.nan}):
         with pytest.raises(SettingError) as caught:
-            Kinematics(**wrong)  # type: ignore[arg-type]
+            MotionLimits(**wrong)  # type: ignore[arg-type]
         assert caught.value.path == tuple(wrong)
     with pytest.raises(SettingError, match="must be positive"):
-        Kinematics(rapid=(1.0, 0.0, 1.0))
+        MotionLimits(rapid=(1.0, 0.0, 1.0))
 
 
 coordinates = st.floats(-20.0, 20.0).map(lambda v: round(v, 2))
@@ -218,7 +220,7 @@ def test_no_path_is_faster_than_its_feed_and_its_axes_nor_slower_than_with_stops
     corners: list[Point], feed: float, modal: Modal
 ) -> None:
     blocks = list(path(corners, feed, modal))
-    found = list(timed(blocks, MILL))
+    found = list(time_blocks(blocks, MILL))
     assert [t.block for t in found] == blocks
     assert found[0].start == 0.0
     assert all(a.end == b.start for a, b in pairwise(found))
@@ -254,10 +256,10 @@ def test_it_streams_and_does_not_depend_on_how_it_is_cut() -> None:
 
     ahead = 0
     ends = []
-    for k, t in enumerate(timed(blocks(2 * n - 1), MILL)):
+    for k, t in enumerate(time_blocks(blocks(2 * n - 1), MILL)):
         ends.append(t.end)
         ahead = max(ahead, asked - k)
     assert ahead <= CHUNK + AHEAD + 2
-    shorter = [t.end for t in timed(blocks(n), MILL)]
+    shorter = [t.end for t in time_blocks(blocks(n), MILL)]
     same = sum(a == pytest.approx(b, rel=1e-12) for a, b in zip(ends, shorter, strict=False))
     assert n - AHEAD - 1 <= same < n

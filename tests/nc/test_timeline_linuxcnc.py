@@ -12,11 +12,11 @@ import linuxcncrun
 import pytest
 
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.planner.timeline import Kinematics, Timed, timed
+from thermocomp.nc.planner.timeline import MotionLimits, Timed, time_blocks
 
-KINEMATICS = Kinematics(
+KINEMATICS = MotionLimits(
     rapid=(linuxcncrun.SPEEDS[0] * 60.0, linuxcncrun.SPEEDS[1] * 60.0, linuxcncrun.SPEEDS[2] * 60.0),
     acceleration=linuxcncrun.ACCELERATIONS,
     tool_change=0.0,
@@ -109,8 +109,8 @@ def ran() -> dict[str, linuxcncrun.Run]:
 
 
 def ours(lines: list[str]) -> list[Timed]:
-    blocks = follow(read_lines(text(lines).splitlines(keepends=True)), Setup())
-    return list(timed(blocks, KINEMATICS))
+    blocks = follow_program(read_lines(text(lines).splitlines(keepends=True)), Setup())
+    return list(time_blocks(blocks, KINEMATICS))
 
 
 @pytest.mark.long

@@ -14,7 +14,7 @@ from test_interpret import needs_linuxcnc
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
 FANUC = Setup("fanuc", inch=False, integers="refuse", least=1e-6)
@@ -35,7 +35,7 @@ def written(text: str, setup: Setup = FANUC) -> list[tuple[str, int]]:
 def places(text: str) -> list[Place]:
     """Return where the follower goes in what comes out."""
     lines = read_lines((line for line, _ in written(text)), "fanuc")
-    return [m.end for b in follow(lines, FANUC) for m in b.moves if math.dist(m.start, m.end) > 1e-9 or m.arc]
+    return [m.end for b in follow_program(lines, FANUC) for m in b.moves if math.dist(m.start, m.end) > 1e-9 or m.arc]
 
 
 def theirs(oracle: Oracle, text: str) -> list[Place]:

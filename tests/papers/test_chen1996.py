@@ -17,8 +17,8 @@ from thermocomp.papers.chen1996 import setup as chen1996_setup
 from thermocomp.papers.chen1996 import show as chen1996_show
 from thermocomp.papers.chen1996 import slope as chen1996_slope
 from thermocomp.papers.chen1996 import unseen as chen1996_unseen
-from thermocomp.papers.chen1996.drift import Learned
-from thermocomp.papers.chen1996.slope import Positioning
+from thermocomp.papers.chen1996.drift import LearnedDrift
+from thermocomp.papers.chen1996.slope import LearnedPositioning
 from thermocomp.papers.chen1996.unseen import DYNAMIC, MRA, NET, NONE, Unseen
 from thermocomp.papers.studies import run
 from thermocomp.papers.study import Claim, Study
@@ -57,17 +57,17 @@ def study(quick: None, told: list[float]) -> Study:
 
 
 @pytest.fixture(scope="module")
-def learned(quick: None) -> Learned:
+def learned(quick: None) -> LearnedDrift:
     return chen1996_drift.learn(0, lambda _: None)
 
 
 @pytest.fixture(scope="module")
-def slopes(quick: None) -> Positioning:
+def slopes(quick: None) -> LearnedPositioning:
     return chen1996_slope.learn(1, 2)
 
 
 @pytest.fixture(scope="module")
-def unseen(learned: Learned) -> Unseen:
+def unseen(learned: LearnedDrift) -> Unseen:
     return chen1996_unseen.observe(learned, 1)
 
 
@@ -128,7 +128,7 @@ def test_compensation_helps_where_the_machine_drifts(study: Study) -> None:
 # -- drifts --------------------------------------------------------------------------------------------------------
 
 
-def test_sensors_are_those_of_table_1(learned: Learned) -> None:
+def test_sensors_are_those_of_table_1(learned: LearnedDrift) -> None:
     """C-11: T5 is the average of the four at the column."""
     values = {c.name: learned.samples.values[:, j] for j, c in enumerate(learned.samples.inputs)}
     assert list(values) == [*chen1996_setup.TEMPERATURES, "speed"]
@@ -136,7 +136,7 @@ def test_sensors_are_those_of_table_1(learned: Learned) -> None:
     assert sorted({float(s) for s in values["speed"]}) == [0, 600, 1000, 1500, 2100, 2600]
 
 
-def test_regressions_take_their_subgroups_and_nets_all_nine(learned: Learned) -> None:
+def test_regressions_take_their_subgroups_and_nets_all_nine(learned: LearnedDrift) -> None:
     """C-13, C-26."""
     for target, regression in learned.regressions.items():
         assert regression.variables_ == chen1996_setup.SUBGROUPS[target]
@@ -151,11 +151,11 @@ def test_regressions_take_their_subgroups_and_nets_all_nine(learned: Learned) ->
     assert learned.others["9-5-3"][1].net.net_.shape == (9, 5, 3)
 
 
-def test_errors_after_training_are_those_of_the_replayed_models(learned: Learned) -> None:
+def test_errors_after_training_are_those_of_the_replayed_models(learned: LearnedDrift) -> None:
     """C-31."""
     change = learned.samples.only(chen1996_setup.TEMPERATURES).frame()
     for target, regression in learned.regressions.items():
-        error = common.measured(learned.samples, target) - regression.predict(change)
+        error = common.take_measured(learned.samples, target) - regression.predict(change)
         np.testing.assert_allclose(learned.mra_residual[target], error, atol=1e-9)
     for trained in learned.nets:
         for target, model in trained.models.items():
@@ -164,7 +164,7 @@ def test_errors_after_training_are_those_of_the_replayed_models(learned: Learned
     assert sorted(n.mean for n in learned.nets)[1] == learned.typical.mean
 
 
-def test_claims_on_the_fits_can_fail(learned: Learned) -> None:
+def test_claims_on_the_fits_can_fail(learned: LearnedDrift) -> None:
     better = [replace(n, mae={t: 0.5 * e for t, e in n.mae.items()}) for n in learned.nets]
     worse = [replace(n, mae={t: 2.0 * e for t, e in n.mae.items()}) for n in learned.nets]
     for others, holds in ((better, False), (worse, True)):
@@ -181,7 +181,7 @@ def test_claims_on_the_fits_can_fail(learned: Learned) -> None:
         assert find(chen1996_drift.claims(replace(learned, nets=nets)), "C-31", "very close").holds is holds
 
 
-def test_the_log_of_the_regression_is_a_table(learned: Learned) -> None:
+def test_the_log_of_the_regression_is_a_table(learned: LearnedDrift) -> None:
     """C-16: Fig. 2."""
     (log,) = [t for t in chen1996_show.tables(learned) if t.caption == "Fig. 2: steps in x"]
     assert len(log.rows) == len(learned.regressions["x"].log_)
@@ -208,7 +208,7 @@ def test_residuals_are_measured_minus_replayed(unseen: Unseen) -> None:
         for k, target in enumerate("xyz"):
             assert list(residuals[target]) == [NONE, MRA, NET, DYNAMIC]
             np.testing.assert_array_equal(residuals[target][NONE], test.deviations[:, k])
-            predicted = common.predicted(unseen.dynamic[target], test)
+            predicted = common.predict_deviation(unseen.dynamic[target], test)
             np.testing.assert_allclose(residuals[target][DYNAMIC], test.deviations[:, k] - predicted)
     assert chen1996_unseen.largest_error(unseen)[NONE] == pytest.approx(
         max(float(np.linalg.norm(t.deviations, axis=1).max()) for t in unseen.tests)
@@ -246,7 +246,9 @@ def test_a_net_that_knows_the_truth_fulfils_them(unseen: Unseen) -> None:
     knowing = cheat(unseen.learned.samples)
     spies = [f"spy {t}" for t in column]
     models = {
-        t: common.fitted(SecondOrderRegression(subset=[f"spy {t}"], second_order=False), knowing.only(spies), [t])[t]
+        t: common.fit_and_freeze(
+            SecondOrderRegression(subset=[f"spy {t}"], second_order=False), knowing.only(spies), [t]
+        )[t]
         for t in column
     }
     learned = replace(
@@ -262,7 +264,7 @@ def test_a_net_that_knows_the_truth_fulfils_them(unseen: Unseen) -> None:
 # -- slopes --------------------------------------------------------------------------------------------------------
 
 
-def test_the_slope_is_that_of_the_thermal_part(slopes: Positioning) -> None:
+def test_the_slope_is_that_of_the_thermal_part(slopes: LearnedPositioning) -> None:
     """C-04, C-07, E-C6: um/m; the same as the house's own, for a polynomial takes nothing from a straight line."""
     k1 = np.array([0.0, 20.0, -35.0])
     day = slopes.learned
@@ -275,7 +277,7 @@ def test_the_slope_is_that_of_the_thermal_part(slopes: Positioning) -> None:
             np.testing.assert_allclose(left, 0.0, atol=1e-9)
 
 
-def test_profiles_are_those_of_the_test(slopes: Positioning) -> None:
+def test_profiles_are_those_of_the_test(slopes: LearnedPositioning) -> None:
     np.testing.assert_array_equal(slopes.learned.position, np.arange(0, 551, 50))
     assert slopes.learned.values.shape == slopes.other.values.shape == slopes.pitch.values.shape == (51, 12)
     (recording,) = chen1996_setup.recordings("chen1996-slope", 1)
@@ -283,7 +285,7 @@ def test_profiles_are_those_of_the_test(slopes: Positioning) -> None:
     np.testing.assert_array_equal(slopes.pitch.values[:, 3], recording.table["y_pitch_150_urad"])
 
 
-def test_the_cold_profile_is_a_polynomial_of_fifth_order(slopes: Positioning) -> None:
+def test_the_cold_profile_is_a_polynomial_of_fifth_order(slopes: LearnedPositioning) -> None:
     """C-22: with y in mm, result in um."""
     learned = slopes.learned
     expected = np.polyval(np.polyfit(learned.position, learned.values[0], 5), learned.position)
@@ -294,7 +296,7 @@ def test_the_cold_profile_is_a_polynomial_of_fifth_order(slopes: Positioning) ->
     np.testing.assert_allclose(by_hand, expected, atol=0.1)  # four digits are printed
 
 
-def test_slopes_are_learned_from_five_variables(slopes: Positioning) -> None:
+def test_slopes_are_learned_from_five_variables(slopes: LearnedPositioning) -> None:
     """C-23, C-27."""
     assert slopes.regression.variables_ == chen1996_setup.SLOPE_VARIABLES
     (linear,) = slopes.linear.model.slopes
@@ -313,7 +315,7 @@ def test_slopes_are_learned_from_five_variables(slopes: Positioning) -> None:
     np.testing.assert_allclose(values["T7-T9"], table["T7"] - table["T9"])
 
 
-def test_claims_on_slopes_can_fail(slopes: Positioning) -> None:
+def test_claims_on_slopes_can_fail(slopes: LearnedPositioning) -> None:
     claims = chen1996_slope.claims(slopes)
     assert find(claims, "C-23", "51 sets").ours == "51, 20"
     assert find(claims, "C-23", "higher-order").holds != any("*" in t for t in slopes.regression.terms_)

@@ -14,8 +14,8 @@ from thermocomp.files import recordings as files
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
 from thermocomp.papers import cross
-from thermocomp.papers.cross import Experiment, Row
-from thermocomp.recording.cycles import find_cycles, whole
+from thermocomp.papers.cross import CrossExperiment, Row
+from thermocomp.recording.cycles import find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
 
 METHODS_HERE = ("ols", "dynamic", "arx")
@@ -30,7 +30,7 @@ def three_tests(name: str, seed: int) -> list[Recording]:
     still = []
     for r in found:
         kept = tuple(c for c in r.channels if c.quantity != "spindle_speed")
-        still.append(replace(r, table=r.table[[c.name for c in kept]], channels=kept, cycles=whole(len(r))))
+        still.append(replace(r, table=r.table[[c.name for c in kept]], channels=kept, cycles=make_single_cycle(len(r))))
     return still
 
 
@@ -53,7 +53,7 @@ def row(rows: Sequence[Row], method: str) -> Row:
 
 
 def test_the_last_tests_are_unseen(machine: list[tuple[str, int]]) -> None:
-    task = cross.virtual(Experiment("moving", "z_um", unseen=2), seed=3)
+    task = cross.simulate_task(CrossExperiment("moving", "z_um", unseen=2), seed=3)
     (split,) = task.judging.splits
     np.testing.assert_array_equal(split.learn, task.samples.test == 0)
     np.testing.assert_array_equal(split.judge, task.samples.test > 0)
@@ -62,7 +62,7 @@ def test_the_last_tests_are_unseen(machine: list[tuple[str, int]]) -> None:
 
 
 def test_what_follows_has_another_seed(machine: list[tuple[str, int]]) -> None:
-    task = cross.virtual(Experiment("moving", -1, then="later"), seed=3)
+    task = cross.simulate_task(CrossExperiment("moving", -1, then="later"), seed=3)
     assert machine == [("moving", 3), ("later", 4)]
     assert task.samples.targets[0].name == "x_um"
     np.testing.assert_array_equal(task.judging.splits[0].judge, task.samples.test == 5)
@@ -70,7 +70,7 @@ def test_what_follows_has_another_seed(machine: list[tuple[str, int]]) -> None:
 
 @pytest.mark.usefixtures("machine")
 def test_figures_of_a_row() -> None:
-    task = cross.virtual(Experiment("moving", "z_um"), seed=0)
+    task = cross.simulate_task(CrossExperiment("moving", "z_um"), seed=0)
     rows = cross.judge(task, METHODS_HERE)
     assert [r.method for r in rows] == [cross.NONE, *METHODS_HERE]
     split, y = task.judging.splits[0], task.samples.deviations[:, 0]
@@ -95,7 +95,7 @@ def test_figures_of_a_row() -> None:
 
 
 def test_of_a_measured_machine_every_cycle_is_unseen_once(recording: Recording) -> None:
-    task = cross.measured([recording], "x_um")
+    task = cross.take_task([recording], "x_um")
     assert len(task.judging.splits) == 4
     assert np.sum([s.judge for s in task.judging.splits], axis=0).tolist() == [1] * len(recording)
     (none, ols) = cross.judge(task, ["ols"])
@@ -110,7 +110,7 @@ def test_of_a_measured_machine_every_cycle_is_unseen_once(recording: Recording) 
 
 @pytest.mark.usefixtures("machine")
 def test_a_method_that_cannot_be_fitted_is_told(recording: Recording) -> None:
-    study = cross.run(0, methods=METHODS_HERE, experiments=[Experiment("resting", "z_um")])
+    study = cross.run(0, methods=METHODS_HERE, experiments=[CrossExperiment("resting", "z_um")])
     (claim,) = study.claims
     assert claim.finding.endswith("Not fitted: arx.")
     overview, table = study.tables
@@ -128,7 +128,7 @@ def test_one_table_of_all(recording: Recording) -> None:
         lambda share, _: told.append(share),
         [recording],
         methods=("ols", "dynamic"),
-        experiments=[Experiment("moving", "z_um"), Experiment("resting", "x_um")],
+        experiments=[CrossExperiment("moving", "z_um"), CrossExperiment("resting", "x_um")],
     )
     assert told == sorted(told)
     assert told[-1] == 1.0

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from thermocomp.datasets.virtual import record
 from thermocomp.models.selection.grouping import Interval
-from thermocomp.papers.common import predicted
+from thermocomp.papers.common import predict_deviation
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.hwang import setup as hwang_setup
-from thermocomp.papers.study import Claim, Study, silent
+from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -64,8 +64,8 @@ def test_the_verdicts_are_those_of_the_numbers(study: Study) -> None:
 
 
 def test_a_seed_is_a_study(study: Study) -> None:
-    assert hwang.run(0, silent).numbers == study.numbers
-    assert hwang.run(1, silent).numbers != study.numbers
+    assert hwang.run(0, tell_nobody).numbers == study.numbers
+    assert hwang.run(1, tell_nobody).numbers != study.numbers
 
 
 def test_a_drift_of_squares_refutes_the_linear_model(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,7 +79,7 @@ def test_a_drift_of_squares_refutes_the_linear_model(monkeypatch: pytest.MonkeyP
         return [replace(test, table=test.table.assign(z_um=z))]
 
     monkeypatch.setattr(hwang_setup, "record", made)
-    study = hwang.run(0, silent)
+    study = hwang.run(0, tell_nobody)
     refuted = claim(study, "H-12", "H-13")
     assert refuted.holds is False
     assert "times the error of the engineering judgement model" in refuted.finding
@@ -117,4 +117,4 @@ def test_the_engineering_judgement_model_is_least_squares() -> None:
     residual = z - X @ weights
     assert fit.error == pytest.approx(np.sqrt(residual @ residual / (len(z) - 7)))
     assert fit.r_squared == pytest.approx(1 - residual @ residual / np.sum((z - z.mean()) ** 2))
-    assert predicted(fit.model, samples) == pytest.approx(X @ weights, abs=1e-6)
+    assert predict_deviation(fit.model, samples) == pytest.approx(X @ weights, abs=1e-6)

@@ -12,7 +12,7 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
-from thermocomp.papers.study import Claims, Ours, Part, Study, Table
+from thermocomp.papers.study import Claims, Ours, Part, Study, StudyTable
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 
@@ -26,19 +26,19 @@ def tests() -> Samples:
 def test_channels_get_the_names_of_the_paper(recording: Recording) -> None:
     first = recording.temperatures[0].name
 
-    named = common.renamed(recording, {"z_um": "z", first: "T1"})
+    named = common.rename_channels(recording, {"z_um": "z", first: "T1"})
 
     assert [c.name for c in named.channels] == ["z", "T1"]
     assert named.channel("T1").quantity == "temperature"
     pd.testing.assert_series_equal(named.table["T1"], recording.table[first], check_names=False)
     with pytest.raises(InputError, match="T99"):
-        common.renamed(recording, {"T99": "T1"})
+        common.rename_channels(recording, {"T99": "T1"})
 
 
 def test_a_derived_channel_is_a_weighted_sum(recording: Recording) -> None:
     a, b = (c.name for c in recording.temperatures[:2])
 
-    more = common.derived(recording, Channel("d", "temperature", "degC"), {a: 1.0, b: -1.0})
+    more = common.add_derived_channel(recording, Channel("d", "temperature", "degC"), {a: 1.0, b: -1.0})
 
     assert len(more.channels) == len(recording.channels) + 1
     np.testing.assert_allclose(more.table["d"], recording.table[a] - recording.table[b])
@@ -72,10 +72,10 @@ def test_a_sensor_that_is_cut_off_stays_at_its_zero(tests: Samples) -> None:
 def test_the_replay_gives_what_the_estimator_predicts(tests: Samples) -> None:
     estimator = LeastSquares()
 
-    models = common.fitted(estimator, tests, ["x_um"])
+    models = common.fit_and_freeze(estimator, tests, ["x_um"])
 
     np.testing.assert_allclose(
-        common.predicted(models["x_um"], tests), estimator.predict(tests.frame()), rtol=0, atol=1e-9
+        common.predict_deviation(models["x_um"], tests), estimator.predict(tests.frame()), rtol=0, atol=1e-9
     )
     np.testing.assert_allclose(
         common.residual(models["x_um"], tests), tests.deviations[:, 1] - estimator.predict(tests.frame()), atol=1e-9
@@ -85,9 +85,9 @@ def test_the_replay_gives_what_the_estimator_predicts(tests: Samples) -> None:
 def test_a_net_learns_several_targets_at_once(tests: Samples) -> None:
     net = SigmoidNet(hidden=3, n_epochs=20)
 
-    models = common.fitted(net, tests, ["x_um", "z_um"])
+    models = common.fit_and_freeze(net, tests, ["x_um", "z_um"])
 
-    both = np.column_stack([common.predicted(m, tests) for m in models.values()])
+    both = np.column_stack([common.predict_deviation(m, tests) for m in models.values()])
     assert list(models) == ["x_um", "z_um"]
     assert [m.target for m in models.values()] == ["x_um", "z_um"]
     np.testing.assert_allclose(both, net.predict(tests.frame()), rtol=0, atol=1e-9)
@@ -97,17 +97,17 @@ def test_a_method_with_a_memory_gets_its_clock(tests: Samples) -> None:
     speeds = [c.name for c in tests.inputs if c.quantity == "spindle_speed"]
     estimator = DynamicRidge(speed=speeds, time="routed")
 
-    model = common.fitted(estimator, tests, ["z_um"], dt=tests.dt(), cycle=tests.cycle)["z_um"]
+    model = common.fit_and_freeze(estimator, tests, ["z_um"], dt=tests.dt(), cycle=tests.cycle)["z_um"]
 
     np.testing.assert_allclose(
-        common.predicted(model, tests), estimator.predict(tests.frame(), dt=tests.dt()), rtol=0, atol=1e-9
+        common.predict_deviation(model, tests), estimator.predict(tests.frame(), dt=tests.dt()), rtol=0, atol=1e-9
     )
 
 
 def test_a_paper_s_model_does_not_stop_at_its_trained_range(tests: Samples) -> None:
     only = tests.only([tests.inputs[0].name])
     estimator = LeastSquares()
-    model = common.fitted(estimator, only, ["z_um"])["z_um"]
+    model = common.fit_and_freeze(estimator, only, ["z_um"])["z_um"]
 
     far = 50.0 * float(np.abs(only.change()).max())
     state, _ = model.step(model.init(), np.zeros(1), 0.0)
@@ -171,7 +171,7 @@ def test_a_claim_is_judged_by_its_function() -> None:
 
 
 def test_a_study_is_its_parts_one_after_the_other() -> None:
-    table, figure = Table("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
+    table, figure = StudyTable("t", ("a",), []), pictures.single("k", "c", ("x", "y"), [])
     made = Study.of("n", "T", Part([], [table], [figure], {"a": 1.0}), Part([], [], [figure], {"b": 2.0}))
     assert (made.name, made.title, made.claims, made.tables) == ("n", "T", (), (table,))
     assert made.figures == (figure, figure)

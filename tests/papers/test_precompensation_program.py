@@ -12,9 +12,9 @@ from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input
-from thermocomp.datasets.virtual import find, record
+from thermocomp.datasets.virtual import find_experiment, record
 from thermocomp.nc.thermal.drift import Drift
-from thermocomp.nc.thermal.start import cold
+from thermocomp.nc.thermal.start import begin_cold
 from thermocomp.papers.precompensation import cutting, program
 from thermocomp.papers.precompensation.cutting import COLD, COLDER, HOUR, WARM, WARMER, Changing
 from thermocomp.papers.precompensation.setup import POSITIONS, SPEED
@@ -58,7 +58,7 @@ def models() -> list[LinearDynamic]:
 def drifting(test: Recording) -> Recording:
     """Return the test of a machine that does what the models say."""
     there = program.stations(models())
-    drift, rows = Drift(there, cold(there, {})), [(0.0,) * len(POSITIONS)]
+    drift, rows = Drift(there, begin_cold(there, {})), [(0.0,) * len(POSITIONS)]
     for dt, speed in zip(np.diff(test.time), test.table[SPEED].to_numpy()[1:], strict=True):
         for _ in range(12):
             drift.advance(dt / 12, float(speed))
@@ -73,7 +73,7 @@ def drifting(test: Recording) -> Recording:
 
 def test_the_spindle_turns_as_in_the_test_to_the_second() -> None:
     test = recorded()
-    lines = program.written(test)
+    lines = program.write_program(test)
     times = np.arange(10.0, test.time[-1], 0.7)
     rows = np.minimum(np.searchsorted(test.time, times), len(test) - 1)
     away = np.abs(times[:, None] - test.time).min(axis=1) > 0.01
@@ -83,7 +83,7 @@ def test_the_spindle_turns_as_in_the_test_to_the_second() -> None:
 
 
 def test_faces_are_milled_in_the_first_and_last_five_minutes_with_a_turning_spindle() -> None:
-    lines = program.written(recorded())
+    lines = program.write_program(recorded())
     found = program.faces(lines)
     assert [(f.number, f.position) for f in found] == [(n, float(p)) for n in (1, 2) for p in POSITIONS]
     assert all((f.time > 0).all() and (f.time < 300).all() for f in found[:4])
@@ -102,7 +102,7 @@ def test_a_stretch_too_short_for_its_moves() -> None:
     table.loc[3:, SPEED] = 1000.0
     short = Recording(test.name, test.time, table, test.channels, test.cycles)
     with pytest.raises(ValueError, match=r"the moves before it take \d+\.\d s longer"):
-        program.written(short)
+        program.write_program(short)
 
 
 # -- revised ---------------------------------------------------------------------------------------------------------
@@ -112,7 +112,7 @@ def test_every_ten_minutes_adds_the_drift_of_that_moment_and_place() -> None:
     # P-06, E-P4: 30 min after the start the drift is d, so -d is commanded from 30 to 40 min
     test = recorded()
     truth = drifting(test)
-    revised = program.faces(program.revised(program.written(test), models(), program.EVERY))
+    revised = program.faces(program.revise_program(program.write_program(test), models(), program.EVERY))
     for face in revised[:4]:
         assert np.allclose(face.z, 0)
     for face, p in zip(revised[4:], POSITIONS, strict=True):
@@ -124,19 +124,19 @@ def test_every_ten_minutes_adds_the_drift_of_that_moment_and_place() -> None:
 @pytest.mark.parametrize("way", [program.NEEDED, program.SAFE])
 def test_a_machine_that_does_what_the_models_say_mills_to_the_drawing(way: str) -> None:
     test = recorded()
-    truth, lines = drifting(test), program.written(test)
+    truth, lines = drifting(test), program.write_program(test)
     before = [f.surface(truth).mean() for f in program.faces(lines)]
-    after = [f.surface(truth) for f in program.faces(program.revised(lines, models(), way))]
+    after = [f.surface(truth) for f in program.faces(program.revise_program(lines, models(), way))]
     assert np.ptp(before) > 15
     assert max(np.abs(s).max() for s in after) < (3.5 if way == program.NEEDED else 7)
     assert np.abs([s.mean() for s in after[4:]]).max() < 1.5
 
 
 def test_a_state_carried_over_is_that_of_the_job_before() -> None:
-    lines = program.written(recorded())
+    lines = program.write_program(recorded())
     there = models()
     from_cold, from_warm = (
-        program.faces(program.revised(lines, there, program.EVERY, start))
+        program.faces(program.revise_program(lines, there, program.EVERY, start))
         for start in (None, program.warmed(there, HOUR, 2000.0))
     )
     # settled at 2000 1/min before: the work is set up on the warm machine, and 30 um of drift are behind it
@@ -145,11 +145,11 @@ def test_a_state_carried_over_is_that_of_the_job_before() -> None:
 
 
 def test_linuxcnc_mills_what_is_read_back(tmp_path: Path) -> None:
-    if reason := rs274.installed():
+    if reason := rs274.find_obstacle():
         pytest.skip(reason)
     stored = rs274.Stored(origins={1: (0.0, 0.0, -program.TOOL)}, lengths={1: program.TOOL})
     for way in program.WAYS:
-        lines = program.revised(program.written(recorded()), models(), way)
+        lines = program.revise_program(program.write_program(recorded()), models(), way)
         path = tmp_path / "cut.ngc"
         path.write_text("".join(lines), encoding="ascii")
         calls = [c.machine[:3] for c in rs274.read(path, stored) if c.kind in ("rapid", "feed")]
@@ -180,7 +180,7 @@ def test_a_pass_that_climbs_is_looked_at_all_along() -> None:
 
 
 def test_the_true_states_differ_in_nothing_but_what_they_should() -> None:
-    tests = {what: record(cutting.true(what), seed=3)[0] for what in (COLD, WARM, WARMER, COLDER)}
+    tests = {what: record(cutting.make_true_test(what), seed=3)[0] for what in (COLD, WARM, WARMER, COLDER)}
     speed = tests[COLD].table[SPEED].to_numpy()
     noisy = record("precompensation-cut", seed=3)[0]
     assert np.abs(tests[COLD].table["z_at_0_um"].to_numpy()[::3] - noisy.table["z_at_0_um"].to_numpy()).max() < 2
@@ -209,6 +209,6 @@ def test_a_room_that_changes() -> None:
 
 
 def test_warm_is_as_long_soaked_as_cold() -> None:
-    (plan,) = cutting.true(WARM).tests
-    assert plan.soak.longest == find("precompensation-cut").tests[0].soak.longest
+    (plan,) = cutting.make_true_test(WARM).tests
+    assert plan.soak.longest == find_experiment("precompensation-cut").tests[0].soak.longest
     assert plan.soak.segments[1].duration == 1800

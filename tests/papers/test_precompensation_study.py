@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.models.arx import ARX
-from thermocomp.papers.common import fitted
+from thermocomp.papers.common import fit_and_freeze
 from thermocomp.papers.precompensation import cutting
 from thermocomp.papers.precompensation import redo as precompensation
 from thermocomp.papers.precompensation import setup as precompensation_setup
-from thermocomp.papers.study import Claim, Study, silent
+from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.simulation.protocol import Experiment
@@ -58,7 +58,7 @@ def another_machine(monkeypatch: pytest.MonkeyPatch, room: float = 0.0) -> Study
         monkeypatch.setattr(module, "record", lambda e, *, seed: made(e, seed=seed, room=room))
     monkeypatch.setattr(cutting, "CUTS", 2)
     monkeypatch.setattr(cutting, "HOUSE", ("dynamic",))
-    return precompensation.run(0, silent)
+    return precompensation.run(0, tell_nobody)
 
 
 @pytest.fixture
@@ -125,13 +125,13 @@ def test_a_room_that_changes_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None
 def test_what_is_added_to_the_program_is_minus_the_deviation() -> None:
     # E-P4: a growth of +10 um is taken back by -10 um
     time = np.arange(0.0, 31 * 60.0, 60.0)
-    assert (precompensation_setup.scheduled(time, np.full((31, 2), 10.0)) == -10).all()
+    assert (precompensation_setup.schedule_corrections(time, np.full((31, 2), 10.0)) == -10).all()
 
 
 def test_the_program_is_corrected_every_ten_minutes() -> None:
     # P-06
     time = np.arange(0.0, 31 * 60.0, 60.0)
-    added = precompensation_setup.scheduled(time, time[:, None] / 60)[:, 0]
+    added = precompensation_setup.schedule_corrections(time, time[:, None] / 60)[:, 0]
     assert added.tolist() == [0.0] * 10 + [-10.0] * 10 + [-20.0] * 10 + [-30.0]
 
 
@@ -146,7 +146,9 @@ def test_depth_difference_of_two_surfaces() -> None:
     learn = precompensation_setup.samples_of(made("precompensation", seed=1)[0])
     still = replace(learn, deviations=0 * learn.deviations)
     estimator = ARX(inputs=("spindle_rpm",), time="routed", k=0, m=0)
-    nothing = [fitted(estimator, still, [c.name], dt=learn.dt(), cycle=learn.cycle)[c.name] for c in still.targets]
+    nothing = [
+        fit_and_freeze(estimator, still, [c.name], dt=learn.dt(), cycle=learn.cycle)[c.name] for c in still.targets
+    ]
     found = precompensation_setup.cut(replace(test, table=table), nothing)
     assert found.without == pytest.approx([7.0] * 4)
     assert found.scheduled == pytest.approx([7.0] * 4)

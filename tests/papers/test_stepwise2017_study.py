@@ -10,7 +10,7 @@ from smallmachine import small_machine
 from thermocomp.datasets.virtual import record
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
-from thermocomp.papers.study import Claim, Study, silent
+from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
 
@@ -58,7 +58,7 @@ def _of(experiment: str, seed: int, few: bool) -> list[Recording]:
 
 def test_a_drift_of_two_temperatures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stepwise2017_setup, "record", lambda e, *, seed: _of(e, seed, few=True))
-    study = stepwise2017.run(0, silent)
+    study = stepwise2017.run(0, tell_nobody)
     assert claim(study, "T-07").holds
     assert claim(study, "T-07").ours == "2: front_seat, table"
     assert study.numbers["rms_online_um"] < 0.1 * study.numbers["rms_online_none_um"]
@@ -71,7 +71,7 @@ def test_a_drift_of_two_temperatures(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_drift_of_many_temperatures_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """T-07 can fail: here eight temperatures count."""
     monkeypatch.setattr(stepwise2017_setup, "record", lambda e, *, seed: _of(e, seed, few=False))
-    study = stepwise2017.run(0, silent)
+    study = stepwise2017.run(0, tell_nobody)
     many = claim(study, "T-07")
     assert many.holds is False
     assert many.ours.startswith("8: ")

@@ -18,7 +18,7 @@ from thermocomp.papers.wessel2004 import spindle as wessel2004_spindle
 from thermocomp.papers.wessel2004 import tools as wessel2004_tools
 from thermocomp.papers.wessel2004.sets import Selection
 from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME, Trial, loop_width, place, stacked, trial
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +31,9 @@ def table(name: str, temperatures: FloatArray, displacements: FloatArray, dt: fl
     kinds = {"t": ("temperature", "degC"), "s": ("displacement", "um")}
     channels = tuple(Channel(n, *kinds[n[0]]) for n in names)
     values = pd.DataFrame(np.hstack([temperatures, displacements]), columns=names)
-    return Recording(name, dt * np.arange(len(values), dtype=np.float64), values, channels, whole(len(values)))
+    return Recording(
+        name, dt * np.arange(len(values), dtype=np.float64), values, channels, make_single_cycle(len(values))
+    )
 
 
 def heated_rod(name: str, heat: FloatArray, *, room: float = 20.0, n_t: int = 9, n_s: int = 3) -> Recording:
@@ -371,4 +373,4 @@ def test_no_common_set_is_told() -> None:
 
 
 def test_sets_are_written_like_the_papers() -> None:
-    assert wessel2004_sets.called((0, 1, 7)) == "{T1, T2, T8}"
+    assert wessel2004_sets.name_set((0, 1, 7)) == "{T1, T2, T8}"

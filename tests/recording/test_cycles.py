@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
+from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 
 
 @given(
@@ -71,12 +71,12 @@ def test_a_spindle_that_never_starts_anew_gives_one_cycle(speed: np.ndarray[tupl
 
 
 def test_labels_become_cycles() -> None:
-    assert given_cycles(["a", "a", "b"]) == (Cycle("a", 0, 2), Cycle("b", 2, 3))
-    assert given_cycles([1.0, 1.0, 2.5]) == (Cycle("1", 0, 2), Cycle("2.5", 2, 3))
+    assert split_by_labels(["a", "a", "b"]) == (Cycle("a", 0, 2), Cycle("b", 2, 3))
+    assert split_by_labels([1.0, 1.0, 2.5]) == (Cycle("1", 0, 2), Cycle("2.5", 2, 3))
     with pytest.raises(RecordingError, match=r"'a' comes back at row 2"):
-        given_cycles(["a", "b", "a"])
+        split_by_labels(["a", "b", "a"])
 
 
 def test_the_whole_test_is_one_cycle() -> None:
-    assert whole(7) == (Cycle("whole test", 0, 7),)
-    assert len(whole(7)[0]) == 7
+    assert make_single_cycle(7) == (Cycle("whole test", 0, 7),)
+    assert len(make_single_cycle(7)[0]) == 7

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from smallmachine import small_machine
 
-from thermocomp.core.fingerprints import Prints, unpacked
+from thermocomp.core.fingerprints import Prints, unpack_marks
 from thermocomp.core.machine import Channel
 from thermocomp.datasets import virtual
 from thermocomp.files.recordings import read
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.fingerprints import LENGTH, fingerprint, overlap, repeats
 from thermocomp.recording.samples import Samples, stack
 
@@ -288,7 +288,7 @@ def test_a_plateau_and_a_ramp_give_none() -> None:
     noise = series(21 + 0.1 * rng.normal(size=(1000, 2)), 0.2 * rng.normal(size=1000))
     found = fingerprint(noise, 0, everything)
     assert found is not None
-    assert not any(unpacked(run.moving).any() for run in found.runs)
+    assert not any(unpack_marks(run.moving).any() for run in found.runs)
     assert share(found, noise) == 0.0
 
 
@@ -303,7 +303,7 @@ def test_a_spindle_that_stands_or_turns_is_no_input() -> None:
 @pytest.mark.parametrize("experiment", ["random", "stepwise2017", "iso230-spindle", "wessel-tool"])
 def test_the_virtual_machine_on_two_days(experiment: str) -> None:
     """One protocol, two seeds of weather and noise, every target."""
-    days = [virtual.record(virtual.find(experiment), seed=seed)[0] for seed in (0, 1)]
+    days = [virtual.record(virtual.find_experiment(experiment), seed=seed)[0] for seed in (0, 1)]
     targets = [c.name for c in days[0].displacements]
     first, second = (stack([day], targets) for day in days)
     for k in range(len(targets)):
@@ -344,12 +344,12 @@ def test_only_learned_rows_are_known() -> None:
 
 
 def test_several_tests_are_kept_and_known_one_by_one() -> None:
-    tests = [replace(small_machine(seed=k), name=f"day {k}", cycles=whole(800)) for k in range(3)]
+    tests = [replace(small_machine(seed=k), name=f"day {k}", cycles=make_single_cycle(800)) for k in range(3)]
     samples = stack(tests, ["z_um"])
     prints = of(samples)
     assert prints.learned == ((0, 800), (800, 1600), (1600, 2400))
     for run in prints.runs:
-        rows = unpacked(run.rows).astype(np.int64)
+        rows = unpack_marks(run.rows).astype(np.int64)
         assert len(rows) > 100
         assert ((rows % 800) + LENGTH * run.stride < 800).all()  # no run goes on in another test
     for k, test in enumerate(tests):

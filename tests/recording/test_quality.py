@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import HOUSE_UNITS
-from thermocomp.recording.cycles import find_cycles, whole
+from thermocomp.recording.cycles import find_cycles, make_single_cycle
 from thermocomp.recording.quality import Finding, check, lasting_trouble, troubled_rows
 from thermocomp.recording.recording import Recording
 
@@ -30,7 +30,7 @@ def _warm_up(*, noise: float = 0.02, resolution: float = 0.0, seed: int = 1) -> 
 
 def _recording(time: FloatArray = TIME, quantity: str = "temperature", **columns: FloatArray) -> Recording:
     channels = tuple(Channel(name, quantity, HOUSE_UNITS[quantity]) for name in columns)
-    return Recording("test", time, pd.DataFrame(columns), channels, whole(len(time)))
+    return Recording("test", time, pd.DataFrame(columns), channels, make_single_cycle(len(time)))
 
 
 def _check(values: FloatArray, quantity: str = "temperature") -> list[Finding]:
@@ -288,7 +288,7 @@ def test_one_cycle_is_told_with_its_reason() -> None:
     assert [(f.severity, f.kind) for f in check(plain)] == [("info", "no cycle")]
     assert "no spindle speed" in check(plain)[0].text
     assert check(turning) == ()
-    assert "never starts anew" in check(turning.with_cycles(whole(N)))[0].text
+    assert "never starts anew" in check(turning.with_cycles(make_single_cycle(N)))[0].text
 
 
 def test_the_gravest_comes_first() -> None:
@@ -302,7 +302,7 @@ def test_the_gravest_comes_first() -> None:
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 9, 10])
 def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
     recording = _recording(TIME[:n], t1=_warm_up()[:n], t2=np.full(n, np.nan), t3=np.full(n, -180.0))
-    short = replace(recording, cycles=whole(n))
+    short = replace(recording, cycles=make_single_cycle(n))
 
     kinds = {(f.channel, f.kind) for f in check(short)}
 

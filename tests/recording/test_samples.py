@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import FIRST_READING, Zeroing
 from thermocomp.recording import samples as stacking
-from thermocomp.recording.cycles import Cycle, whole
+from thermocomp.recording.cycles import Cycle, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.starts import COLD, Start
@@ -34,7 +34,9 @@ def _test(name: str, steps: list[float], seed: int, first_missing: int = 0) -> R
     values = np.random.default_rng(seed).normal(20, 5, size=(len(steps) + 1, len(CHANNELS)))
     values[:first_missing, 2] = np.nan
     table = pd.DataFrame(values, columns=[c.name for c in CHANNELS])
-    return Recording(name, np.cumsum([0.0, *steps]), table, CHANNELS, whole(len(table)), sha256=f"{seed:064d}")
+    return Recording(
+        name, np.cumsum([0.0, *steps]), table, CHANNELS, make_single_cycle(len(table)), sha256=f"{seed:064d}"
+    )
 
 
 TESTS = st.lists(st.lists(st.floats(0.5, 100.0), min_size=2, max_size=8), min_size=1, max_size=4)
@@ -113,7 +115,7 @@ def test_a_model_is_told_reference_and_trained_range() -> None:
 
 def test_what_cannot_be_stacked_is_told() -> None:
     recording = _test("a", [1.0], 1)
-    blind = Recording("blind", recording.time, recording.table[["z_um"]], CHANNELS[3:], whole(2))
+    blind = Recording("blind", recording.time, recording.table[["z_um"]], CHANNELS[3:], make_single_cycle(2))
 
     with pytest.raises(InputError, match="no recording given"):
         stack([], ["z_um"])
@@ -156,7 +158,9 @@ def test_a_recording_finds_its_channels_by_any_of_their_names() -> None:
     assert [c.name for c in recording.displacements] == ["z_um"]
     assert recording.speed == CHANNELS[1]
     assert recording.sampling_interval == 2.0
-    assert np.isnan(Recording("one", np.zeros(1), recording.table[:1], CHANNELS, whole(1)).sampling_interval)
+    assert np.isnan(
+        Recording("one", np.zeros(1), recording.table[:1], CHANNELS, make_single_cycle(1)).sampling_interval
+    )
     with pytest.raises(InputError, match=r"no channel is named 't3_C'; the nearest are t2_C, t1_C"):
         recording.channel("t3_C")
 
@@ -164,10 +168,10 @@ def test_a_recording_finds_its_channels_by_any_of_their_names() -> None:
 @pytest.mark.parametrize(
     ("time", "cycles", "says"),
     [
-        ([0.0], whole(2), "1 times for 2 rows"),
-        ([0.0, 0.0], whole(2), "time does not rise at row 1"),
-        ([0.0, np.nan], whole(2), "time does not rise at row 1"),
-        ([0.0, 1.0], whole(1), "do not cover the 2 rows"),
+        ([0.0], make_single_cycle(2), "1 times for 2 rows"),
+        ([0.0, 0.0], make_single_cycle(2), "time does not rise at row 1"),
+        ([0.0, np.nan], make_single_cycle(2), "time does not rise at row 1"),
+        ([0.0, 1.0], make_single_cycle(1), "do not cover the 2 rows"),
         ([0.0, 1.0], (), "do not cover the 2 rows"),
     ],
 )
@@ -179,7 +183,7 @@ def test_a_recording_that_contradicts_itself_is_refused(
     with pytest.raises(RecordingError, match=says):
         Recording("a", np.array(time), table, CHANNELS, cycles)
     with pytest.raises(RecordingError, match="table columns and channels differ"):
-        Recording("a", np.array([0.0, 1.0]), table, CHANNELS[:2], whole(2))
+        Recording("a", np.array([0.0, 1.0]), table, CHANNELS[:2], make_single_cycle(2))
 
 
 def _drift(start: float = 0.0, *, at_rest: int = 30, interval: float = 15.0, stamp: str = "") -> Recording:
@@ -191,7 +195,9 @@ def _drift(start: float = 0.0, *, at_rest: int = 30, interval: float = 15.0, sta
         21 + warm + 0.4 * rng.normal(size=n), start + 3 * warm + 0.1 * rng.normal(size=n),
     ]  # fmt: skip
     table = pd.DataFrame(dict(zip((c.name for c in CHANNELS), columns, strict=True)))
-    return Recording(f"d{start:g}", np.array([interval * k for k in range(n)]), table, CHANNELS, whole(n), start=stamp)
+    return Recording(
+        f"d{start:g}", np.array([interval * k for k in range(n)]), table, CHANNELS, make_single_cycle(n), start=stamp
+    )
 
 
 def test_the_zero_is_the_mean_over_five_minutes_at_rest() -> None:

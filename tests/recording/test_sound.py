@@ -10,7 +10,7 @@ from thermocomp.assessment.compare import compare
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
-from thermocomp.recording.sound import sound
+from thermocomp.recording.sound import drop_unsound
 from thermocomp.recording.starts import Start
 
 
@@ -23,7 +23,7 @@ def spoiled(column: str, rows: slice, by: float, recording: Recording | None = N
 
 def test_nothing_is_left_out_of_a_sound_recording() -> None:
     plain = stack([small_machine()], ["z_um"])
-    found = sound(plain, [small_machine()])
+    found = drop_unsound(plain, [small_machine()])
     assert np.array_equal(found.values, plain.values)
     assert np.array_equal(found.deviations, plain.deviations)
     assert found.trouble == ()
@@ -31,7 +31,7 @@ def test_nothing_is_left_out_of_a_sound_recording() -> None:
 
 def test_spikes_of_a_probe_do_not_reach_the_verdict() -> None:
     recording = spoiled("z_um", slice(40, 800, 190), 4300.0)
-    samples = sound(stack([recording], ["z_um", "x_um"]), [recording])
+    samples = drop_unsound(stack([recording], ["z_um", "x_um"]), [recording])
     assert np.flatnonzero(np.isnan(samples.deviations[:, 0])).tolist() == [40, 230, 420, 610]
     assert np.isfinite(samples.deviations[:, 1]).all()
     assert np.isfinite(samples.values).all()
@@ -44,7 +44,7 @@ def test_spikes_of_a_probe_do_not_reach_the_verdict() -> None:
 
 def test_a_step_of_a_probe_caps_the_verdict_on_it_alone() -> None:
     recording = spoiled("z_um", slice(450, None), 30.0)
-    samples = sound(stack([recording], ["z_um", "x_um"]), [recording])
+    samples = drop_unsound(stack([recording], ["z_um", "x_um"]), [recording])
     assert [channel for channel, _ in samples.trouble] == ["z_um"]
     result = compare(samples, ["dynamic"], splits.leave_one_cycle_out(samples), robustness=False)
     z, x = result.overall()
@@ -55,7 +55,7 @@ def test_a_step_of_a_probe_caps_the_verdict_on_it_alone() -> None:
 
 def test_trouble_of_a_sensor_caps_the_verdict_on_all_that_use_it() -> None:
     recording = spoiled("t2_C", slice(430, None), 6.0)
-    samples = sound(stack([recording], ["z_um", "x_um"]), [recording])
+    samples = drop_unsound(stack([recording], ["z_um", "x_um"]), [recording])
     assert {channel for channel, _ in samples.trouble} == {"t2_C"}
     result = compare(samples, ["dynamic"], splits.leave_one_cycle_out(samples), robustness=False)
     assert all(a.word != "accepted" for a in result.overall())
@@ -90,7 +90,7 @@ def test_trouble_of_a_file_that_a_test_goes_on_from_does_not_become_its_zero() -
 
     def zero(earlier: Recording) -> float:
         starts = Start("continued", "stated", (earlier,), 60.0)
-        samples = sound(stack([b], ["z_um"], starts=starts), [b])
+        samples = drop_unsound(stack([b], ["z_um"], starts=starts), [b])
         return float(samples.reference()[0, 0])
 
     assert abs(zero(bad) - zero(a)) < 1.0

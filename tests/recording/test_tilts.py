@@ -6,7 +6,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.recording.cycles import whole
+from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.tilts import with_tilts
 
@@ -16,7 +16,7 @@ TEST = Recording(
     np.array([0.0, 60.0]),
     pd.DataFrame(TABLE),
     (*(Channel(n, "displacement", "um") for n in list(TABLE)[:4]), Channel("t", "temperature", "degC")),
-    whole(2),
+    make_single_cycle(2),
 )
 
 

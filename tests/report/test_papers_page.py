@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from thermocomp.papers.study import Claim, Curve, Figure, Panel, Study, Table
+from thermocomp.papers.study import Claim, Figure, Panel, PlotCurve, Study, StudyTable
 from thermocomp.report import papers
 
 HOURS = np.linspace(0.0, 10.0, 5000)
@@ -21,12 +21,12 @@ CLAIMS = (
 
 @pytest.fixture
 def study() -> Study:
-    wave = Curve("measured", HOURS, np.sin(HOURS))
-    broken = Curve("predicted", HOURS, np.where(HOURS > 5, np.nan, np.cos(HOURS)), "dashed")
-    dots = Curve("", HOURS, HOURS, "points")
+    wave = PlotCurve("measured", HOURS, np.sin(HOURS))
+    broken = PlotCurve("predicted", HOURS, np.where(HOURS > 5, np.nan, np.cos(HOURS)), "dashed")
+    dots = PlotCurve("", HOURS, HOURS, "points")
     panels = [Panel("drift", "time [h]", "z [um]", [wave, broken]), Panel("", "T", "S", [dots])]
     figure = Figure("made-fig1", "Fig. 1: what was made up.", [*panels, panels[0]], columns=2)
-    table = Table("Errors", ("model", "who", "RMS [um]"), [["a", "b c", "1.25"], ["d", "", "-3e-4"]])
+    table = StudyTable("Errors", ("model", "who", "RMS [um]"), [["a", "b c", "1.25"], ["d", "", "-3e-4"]])
     return Study("made", "Somebody 1999: Made up", CLAIMS, (table,), (figure,), {"rms_um": 1.25})
 
 
@@ -64,7 +64,7 @@ def test_plain_text(study: Study) -> None:
         "    holds: no. It does not: the noise & all that.",
     ]
     assert some[-1] == "    note: Look."
-    assert papers.laid_out(study.tables[0]).splitlines() == [
+    assert papers.format_table(study.tables[0]).splitlines() == [
         "Errors",
         "model  who  RMS [um]",
         "a      b c      1.25",
@@ -74,14 +74,14 @@ def test_plain_text(study: Study) -> None:
 
 def test_columns_of_numbers_stand_on_the_right() -> None:
     rows = [["a", "1", "12 %", "-1.5e-07", "nan", "1 2", "", "1,024"], ["b", "2", "", "3", "-", "3", "–", "7"]]
-    assert papers.words(Table("", "abcdefgh", rows)) == [0, 5]
-    assert papers.words(Table("", "ab", [["1", ""], ["2", ""], ["not fitted", ""]])) == []
+    assert papers.words(StudyTable("", "abcdefgh", rows)) == [0, 5]
+    assert papers.words(StudyTable("", "ab", [["1", ""], ["2", ""], ["not fitted", ""]])) == []
 
 
 def test_words_of_the_first_column_are_said_once() -> None:
-    table = Table("", ("a", "b"), [["x", "1"], ["x", "2"], ["y", "3"], ["x", "4"]])
+    table = StudyTable("", ("a", "b"), [["x", "1"], ["x", "2"], ["y", "3"], ["x", "4"]])
     assert papers.rows(table) == [["x", "1"], ["", "2"], ["y", "3"], ["x", "4"]]
-    numbers = Table("", ("a", "b"), [["1", "1"], ["1", "2"]])
+    numbers = StudyTable("", ("a", "b"), [["1", "1"], ["1", "2"]])
     assert papers.rows(numbers) == [["1", "1"], ["1", "2"]]
 
 

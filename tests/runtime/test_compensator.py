@@ -15,7 +15,7 @@ from thermocomp.core.model import RULES, HonestError, Input
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensated, Compensator, CompensatorState
-from thermocomp.runtime.limits import limited
+from thermocomp.runtime.limits import limit_offset
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
 
@@ -124,7 +124,7 @@ def test_limits_hold_for_any_number(
 ) -> None:
     limits = Limits(magnitude, rate, dead_band)
     current = max(-magnitude, min(magnitude, current))
-    new = limited(target, current, dt, limits)
+    new = limit_offset(target, current, dt, limits)
     assert math.isfinite(new)
     assert abs(new) <= magnitude
     if not (math.isfinite(target) and math.isfinite(dt) and dt > 0):

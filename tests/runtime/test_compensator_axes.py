@@ -18,7 +18,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.limits import limited_line
+from thermocomp.runtime.limits import limit_line
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import straight_lines
 
@@ -106,8 +106,8 @@ lines = st.builds(Correction, st.floats(-900, 900), st.floats(-900, 900), st.sam
 @given(lines, lines, st.floats(0, 100), st.sampled_from([Limits(), Limits(20.0, 0.05, 0.5)]))
 def test_the_limits_hold_from_end_to_end(wanted: Correction, now: Correction, dt: float, limits: Limits) -> None:
     travel = (-200.0, 600.0)
-    current = limited_line(now, Correction(0.0, 0.0, now.reference_position), travel, 1e9, limits)
-    found = limited_line(wanted, current, travel, dt, limits)
+    current = limit_line(now, Correction(0.0, 0.0, now.reference_position), travel, 1e9, limits)
+    found = limit_line(wanted, current, travel, dt, limits)
     for position in np.linspace(*travel, 9).tolist():
         assert abs(found.at(position)) <= limits.magnitude * (1 + 1e-12)
         assert abs(found.at(position) - current.at(position)) <= limits.rate * dt + 1e-9

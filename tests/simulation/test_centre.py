@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.axes import N_HATS
 from thermocomp.simulation.centre import CentreState, MachiningCentre
 from thermocomp.simulation.heat import BearingFriction, HeatSources, swept
-from thermocomp.simulation.joints import Joints, play
+from thermocomp.simulation.joints import Joints, slide_with_friction
 from thermocomp.simulation.machine import Air, Drive, Truth, VirtualMachine
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE
 
@@ -233,7 +233,7 @@ def test_all_heat_has_a_place(centre: MachiningCentre) -> None:
 
 def test_friction_under_the_column_is_a_play() -> None:
     wish = np.array([*np.arange(0.0, 10.5, 0.5), *np.arange(10.0, -0.5, -0.5)])
-    path = play(0.0, wish, 2.0)
+    path = slide_with_friction(0.0, wish, 2.0)
     up, down = path[:21], path[20:][::-1]
     assert up[4] == 0.0
     assert up[10] == pytest.approx(3.0)

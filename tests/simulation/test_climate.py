@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.climate import CLIMATES, STABLE, STILL, Climate, remember, wandering
+from thermocomp.simulation.climate import CLIMATES, STABLE, STILL, Climate, filter_first_order, wandering
 
 HOUR = 3600.0
 
@@ -15,7 +15,7 @@ def test_what_is_remembered_is_what_a_loop_would_remember() -> None:
     looped, now = np.empty_like(added), before
     for k, value in enumerate(added):
         looped[k] = now = keep * now + value
-    np.testing.assert_allclose(remember(keep, added, before), looped, atol=1e-11)
+    np.testing.assert_allclose(filter_first_order(keep, added, before), looped, atol=1e-11)
 
 
 def test_the_air_wanders_smoothly() -> None:

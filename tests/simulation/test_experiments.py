@@ -16,12 +16,12 @@ from thermocomp.simulation.instruments import Touch, mounting
 from thermocomp.simulation.kits import CENTRE
 from thermocomp.simulation.machine import Drive
 from thermocomp.simulation.protocol import Experiment, Plan, Programme
-from thermocomp.simulation.segments import Segment
+from thermocomp.simulation.segments import SteadySegment
 from thermocomp.simulation.sensors import Fault
 
 FloatArray = NDArray[np.float64]
 GOLDEN = [[22.22, 22.1, 22.28, 0.15], [48.76, 49.92, 22.74, 59.94], [75.82, 78.14, 23.1, 119.75]]
-RUN = (Segment(40.0), Segment(60.0, Drive(3000.0, (300.0, 400.0, 0.0))), Segment(40.0))
+RUN = (SteadySegment(40.0), SteadySegment(60.0, Drive(3000.0, (300.0, 400.0, 0.0))), SteadySegment(40.0))
 
 
 def programme(**more: Any) -> Programme:
@@ -30,7 +30,7 @@ def programme(**more: Any) -> Programme:
         "sampling": 20.0,
         "segments": RUN,
         "climate": STILL,
-        "soak": (Segment(3600.0),),
+        "soak": (SteadySegment(3600.0),),
     }
     return Programme(**(given | {"places": ("housing",), "probes": ("x1", "z"), "perfect": True} | more))
 
@@ -59,7 +59,7 @@ def test_a_row_tells_what_led_to_it() -> None:
 
 
 def test_displacements_count_from_the_first_row() -> None:
-    test = done(programme(soak=(Segment(3600.0, Drive(1000.0)),), probes=("z", "y_laser_50")))
+    test = done(programme(soak=(SteadySegment(3600.0, Drive(1000.0)),), probes=("z", "y_laser_50")))
     assert test.values[0, 0] == pytest.approx(22.0 + 60.0)
     assert test.truth[0, 0] == 0.0
     assert test.truth[0, 1] == pytest.approx(8.48, abs=0.01)  # the cold profile stays
@@ -67,13 +67,13 @@ def test_displacements_count_from_the_first_row() -> None:
 
 def test_slow_sampling_asks_the_machine_often_enough() -> None:
     machine = FakeMachine()
-    test = done(programme(sampling=100.0, segments=(Segment(200.0, Drive(600.0)),)), machine)
+    test = done(programme(sampling=100.0, segments=(SteadySegment(200.0, Drive(600.0)),)), machine)
     assert machine.steps == [180, 10]
     np.testing.assert_allclose(test.truth[:, 0], [0.0, 1.0, 2.0])
 
 
 def test_blocks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
-    segments = (Segment(6000.0, Drive(2000.0)), Segment(6000.0))
+    segments = (SteadySegment(6000.0, Drive(2000.0)), SteadySegment(6000.0))
     made = programme(sampling=60.0, segments=segments, perfect=False, places=("all",), probes=("nest",))
     machine = FakeMachine()
     whole = done(made, machine)
@@ -87,7 +87,7 @@ def test_blocks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_sensors_lag_scatter_and_are_rounded() -> None:
-    segments = (Segment(20.0), Segment(3600.0, Drive(600.0)))
+    segments = (SteadySegment(20.0), SteadySegment(3600.0, Drive(600.0)))
     real = done(programme(segments=segments, perfect=False, probes=("z",)))
     ideal = done(programme(segments=segments, probes=("z",)))
     mounted = mounting("housing")
@@ -101,7 +101,7 @@ def test_sensors_lag_scatter_and_are_rounded() -> None:
 
 
 def test_noise_changes_readings_not_the_truth() -> None:
-    made = programme(perfect=False, segments=(Segment(36000.0),))
+    made = programme(perfect=False, segments=(SteadySegment(36000.0),))
     usual, noisy = done(made), done(made, sensor_noise=0.4)
     np.testing.assert_array_equal(usual.truth, noisy.truth)
     np.testing.assert_array_equal(usual.values[:, 1:], noisy.values[:, 1:])
@@ -110,7 +110,7 @@ def test_noise_changes_readings_not_the_truth() -> None:
 
 def test_the_artefact_is_touched_while_the_spindle_stands() -> None:
     touch = Touch(60.0, {"p": (300.0, 250.0, 250.0), "q": (600.0, 250.0, 250.0)})
-    test = done(programme(touch=touch, segments=(*RUN, Segment(60.0))))
+    test = done(programme(touch=touch, segments=(*RUN, SteadySegment(60.0))))
     touched = [c.name for c in test.channels].index("x_p_um")
     rows = np.flatnonzero(np.isfinite(test.values[:, touched : touched + 6]).all(axis=1))
     assert rows.tolist() == [0, 6, 9]  # due at 60 s, but the spindle turns until 100 s
@@ -150,11 +150,13 @@ def test_unusable_requests_are_refused() -> None:
         with pytest.raises(InputError, match="sensor noise"):
             simulate(experiment, sensor_noise=noise)
     with pytest.raises(InputError, match="no multiple"):
-        programme(segments=(Segment(50.0),))
+        programme(segments=(SteadySegment(50.0),))
 
 
 def test_a_month_takes_little_more_memory_than_its_recording() -> None:
-    made = programme(sampling=10.0, segments=(Segment(30 * 86400.0, Drive(1000.0)),), places=("all",), perfect=False)
+    made = programme(
+        sampling=10.0, segments=(SteadySegment(30 * 86400.0, Drive(1000.0)),), places=("all",), perfect=False
+    )
     tracemalloc.start()
     test = done(made)
     _, peak = tracemalloc.get_traced_memory()

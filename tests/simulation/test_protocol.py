@@ -8,7 +8,7 @@ import pytest
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.simulation.machine import Drive
 from thermocomp.simulation.protocol import Experiment, Plan, Programme
-from thermocomp.simulation.segments import Feed, Lot, Segment, Stretch, Stroke
+from thermocomp.simulation.segments import Feed, Lot, SteadySegment, Stretch, Stroke
 from thermocomp.simulation.sensors import Fault
 
 MINUTE = 60.0
@@ -49,7 +49,7 @@ def test_a_stretch_becomes_segments() -> None:
         )
     )
     full = Drive(2000.0, (100.0, 0.0, 300.0), (None, (100.0, 200.0), None), {"tool_tip": 40.0}, False, True)
-    assert stretch.draw(rng()) == [Segment(60.0), Segment(120.0, full)]
+    assert stretch.draw(rng()) == [SteadySegment(60.0), SteadySegment(120.0, full)]
 
 
 def test_what_is_switched_off_stands_whatever_it_inherits() -> None:
@@ -65,9 +65,9 @@ def test_what_is_said_outside_holds_within() -> None:
         segments=(Stretch(), Stretch(speed=0.0, segments=(Stretch(duration=30.0), Stretch(cooled=False)))),
     )
     expected = [
-        Segment(60.0, Drive(1000.0)),
-        Segment(30.0, Drive(0.0)),
-        Segment(60.0, Drive(0.0, cooled=False)),
+        SteadySegment(60.0, Drive(1000.0)),
+        SteadySegment(30.0, Drive(0.0)),
+        SteadySegment(60.0, Drive(0.0, cooled=False)),
     ]
     assert stretch.draw(rng()) == expected
     assert [path for path, _ in stretch.leaves()] == [
@@ -150,9 +150,9 @@ def test_no_test_depends_on_the_others() -> None:
 
 def test_the_soak_hears_nothing_of_the_test() -> None:
     (programme,) = Experiment(name="e", tests=(plan(speed=1000.0, soak=Stretch(duration=3600.0)),)).programmes()
-    assert programme.soak == (Segment(3600.0),)
-    assert programme.segments == (Segment(MINUTE, Drive(1000.0)),)
-    assert Programme(name="p", sampling=10.0, segments=()).soak == (Segment(12 * 3600.0),)
+    assert programme.soak == (SteadySegment(3600.0),)
+    assert programme.segments == (SteadySegment(MINUTE, Drive(1000.0)),)
+    assert Programme(name="p", sampling=10.0, segments=()).soak == (SteadySegment(12 * 3600.0),)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.simulation.sensors import Fault, Sensor, follow, read, with_faults
+from thermocomp.simulation.sensors import Fault, Sensor, apply_lags, read, with_faults
 
 TEMPERATURE = Channel("t_C", "temperature", "degC")
 
@@ -14,7 +14,7 @@ def test_a_sensor_lags_as_a_first_order_system_does() -> None:
     time = np.arange(0.0, 601.0, 10.0)
     true = np.repeat((20.0 + 0.01 * time)[:, None], 3, axis=1)
     lags = np.array([45.0, 0.0, 5.0])
-    felt = follow(lags, true[0], true[0], true[1:], 10.0)
+    felt = apply_lags(lags, true[0], true[0], true[1:], 10.0)
     for k, lag in ((0, 45.0), (2, 5.0)):
         exact = 20.0 + 0.01 * (time - lag * (1 - np.exp(-time / lag)))
         np.testing.assert_allclose(felt[:, k], exact[1:], atol=1e-12)
@@ -24,9 +24,9 @@ def test_a_sensor_lags_as_a_first_order_system_does() -> None:
 def test_a_sensor_goes_on_where_it_was() -> None:
     true = np.random.default_rng(0).normal(size=(100, 2))
     lags, start = np.array([30.0, 200.0]), np.zeros(2)
-    whole = follow(lags, start, start, true, 10.0)
-    first = follow(lags, start, start, true[:37], 10.0)
-    second = follow(lags, first[-1], true[36], true[37:], 10.0)
+    whole = apply_lags(lags, start, start, true, 10.0)
+    first = apply_lags(lags, start, start, true[:37], 10.0)
+    second = apply_lags(lags, first[-1], true[36], true[37:], 10.0)
     np.testing.assert_allclose(np.vstack([first, second]), whole, atol=1e-12)
 
 

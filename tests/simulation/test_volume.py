@@ -10,16 +10,16 @@ from scipy.linalg import expm
 
 from thermocomp.core.machine import Axis, Machine
 from thermocomp.core.structure import Structure
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL, between
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, TRAVEL, weigh_stations
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.climate import STILL
 from thermocomp.simulation.experiments import SimulatedTest, run
-from thermocomp.simulation.geometry import PROFILES, SAG, SQUARENESS, cold, cold_profile
+from thermocomp.simulation.geometry import PROFILES, SAG, SQUARENESS, cold_profile, find_cold_component
 from thermocomp.simulation.kits import CENTRE
 from thermocomp.simulation.machine import Drive
-from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE, touched
+from thermocomp.simulation.probes import COMPONENTS, PROBE_DISTANCE, weigh_tool_point
 from thermocomp.simulation.protocol import Programme
-from thermocomp.simulation.segments import Segment
+from thermocomp.simulation.segments import SteadySegment
 from thermocomp.simulation.volume import VolumetricTruth
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 
@@ -78,7 +78,7 @@ def measured(drive: Drive) -> SimulatedTest:
     programme = Programme(
         name="t",
         sampling=1200.0,
-        segments=(Segment(1200.0), Segment(6 * HOUR, drive)),
+        segments=(SteadySegment(1200.0), SteadySegment(6 * HOUR, drive)),
         climate=replace(STILL, mean=23.0),
         probes=("nest", *SIX, "EYX_z0", "EYX_z600", "squareness"),
         perfect=True,
@@ -159,7 +159,9 @@ def test_lasers_squareness_and_nest_determine_the_error_everywhere(warm: Warm) -
         at[:, k] = STATIONS[axis]
         reading = np.array([warm.read(f"{code}_{p}_{unit}") for p in STATIONS[axis]])
         # heat is smooth between the stations; the geometry is known from a laser run with small steps
-        values[:, INDEX[code]] = between(axis, where[:, k]) @ (reading - cold(code, at)) + cold(code, where)
+        values[:, INDEX[code]] = weigh_stations(axis, where[:, k]) @ (
+            reading - find_cold_component(code, at)
+        ) + find_cold_component(code, where)
     for code in SQUARENESS:
         values[:, INDEX[code]] = warm.read(f"{code}_urad")
     values[:, INDEX["X0C"]], values[:, INDEX["Y0C"]] = warm.read("x1_um"), warm.read("y1_um")
@@ -184,7 +186,7 @@ def test_it_agrees_with_what_the_machine_tells_of_y_at_other_positions(warm: War
     for p in STATIONS["y"]:
         found = heat.error(warm.row, [(300.0, p, 300.0)])[0]
         for k in (1, 2):
-            known = sum(w * warm.told(name) for name, w in touched(AXES[k], {"y": p}).items())
+            known = sum(w * warm.told(name) for name, w in weigh_tool_point(AXES[k], {"y": p}).items())
             assert found[k] == pytest.approx(known, abs=5e-3)
 
 
@@ -268,13 +270,13 @@ def test_between_the_stations_it_is_smooth() -> None:
     for axis in AXES:
         at = np.array(STATIONS[axis], dtype=np.float64)
         p = np.linspace(0.0, TRAVEL[axis], 1001)
-        w = between(axis, p)
+        w = weigh_stations(axis, p)
         np.testing.assert_allclose(w.sum(axis=1), 1.0)
-        np.testing.assert_allclose(between(axis, at), np.eye(len(at)), atol=1e-12)
+        np.testing.assert_allclose(weigh_stations(axis, at), np.eye(len(at)), atol=1e-12)
         np.testing.assert_allclose(w @ (at - 200.0) ** 2, (p - 200.0) ** 2, atol=1e-8)
         wave = w @ np.sin(at / 50.0)
         assert np.abs(np.diff(wave, 2)).max() < 1e-3  # no kink
-        np.testing.assert_array_equal(between(axis, [-10.0, 1e4]), between(axis, [0.0, TRAVEL[axis]]))
+        np.testing.assert_array_equal(weigh_stations(axis, [-10.0, 1e4]), weigh_stations(axis, [0.0, TRAVEL[axis]]))
 
 
 def test_components_leave_the_older_recordings_as_they_were() -> None:
@@ -287,7 +289,7 @@ def test_components_leave_the_older_recordings_as_they_were() -> None:
         observables=tuple(machine.observables[k] for k in old),
     )
     probes = ("nest", "x_laser", "y_laser", "z_laser", "y_pitch", "x_at_500", "z_at_40")
-    programme = Programme(name="t", sampling=600.0, segments=(Segment(HOUR, WARM["both"]),), probes=probes)
+    programme = Programme(name="t", sampling=600.0, segments=(SteadySegment(HOUR, WARM["both"]),), probes=probes)
     tests = [
         run(m, CENTRE, programme, np.random.default_rng(1), np.random.default_rng(2))
         for m in (machine, MachiningCentre(model))

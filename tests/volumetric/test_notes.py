@@ -9,7 +9,7 @@ from thermocomp.core.machine import Axis, Machine, Source, Vector
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
-from thermocomp.volumetric.notes import counted_twice, held, notes, untilted
+from thermocomp.volumetric.notes import note_counted_twice, note_short_profiles, note_untilted, notes
 
 
 def mill(components: dict[str, Source], code: str = "w X' b Z Y (C1) t", side: str = "tool") -> Machine:
@@ -32,7 +32,7 @@ def along(axis: str, unit: str, *points: tuple[float, float]) -> PositionModel:
 
 def test_a_turn_that_was_there_while_another_axis_was_measured() -> None:
     """20 urad over 500 mm of Y are 10 um."""
-    (found,) = counted_twice(mill({"ECX": 20.0}))
+    (found,) = note_counted_twice(mill({"ECX": 20.0}))
     assert found == (
         "ECX is 20 urad at X 300 mm, where X stood while Y was measured: over the travel of Y it moves the tip by 10 "
         "um along X. EXY or C0Y holds that already if it was read between table and spindle: then count ECX from X 300 "
@@ -55,7 +55,7 @@ def test_a_turn_that_was_there_while_another_axis_was_measured() -> None:
     ],
 )
 def test_the_axes_beyond_are_named(code: str, component: str, told: list[tuple[str, str, float]]) -> None:
-    found = counted_twice(mill({component: -20.0}, code))
+    found = note_counted_twice(mill({component: -20.0}, code))
     assert len(found) == len(told)
     for other, towards, effect in told:
         words = f"over the travel of {other} it moves the tip by {effect:g} um along {towards}"
@@ -67,19 +67,19 @@ def test_the_axes_beyond_are_named(code: str, component: str, told: list[tuple[s
 def test_a_turn_that_counts_from_there_is_told_once() -> None:
     zero, other = (along("X", "urad", (0.0, a), (300.0, 0.0), (600.0, b)) for a, b in ((-30.0, 30.0), (0.0, 30.0)))
     shifted = along("X", "urad", (0.0, 0.0), (600.0, 30.0))
-    assert counted_twice(mill({"ECX": zero})) == counted_twice(mill({"ECX": other})) == ()
-    (found,) = counted_twice(mill({"ECX": shifted}))
+    assert note_counted_twice(mill({"ECX": zero})) == note_counted_twice(mill({"ECX": other})) == ()
+    (found,) = note_counted_twice(mill({"ECX": shifted}))
     assert "ECX is 15 urad at X 300 mm" in found
     assert "by 7.5 um along X" in found
     # models of time begin at zero; what nobody sees is not told; nothing else turns
     quiet: dict[str, Source] = {"ECX": line("ECX", "urad", {"t": 9.0}), "EAX": 0.05, "EXX": 9.0, "C0Y": 9.0, "A0C": 9.0}
-    assert counted_twice(mill(quiet)) == ()
+    assert note_counted_twice(mill(quiet)) == ()
 
 
 def test_its_own_way_counts_if_the_place_stays_with_the_workpiece() -> None:
-    (found,) = counted_twice(mill({"ECY": 20.0}, side="workpiece"))
+    (found,) = note_counted_twice(mill({"ECY": 20.0}, side="workpiece"))
     assert "ECY is 20 urad at Y 250 mm, where Y stood while Y was measured: over the travel of Y" in found
-    assert counted_twice(mill({"ECY": 20.0})) == ()
+    assert note_counted_twice(mill({"ECY": 20.0})) == ()
 
 
 def test_what_is_known_of_a_part_of_the_travel_is_held() -> None:
@@ -88,13 +88,13 @@ def test_what_is_known_of_a_part_of_the_travel_is_held() -> None:
         target="EYY", unit="um", axis="Y", travel=(0.0, 450.0), slopes=(line("EYY", "um/m", {"t": 1.0}),)
     )
     machine = mill({"EXX": whole, "EYX": part, "EYY": slope, "EZZ": 3.0, "ECX": 20.0})
-    assert held(machine) == (
+    assert note_short_profiles(machine) == (
         "EYX: its profile is known from X 100 to 600 mm, the axis goes from 0 to 600 mm: beyond, the value at the end "
         "is held",
         "EYY: its slope is known from Y 0 to 450 mm, the axis goes from 0 to 500 mm: beyond, the value at the end is "
         "held",
     )
-    assert notes(machine) == (*counted_twice(machine), *held(machine))
+    assert notes(machine) == (*note_counted_twice(machine), *note_short_profiles(machine))
     assert len(notes(machine)) == 3
 
 
@@ -108,7 +108,7 @@ def test_a_tool_of_another_length_wants_the_tilt() -> None:
             spindle_tool=(0.0, 0.0, -150.0),
             tool=(0.0, 0.0, -tool),
         )
-        return untilted(machine)
+        return note_untilted(machine)
 
     assert told(150.0, Z0C=5.0) == ()
     assert told(250.0) == ()  # nothing is said of the spindle at all

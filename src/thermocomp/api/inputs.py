@@ -18,7 +18,7 @@ from thermocomp.files import recordings as files
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.sound import sound
+from thermocomp.recording.sound import drop_unsound
 from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]
@@ -181,7 +181,7 @@ def prepare(
         named = [c.name for c in tests[0].displacements]
     chosen = [inputs] if isinstance(inputs, str) else inputs
     begun, how = starts_of(starts, tests), {} if zeroing is None else {"zeroing": zeroing}
-    samples = sound(stack(tests, named, chosen, rezero=not absolute, starts=begun, **how), tests)
+    samples = drop_unsound(stack(tests, named, chosen, rezero=not absolute, starts=begun, **how), tests)
     wanted = judged or split is not None or leave_one is not None
     judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
     return Prepared(tuple(tests), samples, judging, trouble_of(tests))

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 from thermocomp.files import positioning as positioning_files
 from thermocomp.iso230 import part2, part3, tables
 from thermocomp.iso230.part2 import PositioningResult
@@ -122,7 +122,7 @@ def length(text: str, what: str) -> float:
         It is no number with a unit of length.
     """
     try:
-        found = measured(text, "position")
+        found = read_with_unit(text, "position")
     except UnitError as e:
         raise InputError(f"{what} {text!r}: {e}") from e
     if found is None or found < 0:

@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.files import mapping as mappings
 from thermocomp.files import positionfile
 from thermocomp.files import profiles as tables
-from thermocomp.models.methods import method
+from thermocomp.models.methods import find_method
 from thermocomp.models.position import PositionOptions
 from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles
@@ -138,7 +138,7 @@ def prepare(
         The method cannot be frozen, or settings do not go together.
     """
     s = settings or PositionSettings()
-    if not method(s.model).kind.freezable:
+    if not find_method(s.model).kind.freezable:
         raise InputError(f"{s.model} cannot be frozen to plain numbers: choose another method")
     tests = _read(recordings, component, s)
     options = PositionOptions(

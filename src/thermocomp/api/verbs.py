@@ -51,7 +51,7 @@ def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | N
     InputError
         There is no such experiment.
     """
-    return virtual.record(virtual.find(experiment), seed=seed, sensor_noise=noise)
+    return virtual.record(virtual.find_experiment(experiment), seed=seed, sensor_noise=noise)
 
 
 def compare(

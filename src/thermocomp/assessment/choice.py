@@ -121,7 +121,7 @@ class Table:
         return tuple(j for j in range(len(self.columns)) if any(isinstance(row[j], str) for row in self.rows))
 
 
-def written(cell: Cell) -> str:
+def format_cell(cell: Cell) -> str:
     """Return a cell as text: four digits, nothing for what is not known."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""

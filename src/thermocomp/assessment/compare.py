@@ -9,14 +9,14 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm, metrics
-from thermocomp.assessment.coverage import cover
+from thermocomp.assessment.coverage import find_validity
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.leaks import refuse_leaks
-from thermocomp.assessment.recommend import Inner, Recommendation, corrected, inner_splits, recommend, score
-from thermocomp.assessment.replay import run
+from thermocomp.assessment.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
+from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Comparison, Rules
-from thermocomp.assessment.robustness import pooled, stress
-from thermocomp.assessment.splits import Judging, Split, called, stretches
+from thermocomp.assessment.robustness import pool_robustness, stress
+from thermocomp.assessment.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.learned import Learned
@@ -83,7 +83,7 @@ def compare(
     refuse_leaks(samples, judging)
     names = expand(methods)
     rules.check(names)
-    by_target = [readable(samples, k, judging) for k in range(len(samples.targets))]
+    by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
     work = (
@@ -100,7 +100,7 @@ def compare(
     except KeyboardInterrupt:
         if len(done) < len(by_target[0].splits):
             raise
-    capped = alike(samples, judging)
+    capped = cap_alike_units(samples, judging)
     found: list[Assessment] = []
     recommended: list[Recommendation] = []
     finished = 0
@@ -136,8 +136,8 @@ def _concluded(
     caps: tuple[str, ...],
 ) -> list[Assessment]:
     """Return what was found for one target: each method in each block, and over all of them with its verdict."""
-    whole = {name: do_no_harm.together(v, caps=caps) for name, v in verdicts.items()}
-    after = corrected(whole, rules.primary, best)
+    whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
+    after = correct_verdicts(whole, rules.primary, best)
     found = []
     for name, p in parts.items():
         found += p if len(p) > 1 else []
@@ -193,12 +193,12 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
     int
     """
     names = expand(methods)
-    by_target = [readable(samples, k, judging) for k in range(len(samples.targets))]
+    by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     choices = sum(deployable(name) for name in names)
     return sum(len(names) * len(own.splits) + choices * len(_inners(names, own, rules)) for own in by_target)
 
 
-def readable(samples: Samples, target: int, judging: Judging) -> Judging:
+def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
     """Return a judgement without the blocks in which a target has too few readings to say anything.
 
     Parameters
@@ -268,7 +268,7 @@ def judge(
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
     stressed = stress(model, samples, measured, rows) if robustness else None
-    ran = run(model, samples, rows, limits or Limits())
+    ran = replay_compensated(model, samples, rows, limits or Limits())
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
@@ -319,16 +319,16 @@ def judge(
     )
 
 
-def _worse(both: Iterable[do_no_harm.Unit]) -> do_no_harm.Unit:
+def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
     """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
-def alike(samples: Samples, judging: Judging) -> tuple[str, ...]:
+def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
     """Return that the units are too alike to count as several, if they are."""
-    covered = cover(samples, judging)
+    covered = find_validity(samples, judging)
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:
         return ()
@@ -346,10 +346,12 @@ def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) 
     return tuple(found)
 
 
-def per_cycle(whole: Assessment) -> list[Assessment]:
+def split_by_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
-    blocks = [b for b in stretches(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= do_no_harm.MIN_ROWS]
+    blocks = [
+        b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= do_no_harm.MIN_ROWS
+    ]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]
@@ -424,8 +426,8 @@ def _failed(samples: Samples, name: str, target: int, split: Split, why: str) ->
 
 def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
     cycle = samples.cycle[rows]
-    for block in stretches(cycle, samples.test[rows]):
-        mine, name = np.isin(cycle, block), called(samples, block)
+    for block in join_short_cycles(cycle, samples.test[rows]):
+        mine, name = np.isin(cycle, block), name_cycles(samples, block)
         whole = mine.sum() == np.isin(samples.cycle, block).sum()
         yield name if whole else f"part of {name}", mine
 
@@ -443,12 +445,12 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         row=np.concatenate([a.row for a in parts]),
         test=np.concatenate([a.test for a in parts]),
         cycle=np.concatenate([a.cycle for a in parts]),
-        verdict=do_no_harm.together([a.verdict for a in parts]),
+        verdict=do_no_harm.join_verdicts([a.verdict for a in parts]),
         sensors=tuple(dict.fromkeys(s for a in parts for s in a.sensors)),
         n_sensors=(min(a.n_sensors[0] for a in parts), max(a.n_sensors[1] for a in parts)),
         fit_s=sum(a.fit_s for a in parts),
         n_effective=sum(a.n_effective for a in parts),
-        robustness=pooled([(a.robustness, len(a.measured)) for a in parts]),
+        robustness=pool_robustness([(a.robustness, len(a.measured)) for a in parts]),
         alone=np.concatenate([a.predicted if a.alone is None else a.alone for a in parts]),
         rejected=sum(a.rejected for a in parts),
         turned_away=next((a.turned_away for a in parts if a.turned_away), ""),

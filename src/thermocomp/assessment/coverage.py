@@ -30,7 +30,7 @@ PLACES = 32
 _SAME_SPEED = 0.02
 
 
-def cover(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
+def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
     """Return what the units of a judgement covered.
 
     Parameters

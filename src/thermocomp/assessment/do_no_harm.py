@@ -44,7 +44,7 @@ MOVES = 0.1
 
 
 @dataclass(frozen=True)
-class Unit:
+class JudgedUnit:
     """What was found in one unseen cycle or file.
 
     Parameters
@@ -126,7 +126,7 @@ class Verdict:
         Harm that is let pass, as the user stated it before judging; None: by rule.
     """
 
-    units: tuple[Unit, ...]
+    units: tuple[JudgedUnit, ...]
     unit: str = "um"
     caps: tuple[str, ...] = ()
     refusal: str = ""
@@ -253,7 +253,7 @@ class Verdict:
                 return n
         return None
 
-    def _figures(self, u: Unit) -> str:
+    def _figures(self, u: JudgedUnit) -> str:
         text = f"RMS {u.rms:.2f} {self.unit}, {u.none_rms:.2f} {self.unit} without compensation"
         if u.rms - u.none_rms < u.harm:
             text += f", largest {u.largest:.2f} and {u.none_largest:.2f} {self.unit}"
@@ -274,7 +274,7 @@ def measure(
     unit: str = "um",
     margin: float | None = None,
     stretch: bool = False,
-) -> Unit:
+) -> JudgedUnit:
     """Measure one unit.
 
     Parameters
@@ -299,7 +299,7 @@ def measure(
     allowed = margin_of(learned, unit) if margin is None else margin
     baselines = (0.0, learned.mean, learned.last)
     span = float(np.ptp(measured)) - 4 * learned.noise  # what noise alone would span
-    return Unit(
+    return JudgedUnit(
         name=name,
         rows=len(measured),
         rms=_rms(residual),
@@ -313,7 +313,7 @@ def measure(
     )
 
 
-def together(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
+def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
     """Return the verdict over the units of several: what refuses or caps one of them, refuses or caps the whole."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),

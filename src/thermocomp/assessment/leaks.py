@@ -16,7 +16,7 @@ IntArray = NDArray[np.intp]
 LEAST_NEW = 0.05
 
 
-def learned_from(model: ErrorModel, samples: Samples, target: int = 0) -> BoolArray:
+def find_learned_rows(model: ErrorModel, samples: Samples, target: int = 0) -> BoolArray:
     """Return the rows that a model has learned from.
 
     Parameters

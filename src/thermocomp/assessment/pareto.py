@@ -12,7 +12,7 @@ from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.metrics import rms
-from thermocomp.assessment.replay import run
+from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.methods import expand
@@ -410,4 +410,4 @@ def _unseen_rms(samples: Samples, target: int, split: Split, sensors: Sequence[s
     except FitError:
         return float("nan")
     rows = split.judge & np.isfinite(samples.deviations[:, target])
-    return rms(samples.deviations[rows, target], run(model, reduced, rows).compensated)
+    return rms(samples.deviations[rows, target], replay_compensated(model, reduced, rows).compensated)

@@ -16,7 +16,7 @@ from thermocomp.core.learned import Learned
 from thermocomp.core.model import RULES, HonestError
 from thermocomp.core.size import Size
 from thermocomp.models.position import PositionFit, fit_position, slope_samples
-from thermocomp.models.positionoptions import PositionOptions, Setting, reference_position, suited
+from thermocomp.models.positionoptions import PositionOptions, Setting, fill_options, reference_position
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.samples import Samples
 
@@ -134,8 +134,9 @@ def study(
         Of one component, one per test.
     options : PositionOptions
     left_open : sequence of {'slopes', 'offset', 'reference_position'}
-        Settings that the profiles tell, in place of `options`; see `thermocomp.models.positionoptions.suited`. If it is
-        open how many slopes there are and the thermal part is refused, the cold profile alone is judged and taken.
+        Settings that the profiles tell, in place of `options`; see `thermocomp.models.positionoptions.fill_options`. If
+        it is open how many slopes there are and the thermal part is refused, the cold profile alone is judged and
+        taken.
     judging : callable
         Makes splits of the states, such as those of `thermocomp.assessment.splits`.
     jobs : int
@@ -251,7 +252,7 @@ def _piece(
 ) -> tuple[str, Any]:
     """Judge one split; or, without one, fit everything."""
     learn = None if split is None else split.learn
-    chosen = suited(tests, options, left_open, learn=learn) if left_open else options
+    chosen = fill_options(tests, options, left_open, learn=learn) if left_open else options
     fit = fit_position(tests, chosen, learn=learn)
     if split is None:
         return f"{tests[0].target} all states", (chosen, fit)
@@ -375,11 +376,11 @@ def _together(one: _All, parts: Sequence[_Part], options: PositionOptions) -> Po
     )
 
 
-def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.Unit:
+def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.JudgedUnit:
     """Measure a cycle by the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
     none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
     largest = float(rms[:, 0].max())
-    return do_no_harm.Unit(
+    return do_no_harm.JudgedUnit(
         name=name,
         rows=len(rms),
         rms=left,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import do_no_harm
 from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError
-from thermocomp.models.training import fitted
+from thermocomp.models.training import fit_method
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -97,7 +97,7 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
         Infinite if it cannot be fitted [um].
     """
     try:
-        predicted = fitted(name, samples, target, inner.split.learn).predicted
+        predicted = fit_method(name, samples, target, inner.split.learn).predicted
     except FitError:
         return [np.inf] * len(inner.scores)
     found = []
@@ -166,7 +166,7 @@ def recommend(
     judged = [parts[name][u] for u, name in enumerate(chosen)]
     outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
     return Recommendation(
-        target, methods[int(np.argmin(outer))], chosen, do_no_harm.together(judged, about="the choice")
+        target, methods[int(np.argmin(outer))], chosen, do_no_harm.join_verdicts(judged, about="the choice")
     )
 
 
@@ -177,7 +177,7 @@ def _log(verdict: do_no_harm.Verdict) -> float:
     return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))
 
 
-def corrected(
+def correct_verdicts(
     verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
 ) -> dict[str, do_no_harm.Verdict]:
     """Correct the verdicts on the methods that were tried for one target for their number.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
-from thermocomp.core.zero import centre, first_rows
+from thermocomp.core.zero import first_rows, robust_mean
 from thermocomp.recording.samples import Samples
 from thermocomp.runtime import batch
 
@@ -47,7 +47,7 @@ class Replayed:
     limits: Limits | None
 
 
-def run(model: ErrorModel, samples: Samples, rows: BoolArray, limits: Limits = Limits()) -> Replayed:
+def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, limits: Limits = Limits()) -> Replayed:
     """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
 
     A live compensator gets its readings more often than every `Limits.reading_age`, however slowly a test was recorded:
@@ -164,7 +164,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
                 waiting.clear()
 
 
-def absolute(models: Sequence[ErrorModel]) -> bool:
+def are_absolute(models: Sequence[ErrorModel]) -> bool:
     """Return whether models take temperatures as they are, so that the zero of a recording does not matter to them."""
     heat = [i for m in models for i in m.inputs if i.quantity == "temperature"]
     return bool(heat) and not any(i.rezero for i in heat)
@@ -183,7 +183,7 @@ def _begun(
         return state, {}
     head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
     if head:
-        mean = centre(list(head.values()))
+        mean = robust_mean(list(head.values()))
         state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
         head = dict.fromkeys(head, mean)
     return state, head

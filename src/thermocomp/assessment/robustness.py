@@ -100,7 +100,7 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
     return replace(one, noise_rms=noise, lost_rms=lost)
 
 
-def pooled(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
+def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
     """Pool several blocks, each with its number of rows; None if one of them was not stressed.
 
     RMS values are pooled as the root of the mean square; the largest over the draws stays the largest.

@@ -15,7 +15,7 @@ from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.numerics.stepwise import Step
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
@@ -154,7 +154,7 @@ def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settin
     zero = candidates.names.index(settings.reference) if settings.reference is not None else None
     values = X if zero is None else X - X[:, [zero]]
     kept = list(found.candidates_)
-    tri = triangle(table(values[:, kept], candidates.y), intercept=True)
+    tri = triangle(join_columns(values[:, kept], candidates.y), intercept=True)
     swept = grouping.sweep(X[:, kept], tri, absolute=settings.unsigned)
     # thresholds that change the groups but not what is chosen from them are one row
     alike = [

@@ -107,7 +107,7 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
     return _consecutive(name, len(samples), first, stop)
 
 
-def stretches(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
+def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
     """Return the thermal cycles to judge by: those too short to say anything join the one before them in their test.
 
     Parameters
@@ -137,7 +137,7 @@ def stretches(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[In
     return found
 
 
-def called(samples: Samples, block: IntArray) -> str:
+def name_cycles(samples: Samples, block: IntArray) -> str:
     """Return the name of a cycle, or of several one after the other."""
     more = f" and {len(block) - 1} more" if len(block) > 1 else ""
     return f"{samples.cycle_names[block[0]]}{more}"
@@ -157,14 +157,14 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
             "only one thermal cycle was found: leaving one out needs at least two. Give a spindle speed, a 'cycle' "
             "column or several files; or judge by time with --split 0.75/0.25"
         )
-    blocks = stretches(samples.cycle, samples.test)
+    blocks = join_short_cycles(samples.cycle, samples.test)
     joined = f", {n - len(blocks)} of them too short: out with the one before" if 1 < len(blocks) < n else ""
     if len(blocks) == 1:  # all together: there would be nothing to learn from
         blocks = [np.array([k]) for k in range(n)]
     splits = []
     for block in blocks:
         mine = np.isin(samples.cycle, block)
-        splits.append(Split(f"cycle {called(samples, block)}", ~mine, mine))
+        splits.append(Split(f"cycle {name_cycles(samples, block)}", ~mine, mine))
     return Judging(f"leave one thermal cycle out ({n} cycles{joined})", tuple(splits))
 
 
@@ -209,7 +209,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
         if samples.time[rows[-1]] - samples.time[rows[0]] <= DAY:
             days[rows] = days[rows[0]]
     names, day = np.unique(days, return_inverse=True)
-    blocks = stretches(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
+    blocks = join_short_cycles(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
     if len(blocks) < 2:
         raise InputError("leaving one day out needs at least two days with recordings")
     splits = []

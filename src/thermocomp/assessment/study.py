@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment import coverage
-from thermocomp.assessment.compare import alike, compare, judge, per_cycle
-from thermocomp.assessment.leaks import learned_from
-from thermocomp.assessment.replay import absolute
+from thermocomp.assessment.compare import cap_alike_units, compare, judge, split_by_cycle
+from thermocomp.assessment.leaks import find_learned_rows
+from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import stress, worse
-from thermocomp.assessment.splits import Judging, Split, called, stretches
+from thermocomp.assessment.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
@@ -23,9 +23,8 @@ from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
-from thermocomp.recording.sound import sound
-from thermocomp.recording.starts import Start
-from thermocomp.recording.starts import find as find_starts
+from thermocomp.recording.sound import drop_unsound
+from thermocomp.recording.starts import Start, find_starts
 
 BoolArray = NDArray[np.bool_]
 
@@ -106,7 +105,7 @@ def fit(
     )
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
-    covered = coverage.cover(samples, judging, recordings)
+    covered = coverage.find_validity(samples, judging, recordings)
     tried: dict[str, Assessment] = {}
     for k, overall in enumerate(comparison.overall()):
         trained = train(method, samples, k, everything, support=support, prints=True)
@@ -229,7 +228,7 @@ def assess(
             recordings,
             [r.channel(m.target) for r in recordings[:1] for m in models],
             zeroing=models[0].zeroing,
-            absolute=absolute(models),
+            absolute=are_absolute(models),
         )
     told: tuple[tuple[str, Start], ...] = ()
     for model in models:
@@ -242,11 +241,11 @@ def assess(
             zeroing=model.zeroing,
             starts=starts,
         )
-        samples = sound(samples, recordings)
+        samples = drop_unsound(samples, recordings)
         told = tuple(zip(samples.test_names, samples.starts, strict=True))
-        covered = covered or coverage.cover(samples, units(samples), recordings)
+        covered = covered or coverage.find_validity(samples, units(samples), recordings)
         overall = _assess(model, _called_as_in(model, samples), rules, limits)
-        cut = [replace(a, learned=0) for a in per_cycle(overall)]
+        cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen, covered, told)
 
@@ -268,7 +267,7 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
 
 def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -> Assessment:
     """Judge a model on what it has not learned from; on everything if there is nothing else, and say so."""
-    known = learned_from(model, samples)
+    known = find_learned_rows(model, samples)
     judged = np.isfinite(samples.deviations[:, 0])
     n, of = int((known & judged).sum()), int(judged.sum())
     caveat = ""
@@ -283,7 +282,7 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     name = model.provenance.method if model.provenance else model.family
     found = judge(name, model, samples, split, rules=rules, limits=limits)
-    caps = (*found.verdict.caps, *alike(samples, units(samples, ~known)))
+    caps = (*found.verdict.caps, *cap_alike_units(samples, units(samples, ~known)))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n)
 
 
@@ -298,5 +297,5 @@ def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
     """Return the thermal cycles of recordings, or of some of their rows, as units; see `stretches`."""
     none = np.zeros(len(samples), dtype=np.bool_)
     cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
-    blocks = stretches(cycle, samples.test)
-    return Judging("all cycles", tuple(Split(called(samples, b), none, np.isin(cycle, b)) for b in blocks))
+    blocks = join_short_cycles(cycle, samples.test)
+    return Judging("all cycles", tuple(Split(name_cycles(samples, b), none, np.isin(cycle, b)) for b in blocks))

@@ -18,7 +18,7 @@ from thermocomp.volumetric import notes
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import Kinematics
 from thermocomp.volumetric.model import ThermalStates, VolumetricModel
-from thermocomp.volumetric.straight import StraightLines, left_by, straight_lines
+from thermocomp.volumetric.straight import StraightLines, find_remaining_error, straight_lines
 
 FloatArray = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ _PICKED = (_START, _LARGEST, _END, f"{_START} = {_LARGEST}", f"{_END} = {_LARGES
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class PointCourse:
     """What happens at one point while a recording is replayed.
 
     Parameters
@@ -112,7 +112,7 @@ class Moment:
     def after_lines(self, points: FloatArray) -> FloatArray:
         """Return what is left after the straight lines of the axes, of shape (..., 3) [um]."""
         lines = {line.axis: line.correction for line in self.straight.lines}
-        return left_by(self.field, points, lines, self.tool, exact=True)
+        return find_remaining_error(self.field, points, lines, self.tool, exact=True)
 
     def after_all(self, points: FloatArray) -> FloatArray:
         """Return what is left after the whole correction, a vector at every point, of shape (..., 3) [um]."""
@@ -159,7 +159,7 @@ class Volumetric:
 
     machine: Machine
     recording: Recording | None
-    course: Course
+    course: PointCourse
     moments: tuple[Moment, ...]
     missing: int = 0
 
@@ -233,8 +233,8 @@ def study(
             progress(k / len(time))
     levers = Kinematics(machine)
     error, tilt = levers.synthesize(values, np.asarray(point), tip)
-    course = Course(point, tip, time, values, error, tilt, levers.sensitivity(point, tip))
-    points, moments = over_travel(machine, grid), []
+    course = PointCourse(point, tip, time, values, error, tilt, levers.sensitivity(point, tip))
+    points, moments = lay_grid(machine, grid), []
     for label, row in _rows(time, course.largest if at is not None else _largest(states, tip), hours):
         lines = straight_lines(states[row], point, tip, grid=grid, exact=True)
         moments.append(Moment(label, row, float(time[row]), states[row], lines, tip, points))
@@ -264,7 +264,7 @@ def models_of(source: Source | None) -> tuple[ErrorModel, ...]:
     return (source,) if isinstance(source, ErrorModel) else ()
 
 
-def told_by(source: Source | None) -> str:
+def describe_source(source: Source | None) -> str:
     """Say in a few words what tells the value of a component."""
     if source is None:
         return "nothing"
@@ -280,7 +280,7 @@ def middle(machine: Machine) -> Vector:
     return (x, y, z)
 
 
-def over_travel(machine: Machine, n: int) -> FloatArray:
+def lay_grid(machine: Machine, n: int) -> FloatArray:
     """Return a grid over the work volume, of shape (n_x, n_y, n_z, 3) [mm]; one point along an axis not there."""
     along = [np.linspace(*machine.axis(a).travel, n) if a in machine.structure.axes else np.zeros(1) for a in "XYZ"]
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1)
@@ -316,7 +316,7 @@ def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[st
 
 def _largest(states: ThermalStates, tool: Vector) -> int:
     """Return the row with the largest error at the corners of the volume; of a long recording every n-th is seen."""
-    corners = over_travel(states.model.machine, 2)
+    corners = lay_grid(states.model.machine, 2)
     rows = range(0, len(states), 1 + len(states) // _LOOKED_AT)
     return max(rows, key=lambda k: float(np.linalg.norm(states[k].error(corners, tool), axis=-1).max()))
 

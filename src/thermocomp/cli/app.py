@@ -14,7 +14,7 @@ from thermocomp.cli import jsonoutput, loudness
 from thermocomp.cli.exits import FAULT, STDIN, STOPPED
 from thermocomp.cli.extras import needs
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.shown import shown
+from thermocomp.core.shown import replace_unprintable
 
 app = App(
     name="thermocomp",
@@ -96,7 +96,7 @@ def main() -> None:
 
 
 def _unusable(message: str) -> int:
-    text = "\n".join(shown(line) for line in message.split("\n"))
+    text = "\n".join(replace_unprintable(line) for line in message.split("\n"))
     Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
     _tell_programs(message)
     return 2
@@ -107,7 +107,9 @@ def _fault(error: Exception) -> int:
         traceback.print_exception(error)
     message = f"unexpected: {type(error).__name__}: {error}"
     hint = "" if loudness.verbose else "; this is a fault of thermocomp: --verbose tells where, for a report"
-    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(shown(message + hint))}", soft_wrap=True)
+    Console(stderr=True, highlight=False).print(
+        f"[bold red]error:[/] {escape(replace_unprintable(message + hint))}", soft_wrap=True
+    )
     _tell_programs(message)
     return FAULT
 

@@ -5,11 +5,11 @@ from pathlib import Path
 from thermocomp.cli import loudness
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.options import (
-    Compensator,
+    CompensatorOptions,
     read_recordings,
     tell_trouble,
 )
-from thermocomp.cli.progress import by_steps
+from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 
 
@@ -20,7 +20,7 @@ def assess(
     *,
     mapping: Path | None = None,
     harm_margin: float | None = None,
-    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     json: bool = False,
 ) -> int:
@@ -61,7 +61,7 @@ def assess(
     models = modelfile.read(model)
     loudness.tell(f"read {model}: models of {', '.join(m.target for m in models)}")
     trouble = tell_trouble(tests)
-    with by_steps(len(models), hidden=json) as progress:
+    with show_steps(len(models), hidden=json) as progress:
         judged = studies.assess(
             models,
             tests,

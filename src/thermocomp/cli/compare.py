@@ -5,11 +5,11 @@ from pathlib import Path
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.exits import STOPPED
 from thermocomp.cli.options import (
-    Compensator,
+    CompensatorOptions,
     OptionalOutput,
-    Study,
+    StudyOptions,
 )
-from thermocomp.cli.progress import by_steps
+from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
@@ -19,10 +19,10 @@ def compare(
     recordings: list[Path],
     /,
     *,
-    study: Study = Study(),  # noqa: B008 - frozen
+    study: StudyOptions = StudyOptions(),  # noqa: B008 - frozen
     models: list[str] = list(DEFAULT_MODELS),  # noqa: B006 - cyclopts shows it as the default and never changes it
     primary: str | None = None,
-    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     output: OptionalOutput = None,
     overwrite: bool = False,
@@ -64,7 +64,7 @@ def compare(
     from thermocomp.cli import output as out
 
     samples, judging, rules, limits = ready.samples, ready.judging, study.rules(primary), compensator.limits()
-    with by_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
+    with show_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
         comparison = comparing.compare(
             samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
         )

@@ -6,7 +6,7 @@ from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import (
     Output,
-    Study,
+    StudyOptions,
     read_recordings,
 )
 from thermocomp.cli.simulate import simulate
@@ -44,7 +44,7 @@ def demo(
     if not json:
         console.print("[bold]1. The virtual machine tool runs a drift test[/]")
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
-    study = Study(target=[c.name for c in read_recordings([recording], None)[0].displacements])
+    study = StudyOptions(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
         console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
     compare([recording], study=study, output=report, overwrite=overwrite, json=json)

@@ -6,12 +6,12 @@ from typing import Literal
 
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.options import (
-    Compensator,
+    CompensatorOptions,
     Output,
     Quiet,
-    Study,
+    StudyOptions,
 )
-from thermocomp.cli.progress import by_steps
+from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 
 Policy = Literal["clip", "hold", "fade"]
@@ -21,14 +21,14 @@ def fit(
     recordings: list[Path],
     /,
     *,
-    study: Study = Study(),  # noqa: B008 - frozen
+    study: StudyOptions = StudyOptions(),  # noqa: B008 - frozen
     model: str = "dynamic",
     tilt: list[str] | None = None,
     output: Output,
     support: Policy = "clip",
     margin: float = 0.25,
     accept_unproven: str | None = None,
-    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     overwrite: bool = False,
     json: bool = False,
@@ -81,7 +81,7 @@ def fit(
     from thermocomp.files import modelfile
 
     samples, judging = ready.samples, ready.judging
-    with by_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
+    with show_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
         result = studies.fit(
             samples,
             model,

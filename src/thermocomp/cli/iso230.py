@@ -10,7 +10,7 @@ from rich.markup import escape
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
-    Compensator,
+    CompensatorOptions,
     OptionalOutput,
     read_recordings,
     tell_trouble,
@@ -38,7 +38,7 @@ def iso230(
     pairs: list[str] | None = None,
     ambient: str | None = None,
     model: Path | None = None,
-    compensator: Compensator = Compensator(),  # noqa: B008 - frozen
+    compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     positioning: Tables = [],  # noqa: B006 - never changed
     mapping: Path | None = None,

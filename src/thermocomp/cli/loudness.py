@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.shown import shown
+from thermocomp.core.shown import replace_unprintable
 
 if TYPE_CHECKING:
     from thermocomp.recording.recording import Recording
@@ -39,7 +39,7 @@ def taken_off(words: Sequence[str]) -> list[str]:
 def tell(text: str) -> None:
     """Write a line on stderr, if more is wanted there."""
     if verbose:
-        print(shown(text), file=sys.stderr, flush=True)
+        print(replace_unprintable(text), file=sys.stderr, flush=True)
 
 
 def tell_read(recordings: "Sequence[Recording]") -> None:

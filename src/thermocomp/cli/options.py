@@ -35,7 +35,7 @@ OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class StudyOptions:
     """What is predicted from what, and on what it is judged.
 
     Parameters
@@ -140,7 +140,7 @@ class Study:
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Compensator:
+class CompensatorOptions:
     """What the compensator that is judged with a model may never do.
 
     Parameters

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice
-from thermocomp.assessment.do_no_harm import Unit
+from thermocomp.assessment.do_no_harm import JudgedUnit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.jsonoutput import print_json
@@ -18,8 +18,8 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report import records
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
-from thermocomp.report.running import told
-from thermocomp.report.summary import cautions, unlike
+from thermocomp.report.running import describe_running
+from thermocomp.report.summary import cautions, describe_unlike
 from thermocomp.simulation.protocol import Experiment
 
 
@@ -75,7 +75,7 @@ def show_comparison(
             )
     for caution in cautions(comparison):
         console.print(f"[yellow]but[/] {escape(caution)}")
-    for line in told(comparison.overall()):
+    for line in describe_running(comparison.overall()):
         console.print(escape(line))
     if comparison.left:
         console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
@@ -146,7 +146,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
             console.print(
                 f"{mark(m.honest_error.word)} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True
             )
-    for line in told(fitted.comparison.overall()):
+    for line in describe_running(fitted.comparison.overall()):
         console.print(escape(line))
     console.print(f"Model file: {path}", soft_wrap=True)
 
@@ -176,10 +176,10 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
-    for line in told(judged.overall()):
+    for line in describe_running(judged.overall()):
         console.print(escape(line))
         if a.robustness is not None and a.robustness.unlike > 0.1:
-            console.print(f"[yellow]but[/] {escape(a.target)}: {unlike(a.robustness)}")
+            console.print(f"[yellow]but[/] {escape(a.target)}: {describe_unlike(a.robustness)}")
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     known = {name: v for name, v in fitted.items() if v is not None}
     if known:
@@ -298,7 +298,7 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
     return Layout((Column("", 0, whole=True), *columns), rows, caption=caption, sections=frozenset(sections))
 
 
-def _passed(cycle: Unit) -> str:
+def _passed(cycle: JudgedUnit) -> str:
     return Toned(f"{cycle.rms:.2f}!", "bad") if cycle.harmful else f"{cycle.rms:.2f} "
 
 

@@ -14,16 +14,15 @@ from thermocomp.cli.options import (
     read_recordings,
     tell_trouble,
 )
-from thermocomp.cli.progress import by_share
+from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, marked, print_table
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
 from thermocomp.report.layout import Column, Layout, Toned
 
 if TYPE_CHECKING:
-    from thermocomp.papers.study import Claim, Study
+    from thermocomp.papers.study import Claim, Study, StudyTable
     from thermocomp.papers.study import Progress as Told
-    from thermocomp.papers.study import Table as StudyTable
     from thermocomp.recording.recording import Recording
 
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
@@ -105,7 +104,7 @@ def papers(
     done: list[tuple[Study, float]] = []
     for number, name in enumerate(chosen, start=1):
         begin = time.perf_counter()
-        with by_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
+        with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
             study = (
                 _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, repeats, progress)
             )

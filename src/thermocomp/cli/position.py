@@ -79,7 +79,7 @@ def position(
     job = prepare(recordings, component, settings)
     loudness.tell_read(job.recordings)
     trouble = tell_trouble(job.recordings)
-    with progress.by_steps(job.n_pieces, hidden=json) as tell:
+    with progress.show_steps(job.n_pieces, hidden=json) as tell:
         result = job.run(tell)
     if output is not None:
         result.save(output, accept_unproven=accept_unproven, overwrite=overwrite)

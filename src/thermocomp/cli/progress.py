@@ -19,7 +19,7 @@ from rich.progress import (
 )
 
 from thermocomp.cli import loudness
-from thermocomp.core.shown import shown
+from thermocomp.core.shown import replace_unprintable
 
 #: without a terminal a line is told so often; work that takes less time tells none [s]
 OFTEN = 10.0
@@ -40,7 +40,7 @@ class Share(Protocol):
 
 
 @contextmanager
-def by_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
+def show_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
     """Show how many of so many steps are done; nothing if `hidden`, or if the command line wants it quiet."""
     hidden = hidden or loudness.quiet
     with _bar(MofNCompleteColumn(), hidden) as bar:
@@ -60,7 +60,7 @@ def by_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
 
 
 @contextmanager
-def by_share(name: str, *, hidden: bool) -> Iterator[Share]:
+def show_share(name: str, *, hidden: bool) -> Iterator[Share]:
     """Show the percentage that is done; nothing if `hidden`, or if the command line wants it quiet."""
     hidden = hidden or loudness.quiet
     with _bar(TaskProgressColumn(), hidden) as bar:
@@ -87,7 +87,7 @@ class _Lines:
         now = time.monotonic()
         if not self._silent and now - self._told >= OFTEN:
             self._told = now
-            print(f"{shown(text)}: {done} after {now - self._begun:.0f} s", file=sys.stderr, flush=True)
+            print(f"{replace_unprintable(text)}: {done} after {now - self._begun:.0f} s", file=sys.stderr, flush=True)
 
 
 def _bar(done: ProgressColumn, hidden: bool) -> Progress:

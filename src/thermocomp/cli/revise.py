@@ -17,9 +17,9 @@ from thermocomp.api.revision.prepare import prepare_job
 from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
-from thermocomp.cli.progress import by_share
+from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, print_table
-from thermocomp.core.shown import shown
+from thermocomp.core.shown import replace_unprintable
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.report.layout import Column, Layout
 
@@ -90,7 +90,7 @@ def revise(
     job, notes = prepare_job(program, drifting, output, starting, way, controller, timing, date, overwrite=overwrite)
     loudness.tell(f"read {job.program}")
     # a pipe gets its lines on stderr, whatever stdout is for
-    done = revise_program(job, partial(by_share, hidden=json and sys.stderr.isatty()))
+    done = revise_program(job, partial(show_share, hidden=json and sys.stderr.isatty()))
     if json:
         print_json(outcome.content(job, done, notes))
     else:
@@ -103,10 +103,10 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     revision = job.revision
 
     def say(mark: str, text: str) -> None:
-        console.print(f"{mark} {escape(shown(text))}".lstrip(), soft_wrap=True)
+        console.print(f"{mark} {escape(replace_unprintable(text))}".lstrip(), soft_wrap=True)
 
     console.print(
-        f"[bold]{escape(shown(job.program))}[/]: {_many(revision.lines, 'line')}, "
+        f"[bold]{escape(replace_unprintable(job.program))}[/]: {_many(revision.lines, 'line')}, "
         f"{revision.changed if done.written else 'none'} of them changed; "
         f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
         f"{_many(len(revision.tool_changes), 'tool change')}",
@@ -123,7 +123,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
         say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
     for warning in outcome.warnings(job, done):
         say("[yellow]but[/]", warning)
-    for note in (*notes, *outcome.place(job, done)):
+    for note in (*notes, *outcome.describe_place(job, done)):
         say("[yellow]note[/]", note)
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
@@ -132,7 +132,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     if done.written:
         say("", f"Written: {', '.join(map(str, job.paths.all()))}")
     else:
-        say("[bold yellow]nothing written:[/]", outcome.nothing(job, done))
+        say("[bold yellow]nothing written:[/]", outcome.explain_nothing(job, done))
 
 
 def _bounds(bounds: Sequence[Bound]) -> Layout:

@@ -7,9 +7,9 @@ from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.options import (
     OptionalOutput,
     Selector,
-    Study,
+    StudyOptions,
 )
-from thermocomp.cli.progress import by_steps
+from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
@@ -19,7 +19,7 @@ def select(
     recordings: list[Path],
     /,
     *,
-    study: Study = Study(),  # noqa: B008 - frozen
+    study: StudyOptions = StudyOptions(),  # noqa: B008 - frozen
     method: SelectionMethod = "pareto",
     settings: Selector = Selector(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
@@ -61,7 +61,7 @@ def select(
     from thermocomp.cli import output as out
 
     samples, judging = ready.samples, ready.judging
-    with by_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
+    with show_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
         choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
         from thermocomp.report import html

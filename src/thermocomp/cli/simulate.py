@@ -8,7 +8,7 @@ from thermocomp.cli.options import (
     OptionalOutput,
     Quiet,
 )
-from thermocomp.cli.progress import by_steps
+from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
@@ -57,11 +57,11 @@ def simulate(
     from thermocomp.files import recordings
 
     if list_:
-        out.show_experiments([virtual.find(name) for name in virtual.EXPERIMENTS], console, as_json=json)
+        out.show_experiments([virtual.find_experiment(name) for name in virtual.EXPERIMENTS], console, as_json=json)
         return 0
     if experiment is None or output is None:
         raise InputError("name an experiment and a file: thermocomp simulate demo -o drift.parquet; see --list")
-    found = virtual.find(experiment)
+    found = virtual.find_experiment(experiment)
     n_tests = len(found.names)
     paths = (
         [output]
@@ -69,7 +69,7 @@ def simulate(
         else [output.with_name(f"{output.stem}-{k}{output.suffix}") for k in range(1, n_tests + 1)]
     )
     refuse_existing(paths, overwrite)
-    with by_steps(n_tests, hidden=json or quiet) as progress:
+    with show_steps(n_tests, hidden=json or quiet) as progress:
         tests = virtual.record(found, seed=seed, sensor_noise=noise, progress=progress)
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)

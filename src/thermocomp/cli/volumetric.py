@@ -8,7 +8,7 @@ from rich.markup import escape
 from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
-from thermocomp.cli.progress import by_share
+from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import refuse_existing
@@ -82,7 +82,7 @@ def volumetric(
     loudness.tell(f"read {machine}: {len(known.axes)} axes, {len(known.components)} components")
     tests = read_recordings([recording], mapping) if recording is not None else []
     trouble = tell_trouble(tests)
-    with by_share("replaying", hidden=json) as progress:
+    with show_share("replaying", hidden=json) as progress:
         result = study(
             known,
             tests[0] if tests else None,

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Constant, Node, Sum, Table
+from thermocomp.core.expression import Constant, Lookup, Node, Sum
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Variable
 
@@ -70,9 +70,9 @@ class Curve:
         """Greatest minus least value."""
         return max(self.y) - min(self.y)
 
-    def expression(self, of: Node, name: str) -> Table:
+    def expression(self, of: Node, name: str) -> Lookup:
         """Return it as a part of an expression."""
-        return Table(of, self.x, self.y, self.kind, name)
+        return Lookup(of, self.x, self.y, self.kind, name)
 
     def __call__(self, variable: FloatArray) -> FloatArray:
         """Return the values at `variable`, element by element: the same alone as in a batch, to the last bit."""

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, weighted
+from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, sum_weighted
 from thermocomp.core.model import ErrorModel, FloatArray, State, check_finite
 from thermocomp.core.network import Affine, Perceptron
 
@@ -37,7 +37,7 @@ EARLY = 1e-6
 MOST_TICKS = 5760
 
 
-def slowest(a: ArrayLike) -> float:
+def find_largest_root(a: ArrayLike) -> float:
     """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run decays."""
     roots = np.linalg.eigvals(companion(np.asarray(a, dtype=np.float64)))
     return float(np.abs(roots).max(initial=0.0))
@@ -225,7 +225,7 @@ class Autoregressive(Ticking):
         check_finite(owner, a=self.a, intercept=self.intercept)
         for b in self.b:
             check_finite(owner, b=b)
-        largest = slowest(self.a)
+        largest = find_largest_root(self.a)
         if not largest < 1:
             raise InputError(
                 f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, want < 1"
@@ -265,7 +265,7 @@ class Autoregressive(Ticking):
         return {n: c for n, c in zip(self._regressor_names(), self._weights.tolist(), strict=True) if c != 0}
 
     def _expression(self, change: Sequence[Node]) -> Node:
-        return Recurrence(weighted(self._weights.tolist(), self._regressors(change), self.intercept), self.interval)
+        return Recurrence(sum_weighted(self._weights.tolist(), self._regressors(change), self.intercept), self.interval)
 
 
 @dataclass(frozen=True, kw_only=True)

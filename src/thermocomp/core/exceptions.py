@@ -29,7 +29,7 @@ class SettingError(InputError, ValueError):
         self.path = path
 
 
-def unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
+def explain_unknown(what: str, name: str, known: Iterable[str], path: tuple[str | int, ...] = ()) -> SettingError:
     """Return the error of a name that nobody knows; it tells the nearest ones.
 
     Parameters

@@ -80,7 +80,7 @@ class Sigmoid:
 
 
 @dataclass(frozen=True)
-class Table:
+class Lookup:
     """A function of one value, constant beyond its ends; see `thermocomp.core.additive.Curve`.
 
     Parameters
@@ -167,7 +167,7 @@ Node = (
     | Product
     | Power
     | Sigmoid
-    | Table
+    | Lookup
     | Lag
     | Past
     | Mean
@@ -176,19 +176,19 @@ Node = (
 )
 
 
-def scaled(factor: float, of: Node) -> Node:
+def scale_node(factor: float, of: Node) -> Node:
     """Return a node times a number."""
     return of if factor == 1.0 else Product((Constant(factor), of))
 
 
-def weighted(weights: Sequence[float], of: Sequence[Node], constant: float = 0.0) -> Node:
+def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float = 0.0) -> Node:
     """Return the sum of nodes times numbers, and of a constant; what is zero is left out."""
     found: list[Node] = [Constant(constant)] if constant else []
     found += [Product((Constant(w), x)) for w, x in zip(weights, of, strict=True) if w != 0]
     return Sum(tuple(found))
 
 
-def printed(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kind of node
+def format_node(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kind of node
     """Return a tree as one line of text, such as ``1.5 T1 - 0.5 lag(T1, 10 min) + 4e-07 n*n``.
 
     Parameters
@@ -205,11 +205,11 @@ def printed(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kin
         case Input(_, name) | Named(name, _):
             return name
         case Clip(of):
-            return printed(of)
+            return format_node(of)
         case Sum(terms):
             return _sum(terms)
         case Difference(of, minus):
-            return f"{printed(of)}-{_bracketed(minus)}"
+            return f"{format_node(of)}-{_bracketed(minus)}"
         case Product((Constant(value), *others)) if others:
             return f"{value:.6g} {_product(others)}"
         case Product(factors):
@@ -217,17 +217,17 @@ def printed(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every kin
         case Power(of, exponent):
             return "*".join([_bracketed(of)] * exponent)
         case Sigmoid(of):
-            return f"sigmoid({printed(of)})"
-        case Table(of, name=name):
-            return f"{name}({printed(of)})"
+            return f"sigmoid({format_node(of)})"
+        case Lookup(of, name=name):
+            return f"{name}({format_node(of)})"
         case Lag(of, tau):
-            return f"lag({printed(of)}, {tau / 60:.4g} min)"
+            return f"lag({format_node(of)}, {tau / 60:.4g} min)"
         case Past(ticks):
             return f"dz(t-{ticks})"
         case Mean(of, ticks):
-            return f"{printed(of)}(t-{ticks})" if ticks else f"{printed(of)}(t)"
+            return f"{format_node(of)}(t-{ticks})" if ticks else f"{format_node(of)}(t)"
         case Recurrence(tick, interval):
-            return f"{printed(tick)}; t in steps of {interval:g} s"
+            return f"{format_node(tick)}; t in steps of {interval:g} s"
     raise InputError(f"{node!r} is no part of an expression")
 
 
@@ -236,9 +236,9 @@ def _sum(terms: Sequence[Node]) -> str:
     for term in terms:
         match term:
             case Product((Constant(value), *others)) if others and value < 0:
-                text += f" - {printed(Product((Constant(-value), *others)))}"
+                text += f" - {format_node(Product((Constant(-value), *others)))}"
             case _:
-                text += f" + {printed(term)}"
+                text += f" + {format_node(term)}"
     return text.removeprefix(" + ").strip() or "0"
 
 
@@ -249,4 +249,4 @@ def _product(factors: Sequence[Node]) -> str:
 def _bracketed(node: Node) -> str:
     """Return a part of a product, in brackets if it is a sum."""
     inner = node.of if isinstance(node, Named | Clip) else node
-    return f"({printed(node)})" if isinstance(inner, Sum | Difference) else printed(node)
+    return f"({format_node(node)})" if isinstance(inner, Sum | Difference) else format_node(node)

@@ -12,12 +12,12 @@ from thermocomp.core.exceptions import InputError
 Marks = NDArray[np.uint32]
 
 
-def packed(marks: Marks) -> str:
+def pack_marks(marks: Marks) -> str:
     """Return numbers of 32 bits as base64 text, lowest byte first."""
     return base64.b64encode(marks.astype("<u4").tobytes()).decode("ascii")
 
 
-def unpacked(text: str) -> Marks:
+def unpack_marks(text: str) -> Marks:
     """Return the numbers in the text that `packed` gives.
 
     Raises
@@ -59,11 +59,11 @@ class Runs:
             raise InputError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
         if not self.marks:
             raise InputError("fingerprints: want those of a target at least")
-        rows = unpacked(self.rows)
+        rows = unpack_marks(self.rows)
         if not (np.diff(rows.astype(np.int64)) > 0).all():
             raise InputError("fingerprints: their rows do not rise")
         for name, text in (("moving", self.moving), *self.marks.items()):
-            if (n := len(unpacked(text))) != len(rows):
+            if (n := len(unpack_marks(text))) != len(rows):
                 raise InputError(f"fingerprints: {n} of {name} for {len(rows)} rows")
 
 
@@ -100,5 +100,5 @@ class Prints:
         for run in self.runs:
             if list(run.marks) != list(self.steps):
                 raise InputError(f"fingerprints of {', '.join(run.marks)}: want those of {', '.join(self.steps)}")
-            if (rows := unpacked(run.rows)).size and rows[-1] >= ends[-1]:
+            if (rows := unpack_marks(run.rows)).size and rows[-1] >= ends[-1]:
                 raise InputError(f"fingerprints: of row {rows[-1]}, where {ends[-1]} rows were recorded")

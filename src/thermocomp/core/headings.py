@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
-from thermocomp.core.units import Unit, unit
+from thermocomp.core.units import Unit, find_unit
 
 # What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
 SUFFIXES = {
@@ -63,7 +63,7 @@ def understand(heading: str) -> Meaning | None:
             return None
         symbol = SUFFIXES.get(symbol, symbol)
         try:
-            meant = unit(symbol)
+            meant = find_unit(symbol)
         except UnitError:
             # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
             if get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
@@ -74,9 +74,9 @@ def understand(heading: str) -> Meaning | None:
         if not ends:
             return None
         suffix = max(ends, key=len)
-        base, meant = heading[: -len(suffix) - 1], unit(SUFFIXES[suffix])
+        base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
     if meant.quantity == "displacement" and _is_position(base, meant.symbol):
-        meant = unit(meant.symbol, "position")
+        meant = find_unit(meant.symbol, "position")
     # one word, so that the name can go into a formula or a controller
     return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
 

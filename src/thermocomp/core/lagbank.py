@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 
-def decay(dt: float | FloatArray, time_constants: FloatArray) -> FloatArray:
+def step_response(dt: float | FloatArray, time_constants: FloatArray) -> FloatArray:
     """Return 1 - exp(-dt / tau): the share of a step that a first-order lag follows within `dt`."""
     return -np.expm1(-dt / time_constants)
 
@@ -28,7 +28,7 @@ def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: 
     -------
     ndarray of shape (..., n_lags)
     """
-    return memory + decay(dt, time_constants) * (signals - memory)
+    return memory + step_response(dt, time_constants) * (signals - memory)
 
 
 def run(
@@ -55,7 +55,7 @@ def run(
         out[:] = signals
         return out
     steps, where = np.unique(dt, return_inverse=True)
-    shares = decay(steps[:, None], time_constants)  # few distinct steps even in a long recording
+    shares = step_response(steps[:, None], time_constants)  # few distinct steps even in a long recording
     current = signals[0] if memory is None else memory
     for k in range(len(signals)):
         current = current + shares[where[k]] * (signals[k] - current)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Lag, Node, weighted
+from thermocomp.core.expression import Lag, Node, sum_weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -89,7 +89,7 @@ class LinearDynamic(ErrorModel):
     def _expression(self, change: Sequence[Node]) -> Node:
         signals = self._table.expressions(change)
         lags = [Lag(signals[k], tau) for k, tau in zip(self.lag_signals, self.time_constants, strict=True)]
-        return weighted((*self.direct, *self.lagged), (*signals, *lags), self.intercept)
+        return sum_weighted((*self.direct, *self.lagged), (*signals, *lags), self.intercept)
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
-from thermocomp.core.units import unit
+from thermocomp.core.units import find_unit
 
 Vector = tuple[float, float, float]
 #: what may tell the value of a component: a constant [um or urad], a model of time, a model of time and position
@@ -105,7 +105,7 @@ class Channel:
     place: str = ""
 
     def __post_init__(self) -> None:
-        unit(self.unit, self.quantity)
+        find_unit(self.unit, self.quantity)
 
 
 @dataclass(frozen=True, eq=False)

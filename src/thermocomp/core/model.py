@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import InputError, ReadingError
-from thermocomp.core.expression import Clip, Node, printed
+from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.fingerprints import Prints
 from thermocomp.core.instants import seconds
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.learned import Learned
 from thermocomp.core.validity import Validity
-from thermocomp.core.zero import FIRST_READING, Zeroing, begin
+from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -439,7 +439,7 @@ class ErrorModel(ABC):
         for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
             zeros[a] = reference
             if clock is not None and usable[a:b].any():
-                zeros[a], values[a:b] = begin(
+                zeros[a], values[a:b] = find_zero(
                     self.zeroing, self.init(reference).reference, clock[a:b], values[a:b], resting[a:b], usable[a:b]
                 )
         found, state, since = np.empty(n), self.init(reference), 0.0
@@ -501,7 +501,7 @@ class ErrorModel(ABC):
 
     def formula(self) -> str:
         """Return the model as one line of text."""
-        return printed(self.expression())
+        return format_node(self.expression())
 
     @property
     def accepted(self) -> bool:

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scaled, weighted
+from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scale_node, sum_weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 
 Activation = Literal["sigmoid", "tanh", "identity"]
@@ -31,7 +31,7 @@ def _activated(function: Activation, net: Node) -> Node:
         case "sigmoid":
             return Sigmoid(net)
         case "tanh":  # 2 sigmoid(2 net) - 1
-            return Sum((scaled(2.0, Sigmoid(scaled(2.0, net))), Constant(-1.0)))
+            return Sum((scale_node(2.0, Sigmoid(scale_node(2.0, net))), Constant(-1.0)))
         case "identity":
             return net
 
@@ -157,13 +157,13 @@ class Perceptron:
         """Return the first output, with the scalings around it, as a part of an expression."""
         (gain, *_), (offset, *_) = output_scaling.gain, output_scaling.offset
         scale = zip(input_scaling.gain, inputs, input_scaling.offset, strict=True)
-        given = [Sum((scaled(g, x), Constant(o))) for g, x, o in scale]
+        given = [Sum((scale_node(g, x), Constant(o))) for g, x, o in scale]
         layer = [
-            _activated(self.hidden, weighted(weights, given, threshold))
+            _activated(self.hidden, sum_weighted(weights, given, threshold))
             for weights, threshold in zip(self.hidden_weights, self.hidden_thresholds, strict=True)
         ]
-        out = _activated(self.output, weighted(self.output_weights[0], layer, self.output_thresholds[0]))
-        return Sum((scaled(gain, out), Constant(offset)))
+        out = _activated(self.output, sum_weighted(self.output_weights[0], layer, self.output_thresholds[0]))
+        return Sum((scale_node(gain, out), Constant(offset)))
 
     @property
     def n_parameters(self) -> int:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Node, weighted
+from thermocomp.core.expression import Node, sum_weighted
 from thermocomp.core.model import ErrorModel, FloatArray, check_finite
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -58,7 +58,7 @@ class Polynomial(ErrorModel):
         return memory, self._table.evaluate(change) @ self._coefficients + self.intercept
 
     def _expression(self, change: Sequence[Node]) -> Node:
-        return weighted(self.coefficients, self._table.expressions(change), self.intercept)
+        return sum_weighted(self.coefficients, self._table.expressions(change), self.intercept)
 
     @property
     def sensors(self) -> tuple[str, ...]:

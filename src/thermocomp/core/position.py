@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel, Provenance, check_finite
-from thermocomp.core.profile import Coordinates, Numbers, Profile, coordinates, held
+from thermocomp.core.profile import Coordinates, Numbers, Profile, clamp, coordinates
 
 FloatArray = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ class PositionModel:
         value = k_0 if self.profile is None else self.profile.value(xyz) + k_0
         if not self.slopes:
             return value
-        q = 1e-3 * (held(xyz["XYZ".index(self.axis)], *self.travel) - self.reference_position)
+        q = 1e-3 * (clamp(xyz["XYZ".index(self.axis)], *self.travel) - self.reference_position)
         thermal: Numbers = 0.0
         for _, k in zip(reversed(self.slopes), reversed(others), strict=True):
             thermal = (thermal + k) * q

@@ -109,7 +109,7 @@ class PolynomialProfile:
         return total
 
     def _scaled(self, xyz: Coordinates, axis: int) -> Numbers:
-        return (held(xyz[axis], self.low[axis], self.high[axis]) - self.centre[axis]) / self.scale[axis]
+        return (clamp(xyz[axis], self.low[axis], self.high[axis]) - self.centre[axis]) / self.scale[axis]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class SplineProfile:
 
     def value(self, xyz: Coordinates) -> Numbers:
         """Return its values at what `coordinates` made of points."""
-        p = held(xyz["XYZ".index(self.axis)], self.knots[0], self.knots[-1])
+        p = clamp(xyz["XYZ".index(self.axis)], self.knots[0], self.knots[-1])
         if isinstance(p, float):
             i = min(bisect_right(self.knots, p), len(self.pieces)) - 1
             return _cubic(self.pieces[i], (p - self.knots[i]) / (self.knots[i + 1] - self.knots[i]))
@@ -187,7 +187,7 @@ def coordinates(points: FloatArray) -> Coordinates:
     return points[..., 0], points[..., 1], points[..., 2]
 
 
-def held(value: Numbers, low: float, high: float) -> Numbers:
+def clamp(value: Numbers, low: float, high: float) -> Numbers:
     """Return numbers, no further out than the borders."""
     return min(max(value, low), high) if isinstance(value, float) else np.clip(value, low, high)
 

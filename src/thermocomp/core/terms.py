@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Difference, Named, Node, Power, Product, Sum, scaled
+from thermocomp.core.expression import Difference, Named, Node, Power, Product, Sum, scale_node
 
 FloatArray = NDArray[np.float64]
 Term = tuple[int, ...]
@@ -54,7 +54,7 @@ class Variable:
                 return change[index]
             case ((plus, 1.0), (minus, -1.0)):
                 return Named(self.name, Difference(change[plus], change[minus]))
-        return Named(self.name, Sum(tuple(scaled(w, change[i]) for i, w in self.weights)))
+        return Named(self.name, Sum(tuple(scale_node(w, change[i]) for i, w in self.weights)))
 
     def written(self) -> str:
         """Return the name, in brackets where a product needs them."""

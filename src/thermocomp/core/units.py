@@ -118,7 +118,7 @@ _MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\
 _BY_KEY = {(u.symbol, u.quantity): u for u in _UNITS}
 
 
-def unit(symbol: str, quantity: str | None = None) -> Unit:
+def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     """Look a unit up.
 
     Parameters
@@ -158,7 +158,7 @@ def unit(symbol: str, quantity: str | None = None) -> Unit:
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")
 
 
-def measured(text: object, quantity: str) -> float | None:
+def read_with_unit(text: object, quantity: str) -> float | None:
     """Read a value that is written with its unit.
 
     Parameters
@@ -181,7 +181,7 @@ def measured(text: object, quantity: str) -> float | None:
     found = _MEASURED.fullmatch(text) if isinstance(text, str) else None
     if found is None:
         return None
-    known = unit(found[2], quantity)
+    known = find_unit(found[2], quantity)
     value = known.scale * float(found[1]) + known.shift
     if not math.isfinite(value):
         raise UnitError("is no finite number")

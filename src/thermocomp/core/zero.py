@@ -116,7 +116,7 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
     return len(time), len(time)
 
 
-def centre(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
+def robust_mean(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
     """Return the mean over the first axis, without what is further than `FAR` median deviations from the median.
 
     Parameters
@@ -136,7 +136,7 @@ def centre(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
     return np.asarray((np.where(near, table, 0.0)).sum(axis=0) / near.sum(axis=0))
 
 
-def begin(
+def find_zero(
     zeroing: Zeroing, zero: FloatArray, time: FloatArray, values: FloatArray, resting: BoolArray, usable: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Find what a test counts from.
@@ -164,5 +164,5 @@ def begin(
         return zero, values
     window = rows[: first_rows(zeroing, time[rows], resting[rows])[0]]
     rested = values.copy()
-    rested[window] = centre(values[window])
+    rested[window] = robust_mean(values[window])
     return np.where(np.isnan(zero), rested[window[0]], zero), rested

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.files.protocols import read_protocol
-from thermocomp.recording.cycles import find_cycles, whole
+from thermocomp.recording.cycles import find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.simulation.experiments import SimulatedTest, simulate
 from thermocomp.simulation.protocol import Experiment
@@ -36,7 +36,7 @@ _read = cache(read_protocol)
 EXPERIMENTS: Mapping[str, Experiment] = _BuiltIn()
 
 
-def find(experiment: str | Path) -> Experiment:
+def find_experiment(experiment: str | Path) -> Experiment:
     """Return an experiment by its name, or from a file of one's own.
 
     Parameters
@@ -52,7 +52,7 @@ def find(experiment: str | Path) -> Experiment:
     if Path(experiment).suffix == ".toml":
         return read_protocol(experiment)
     if str(experiment) not in EXPERIMENTS:
-        message = unknown("experiment", str(experiment), EXPERIMENTS)
+        message = explain_unknown("experiment", str(experiment), EXPERIMENTS)
         raise InputError(f"{message}; a protocol of your own is named by its file, such as my_test.toml")
     return EXPERIMENTS[str(experiment)]
 
@@ -90,17 +90,17 @@ def record(
     InputError
         There is no such experiment, or the file cannot be used.
     """
-    found = experiment if isinstance(experiment, Experiment) else find(experiment)
+    found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
     recordings = []
     for test in simulate(found, seed=seed, sensor_noise=sensor_noise, faults=faults):
-        recordings.append(recording(test))
+        recordings.append(make_recording(test))
         progress(test.name)
     return recordings
 
 
-def recording(test: SimulatedTest) -> Recording:
+def make_recording(test: SimulatedTest) -> Recording:
     """Return a simulated test as a recording, split into its thermal cycles."""
     table = pd.DataFrame(test.values, columns=[c.name for c in test.channels])
     speeds = [c.name for c in test.channels if c.quantity == "spindle_speed"]
-    cycles = find_cycles(test.time, table[speeds[0]].to_numpy()) if speeds else whole(len(table))
+    cycles = find_cycles(test.time, table[speeds[0]].to_numpy()) if speeds else make_single_cycle(len(table))
     return Recording(test.name, test.time, table, test.channels, cycles)

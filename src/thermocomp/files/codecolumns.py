@@ -25,7 +25,7 @@ def codes(recording: Recording) -> tuple[str, ...]:
     return tuple(c.code for c in COMPONENTS if columns_of(recording, c.code)[0])
 
 
-def is_one(channel: Channel) -> bool:
+def is_code_column(channel: Channel) -> bool:
     """Return whether a column is called after a component."""
     return _NAME.fullmatch(channel.name) is not None
 

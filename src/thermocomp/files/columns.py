@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, Meaning, understand
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import Unit, unit
+from thermocomp.core.units import Unit, find_unit
 from thermocomp.files.mapping import ColumnMap, Mapping
 
 FloatArray = NDArray[np.float64]
@@ -64,7 +64,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ColumnPlan:
     """Which columns of a file are read, and as what.
 
     Parameters
@@ -96,7 +96,7 @@ class Plan:
     notes: tuple[str, ...] = ()
 
 
-def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
+def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     """Decide which columns are read, and as what.
 
     Parameters
@@ -159,7 +159,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> Plan:
     time_unit, note = _time_unit(headings[time], meanings[time], mapping, source)
     notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
-    return Plan(time, time_unit, date, cycle, tuple(columns), tuple(left_out), aliases, tuple(notes))
+    return ColumnPlan(time, time_unit, date, cycle, tuple(columns), tuple(left_out), aliases, tuple(notes))
 
 
 def why_left_out(heading: str) -> str:
@@ -171,7 +171,7 @@ def why_left_out(heading: str) -> str:
     if not found and "_" not in heading:
         return f"{heading!r} has no unit; put it behind the name (t1_C), or write {mapped} role and unit, or {ignore}"
     try:
-        meant = unit(symbol)
+        meant = find_unit(symbol)
     except UnitError:
         near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
         known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(HOUSE_SUFFIX)} and others"
@@ -196,7 +196,7 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
     if meant is None:
         return said, ""
     try:
-        said = unit(said.symbol, meant.quantity)
+        said = find_unit(said.symbol, meant.quantity)
     except UnitError as e:
         if rule.unit and rule.scale != 1 and {said.quantity, meant.quantity} <= set(_GEOMETRY):
             return meant, ""
@@ -263,7 +263,7 @@ def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: 
             f"{source}: mapping [time]: the heading {heading!r} says {said.symbol}, a unit of {said.quantity}, not "
             f"{given or 's'}; take the column that holds the time, or correct the heading"
         )
-    if given in ("", "timestamp") or unit(given, "time") == said:
+    if given in ("", "timestamp") or find_unit(given, "time") == said:
         return given or said.symbol, ""
     return given, f"time: the heading {heading!r} says {said.symbol}, the mapping says {given}; the mapping is obeyed"
 

@@ -64,7 +64,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     try:
         saved = _ADAPTER.validate_python(body[0])
     except ValidationError as e:
-        raise jsonfile.damaged(e, source) from e
+        raise jsonfile.explain_damage(e, source) from e
     except InputError as e:
         raise ModelFileError(f"{source}: {e}") from e
     return SavedJob(saved.written.astimezone(UTC), saved.state)

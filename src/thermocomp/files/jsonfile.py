@@ -137,7 +137,7 @@ def digest(body: list[Any]) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def damaged(failure: ValidationError, where: str) -> ModelFileError:
+def explain_damage(failure: ValidationError, where: str) -> ModelFileError:
     """Return the error that tells the place of pydantic's first one."""
     first = failure.errors()[0]
     place = ".".join(str(p) for p in first["loc"])

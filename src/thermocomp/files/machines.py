@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from thermocomp.core.components import BY_CODE, ErrorComponent
-from thermocomp.core.exceptions import InputError, SettingError, UnitError, unknown
+from thermocomp.core.exceptions import InputError, SettingError, UnitError, explain_unknown
 from thermocomp.core.machine import Axis, Machine, Source
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.structure import Structure
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 from thermocomp.files import jsonfile, modelfile, positionfile
 from thermocomp.files.tomlfile import read_toml
 
@@ -173,7 +173,7 @@ class _Sources:
         """Return what stands under ``components.CODE``."""
         where: Keys = ("components", code)
         if code not in BY_CODE:
-            raise unknown("component", code, BY_CODE, where)
+            raise explain_unknown("component", code, BY_CODE, where)
         component = BY_CODE[code]
         for name in component.axes:
             if name not in self.axes:
@@ -226,7 +226,7 @@ class _Sources:
                 raise SettingError(str(e), here) from e
         models = {m.target: m for m in self._files[path]}
         if target is not None and target not in models:
-            raise unknown(f"model in {path} of", target, models, (*where, "target"))
+            raise explain_unknown(f"model in {path} of", target, models, (*where, "target"))
         wanted = target or (component.code if component.code in models else None)
         if wanted is None and len(models) > 1:
             raise SettingError(f"{path} holds models of {', '.join(models)}: say which by target", where)
@@ -259,7 +259,7 @@ def _table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, A
     found = {}
     for key, inner in value.items():
         if key not in known:
-            raise unknown("key", key, known, (*where, key))
+            raise explain_unknown("key", key, known, (*where, key))
         found[key] = known[key](inner, (*where, key))
     return found
 
@@ -270,7 +270,7 @@ def _measure(quantity: str) -> Convert:
 
     def convert(value: Any, where: Keys) -> float:
         try:
-            number = measured(value, quantity)
+            number = read_with_unit(value, quantity)
         except UnitError as e:
             raise SettingError(f'"{value}": {e}', where) from e
         if number is None:

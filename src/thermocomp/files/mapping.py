@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.core.units import HOUSE_UNITS, Unit, unit
+from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.tomlfile import read_toml
 
 Role = Literal[
@@ -88,8 +88,8 @@ class ColumnMap:
         """What leads to the house unit; None if neither unit nor role says."""
         quantity = self.role if self.role in HOUSE_UNITS else None
         if self.unit:
-            return unit(self.unit, quantity)
-        return unit(HOUSE_UNITS[quantity], quantity) if quantity else None
+            return find_unit(self.unit, quantity)
+        return find_unit(HOUSE_UNITS[quantity], quantity) if quantity else None
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ def _explain(failure: ValidationError) -> str:
 def _unit_in(table: str, symbol: str, quantity: str | None) -> None:
     try:
         if symbol:
-            unit(symbol, quantity)
+            find_unit(symbol, quantity)
     except UnitError as e:
         raise UnitError(f"{table}: {e}") from e
 

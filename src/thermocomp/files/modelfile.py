@@ -121,6 +121,6 @@ def model_of(entry: Any, where: str) -> ErrorModel:
     try:
         return _adapter(family).validate_python(fields)
     except ValidationError as e:
-        raise jsonfile.damaged(e, where) from e
+        raise jsonfile.explain_damage(e, where) from e
     except InputError as e:
         raise ModelFileError(f"{where}: {e}") from e

@@ -8,7 +8,7 @@ from typing import TextIO
 from thermocomp.core.exceptions import InputError
 
 
-def opened(path: Path) -> TextIO:
+def open_to_read(path: Path) -> TextIO:
     """Open a program for reading; its lines come with their endings.
 
     Raises
@@ -24,12 +24,12 @@ def opened(path: Path) -> TextIO:
         raise InputError(f"{path}: no such file") from e
 
 
-def created(path: Path) -> TextIO:
+def open_to_write(path: Path) -> TextIO:
     """Open a program for writing: what is written is what the file holds."""
     return path.open("w", encoding="latin-1", newline="")
 
 
-def fill(draft: Path, target: Path, lines: Mapping[str, str]) -> None:
+def replace_lines(draft: Path, target: Path, lines: Mapping[str, str]) -> None:
     """Copy a program, or a diff of it, with some of its lines replaced.
 
     Parameters

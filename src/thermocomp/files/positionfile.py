@@ -131,7 +131,7 @@ def _model(entry: Any, where: str) -> PositionModel:
             slopes=tuple(modelfile.model_of(m, f"{where}: slope {k}") for k, m in enumerate(entry["slopes"], start=1)),
         )
     except ValidationError as e:
-        raise jsonfile.damaged(e, where) from e
+        raise jsonfile.explain_damage(e, where) from e
     except ModelFileError:
         raise
     except InputError as e:
@@ -146,6 +146,6 @@ def _profile(entry: Any, where: str) -> Profile:
     try:
         return adapter.validate_python(fields)
     except ValidationError as e:
-        raise jsonfile.damaged(e, where) from e
+        raise jsonfile.explain_damage(e, where) from e
     except InputError as e:
         raise ModelFileError(f"{where}: {e}") from e

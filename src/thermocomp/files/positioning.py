@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import understand
-from thermocomp.core.units import Unit, unit
+from thermocomp.core.units import Unit, find_unit
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.textfile import CsvTable, open_csv
 from thermocomp.recording.positioning import Positioning
@@ -201,7 +201,7 @@ def _unit(table: CsvTable, column: int, role: str) -> Unit:
         )
     for quantity in _QUANTITIES[role]:
         try:
-            return unit(symbol, quantity)
+            return find_unit(symbol, quantity)
         except UnitError as e:
             failure = e
     raise UnitError(f"{table.path}: heading line, column {heading!r}: {failure}") from failure

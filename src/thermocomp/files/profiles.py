@@ -12,9 +12,9 @@ import numpy as np
 from thermocomp.core.components import BY_CODE
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 from thermocomp.files.codecolumns import codes, columns_of
-from thermocomp.files.codecolumns import is_one as is_profile
+from thermocomp.files.codecolumns import is_code_column as is_profile
 from thermocomp.files.longtables import read_long
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.recordings import read as read_recording
@@ -278,7 +278,7 @@ def _read_place(value: Any, where: str) -> Place:
     place = {}
     for axis, text in value.items():
         try:
-            position = measured(text, "position")
+            position = read_with_unit(text, "position")
         except UnitError as e:
             raise UnitError(f"{where}.{axis}: {e}") from e
         if position is None:

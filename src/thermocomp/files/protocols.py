@@ -9,8 +9,8 @@ from typing import Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
-from thermocomp.core.exceptions import InputError, SettingError, UnitError, unknown
-from thermocomp.core.units import measured
+from thermocomp.core.exceptions import InputError, SettingError, UnitError, explain_unknown
+from thermocomp.core.units import read_with_unit
 from thermocomp.files.tomlfile import read_toml
 from thermocomp.simulation.climate import CLIMATES, Climate
 from thermocomp.simulation.instruments import Touch
@@ -121,7 +121,7 @@ def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
     known = [*_OF_ALL, *(f.name for f in fields(Plan))]
     for key in content:
         if key not in known:
-            raise unknown("key", key, known, (key,))
+            raise explain_unknown("key", key, known, (key,))
     shared = {key: value for key, value in content.items() if key not in _OF_ALL}
     tests = content.get("tests", [{}])
     if not isinstance(tests, list) or not all(isinstance(t, dict) for t in tests):
@@ -148,7 +148,7 @@ def _value(key: str, value: Any, path: Keys) -> Any:
     if key == "climate":
         like = str(table.pop("like", "workshop"))
         if like not in CLIMATES:
-            raise unknown("climate", like, CLIMATES, path)
+            raise explain_unknown("climate", like, CLIMATES, path)
         table = asdict(CLIMATES[like]) | table
     return table
 
@@ -160,7 +160,7 @@ def _seconds(value: Any, path: Keys) -> Any:
     if isinstance(value, list):
         return [_seconds(v, (*path, k)) for k, v in enumerate(value)]
     try:
-        seconds = measured(value, "time")
+        seconds = read_with_unit(value, "time")
     except UnitError as e:
         raise SettingError(str(e), path) from e
     if seconds is None:
@@ -181,7 +181,7 @@ def _explain(failure: ValidationError, given: Mapping[str, Any]) -> tuple[Keys, 
         return (*keys, *cause.path), str(cause)
     if error["type"] == "unexpected_keyword_argument":
         above = [k for k in keys[:-1] if isinstance(k, str)]
-        return keys, str(unknown("key", str(keys[-1]), [f.name for f in fields(_TABLES.get(above[-1], Lot))]))
+        return keys, str(explain_unknown("key", str(keys[-1]), [f.name for f in fields(_TABLES.get(above[-1], Lot))]))
     if error["type"] == "missing" and isinstance(error["loc"][-1], str):
         return (*keys, error["loc"][-1]), "is missing"
     return keys, _PLAIN.get(error["type"], error["msg"])

@@ -15,13 +15,13 @@ from pydantic import ValidationError
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import understand
 from thermocomp.core.machine import Channel
-from thermocomp.files.columns import Plan, plan, why_left_out
+from thermocomp.files.columns import ColumnPlan, plan, why_left_out
 from thermocomp.files.draft import draft
 from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.tables import EMBEDDED, Table, open_parquet, open_xlsx
+from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet, open_xlsx
 from thermocomp.files.textfile import open_csv
 from thermocomp.files.times import read_times
-from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
+from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -55,7 +55,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
     rows = read_rows(path, mapping)
-    return recorded(rows, rows.time, rows.table, rows.labels)
+    return make_recording(rows, rows.time, rows.table, rows.labels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ def read_rows(
     )
 
 
-def recorded(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
+def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
     """Make a recording of rows, or of what was made of them.
 
     Parameters
@@ -191,7 +191,7 @@ def recorded(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence
         time=time,
         table=table,
         channels=tuple(c for c in rows.channels if c.name in table.columns),
-        cycles=whole(len(time)),
+        cycles=make_single_cycle(len(time)),
         source=rows.source,
         sha256=rows.sha256,
         start=rows.start,
@@ -265,7 +265,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
             out.to_parquet(started, index=False)
 
 
-def _open(path: Path, options: ReadOptions) -> tuple[Table, str]:
+def _open(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
     """Return the raw table and the SHA-256 of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -300,7 +300,7 @@ def _described(text: str, source: Path) -> Mapping:
         raise type(e)(f"{source}: {e}") from e
 
 
-def _labels(cells: pd.DataFrame, columns: Plan, table: Table, source: Path) -> list[Any] | None:
+def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: Path) -> list[Any] | None:
     if columns.cycle is None:
         return None
     labels = cells[columns.cycle]
@@ -316,11 +316,11 @@ def _labels(cells: pd.DataFrame, columns: Plan, table: Table, source: Path) -> l
 def _cycles(recording: Recording, labels: Sequence[Any] | None, rule: CycleRule) -> Sequence[Cycle]:
     if labels is not None:
         try:
-            return given_cycles(labels)
+            return split_by_labels(labels)
         except RecordingError as e:
             raise RecordingError(f"{recording.source}: {e}") from e
     speed = recording.speed
     if speed is None:
-        return whole(len(recording))
+        return make_single_cycle(len(recording))
     values = recording.table[speed.name].to_numpy()
     return find_cycles(recording.time, values, min_run=rule.min_run_s, min_stop=rule.min_stop_s)

@@ -18,7 +18,7 @@ EMBEDDED = "thermocomp"
 MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
 
 
-class Table(Protocol):
+class FileTable(Protocol):
     """The cells of a file before anybody knows what its columns mean."""
 
     @property
@@ -173,7 +173,7 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int) -> None:
 
 
 def refuse_cell(
-    table: Table, source: str, row: int, column: int, cell: object, cause: Exception | None = None
+    table: FileTable, source: str, row: int, column: int, cell: object, cause: Exception | None = None
 ) -> NoReturn:
     """Tell which cell holds text where a number belongs.
 

@@ -29,7 +29,7 @@ _EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round
 
 @dataclass(frozen=True)
 class CsvTable:
-    """A text file with a heading line; made by `open_csv`. A `thermocomp.files.tables.Table`.
+    """A text file with a heading line; made by `open_csv`. A `thermocomp.files.tables.FileTable`.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class CsvTable:
         return empty if first is None else is_float(first.replace(",", "."))
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
-        """Read columns; see `thermocomp.files.tables.Table.load`."""
+        """Read columns; see `thermocomp.files.tables.FileTable.load`."""
         types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
         options = self._options(types)
         failure: ValueError = ValueError("nothing tried")

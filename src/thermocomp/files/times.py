@@ -8,10 +8,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.core.units import unit
-from thermocomp.files.columns import Plan
+from thermocomp.core.units import find_unit
+from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
-from thermocomp.files.tables import Table
+from thermocomp.files.tables import FileTable
 
 FloatArray = NDArray[np.float64]
 
@@ -30,7 +30,14 @@ _FORMATS = (
 
 
 def read_times(
-    cells: pd.DataFrame, columns: Plan, mapping: Mapping, table: Table, source: Path, *, is_stamp: bool, rising: bool
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+    *,
+    is_stamp: bool,
+    rising: bool,
 ) -> tuple[FloatArray, str]:
     """Read the times of a recording's rows.
 
@@ -70,7 +77,7 @@ def read_times(
         time = np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
     else:
         raw = shown.to_numpy(dtype=np.float64)
-        time = (raw - raw[0]) * unit(columns.time_unit or "s", "time").scale
+        time = (raw - raw[0]) * find_unit(columns.time_unit or "s", "time").scale
         missing = np.flatnonzero(~np.isfinite(raw))
         if missing.size:
             _refuse_missing(table, source, int(missing[0]), table.headings[columns.time])
@@ -92,7 +99,7 @@ def read_times(
 
 
 def _timestamps(
-    cells: "pd.Series[Any]", wanted: str, table: Table, source: Path, heading: str
+    cells: "pd.Series[Any]", wanted: str, table: FileTable, source: Path, heading: str
 ) -> tuple["pd.Series[pd.Timestamp]", str]:
     """Parse timestamps; mixed offsets (summer time) are brought to one clock."""
     if cells.isna().any():
@@ -124,7 +131,7 @@ def _timestamps(
     return stamps, pd.to_datetime(first, format=fitting[0]).iloc[0].isoformat()
 
 
-def _refuse_missing(table: Table, source: Path, row: int, heading: str) -> None:
+def _refuse_missing(table: FileTable, source: Path, row: int, heading: str) -> None:
     raise RecordingError(
         f"{source}: {table.place(row)}, column {heading!r}: the time is missing; fill it in or delete the row"
     )

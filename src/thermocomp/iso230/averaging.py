@@ -78,7 +78,7 @@ class Zero:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class AveragedCurve:
     """A curve as averaged, counted from its zero.
 
     Parameters
@@ -121,7 +121,7 @@ def scatter(values: FloatArray) -> float:
     return float(1.4826 / np.sqrt(6.0) * np.median(np.abs(np.diff(known, 2))))
 
 
-def cleaned(values: FloatArray) -> FloatArray:
+def replace_outliers(values: FloatArray) -> FloatArray:
     """Return values of a curve without bends, single outliers replaced by what the rows around them say.
 
     Parameters
@@ -245,7 +245,9 @@ def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool =
     return Zero(float(value[0]), float(u[0]), len(y))
 
 
-def course(time: FloatArray, values: FloatArray, start: int, stop: int, *, rests: bool, smooth: bool = False) -> Course:
+def average_test(
+    time: FloatArray, values: FloatArray, start: int, stop: int, *, rests: bool, smooth: bool = False
+) -> AveragedCurve:
     """Average the curve of a test, on both sides of the row in which the drives stop, and count it from its zero.
 
     Parameters
@@ -265,7 +267,7 @@ def course(time: FloatArray, values: FloatArray, start: int, stop: int, *, rests
         From `start` on.
     """
     parts = (slice(None, start + 1), slice(start + 1, stop + 1), slice(stop + 1, None))
-    clean = np.concatenate([cleaned(values[part]) for part in parts])
+    clean = np.concatenate([replace_outliers(values[part]) for part in parts])
     t, y = time[start:], clean[start:]
     noise = noise_of(t, y, stop - start)
     if smooth:
@@ -275,16 +277,16 @@ def course(time: FloatArray, values: FloatArray, start: int, stop: int, *, rests
     there = np.flatnonzero(np.isfinite(y))
     if not zero.rows and there.size:  # no value at the start of the test: the first one
         zero = Zero(float(y[there[0]]), float(noise.of_mean(1.0)), 1)
-    run, run_u = averaged(t[: stop - start + 1], y[: stop - start + 1], noise)
-    rest, rest_u = averaged(t[stop - start :], y[stop - start :], noise)
+    run, run_u = average_curve(t[: stop - start + 1], y[: stop - start + 1], noise)
+    rest, rest_u = average_curve(t[stop - start :], y[stop - start :], noise)
     means = np.concatenate([run, rest[1:]]) - zero.value
     u = np.concatenate([run_u, rest_u[1:]])
     if there.size and there[0] == 0:
         means[0], u[0] = 0.0, 0.0
-    return Course(means, u, zero, noise)
+    return AveragedCurve(means, u, zero, noise)
 
 
-def averaged(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
+def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[FloatArray, FloatArray]:
     """Average a curve that begins in its first row and goes on smoothly to its last one.
 
     A row is the mean over the window around it. Towards the first row, in which the drives start or stop, the window

@@ -5,19 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.leaks import learned_from
-from thermocomp.assessment.replay import absolute, run
+from thermocomp.assessment.leaks import find_learned_rows
+from thermocomp.assessment.replay import are_absolute, replay_compensated
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
-from thermocomp.recording.starts import Start, find
+from thermocomp.recording.starts import Start, find_starts
 
 FloatArray = NDArray[np.float64]
 
 
-def left_by(
+def replay_models(
     recording: Recording, models: Sequence[ErrorModel], start: Start | None, limits: Limits
 ) -> tuple[dict[str, FloatArray], list[str]]:
     """Replay models over a thermal test, behind the gate and with limits, as a compensator would run them.
@@ -52,7 +52,7 @@ def left_by(
         channels = [recording.channel(target) for target in mine]
         used = list(mine.values())
         if start is None:
-            (start,) = find([recording], channels, zeroing=used[0].zeroing, absolute=absolute(used))
+            (start,) = find_starts([recording], channels, zeroing=used[0].zeroing, absolute=are_absolute(used))
         notes.append(f"{start.told(recording.name)}; models run behind the gate, {limits.in_words()}")
     for target, model in by_target.items():
         if target not in names:
@@ -67,13 +67,13 @@ def left_by(
             starts=start,
         )
         own = samples.cycle >= 0
-        ran = run(model, samples, own, limits)
+        ran = replay_compensated(model, samples, own, limits)
         found[target] = samples.deviations[own, 0] - ran.compensated
         alone = samples.deviations[own, 0] - ran.deviation
         left = [float(np.sqrt(np.nanmean(v**2))) for v in (found[target], alone)]
         if f"{left[0]:.2f}" != f"{left[1]:.2f}":
             notes.append(f"{target}: the model alone leaves {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
-        known = learned_from(model, samples)[own]
+        known = find_learned_rows(model, samples)[own]
         if known.all():
             notes.append(f"the model of {target} was fitted to this very recording: what it leaves is no honest test")
         elif known.any():

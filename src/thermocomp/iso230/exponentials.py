@@ -32,7 +32,7 @@ class Exponential:
 
 
 @dataclass(frozen=True)
-class Fit:
+class ExponentialFit:
     """A curve of one or two exponentials.
 
     Parameters
@@ -69,7 +69,7 @@ class Fit:
         return all(e.tau <= self.duration and e.tau_error <= 0.5 * e.tau for e in self.terms)
 
 
-def fit(t: FloatArray, y: FloatArray) -> tuple[Fit | None, Fit | None]:
+def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, ExponentialFit | None]:
     """Fit one and two exponentials by least squares.
 
     Time constants are sought between the shortest interval and ten times the duration; amplitudes follow from them
@@ -108,7 +108,7 @@ def fit(t: FloatArray, y: FloatArray) -> tuple[Fit | None, Fit | None]:
 
 def _least_squares(
     t: FloatArray, y: FloatArray, starts: list[tuple[float, ...]], bounds: tuple[float, float]
-) -> Fit | None:
+) -> ExponentialFit | None:
     """Fit as many exponentials as a start has logarithms of time constants."""
     k = len(starts[0])
     if len(y) < 2 * k + 3:
@@ -138,7 +138,7 @@ def _least_squares(
     )
     total = float(np.sum((y - y.mean()) ** 2))
     share = 1.0 - float(left @ left) / total if total > 0 else float("nan")
-    return Fit(float(level), tuple(terms), share, float(np.sqrt(np.mean(left**2))), float(t[-1]))
+    return ExponentialFit(float(level), tuple(terms), share, float(np.sqrt(np.mean(left**2))), float(t[-1]))
 
 
 def _residual(t: FloatArray, y: FloatArray) -> Callable[[FloatArray], FloatArray]:

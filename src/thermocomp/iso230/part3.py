@@ -19,10 +19,10 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
-from thermocomp.iso230.averaging import WINDOW, course
-from thermocomp.iso230.compensated import left_by
-from thermocomp.iso230.settling import Phase, drive, find_phases, settle
-from thermocomp.iso230.thermaltest import HOUR, Curve, Kind, Pair, Targets, ThermalTest, figures_of
+from thermocomp.iso230.averaging import WINDOW, average_test
+from thermocomp.iso230.compensated import replay_models
+from thermocomp.iso230.settling import Phase, find_driven_rows, find_phases, settle
+from thermocomp.iso230.thermaltest import HOUR, Kind, Pair, Targets, ThermalCurve, ThermalTest, evaluate_averaged_curve
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 
@@ -136,7 +136,7 @@ def assess(
     if air is not None and air.quantity != "temperature":
         raise InputError(f"{recording.name}: {air.name} is a {air.quantity}; the ambient channel is a temperature")
     pairs = tuple(replace(p, tip=find_probe(recording, p.tip), spindle=find_probe(recording, p.spindle)) for p in pairs)
-    residuals, notes = left_by(recording, models, start, limits)
+    residuals, notes = replay_models(recording, models, start, limits)
     notes += _about(recording, kind, pairs, air)
     phases = find_phases(recording) if kind != "etve" else ()
     starts = [k for k, p in enumerate(phases) if p.kind == "warm-up"]
@@ -176,14 +176,14 @@ class _Stretch(NamedTuple):
         """Its rows, with those before it."""
         return slice(self.rows[0] - self.lead, self.rows[2] + 1)
 
-    def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> Curve:
+    def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> ThermalCurve:
         """Return the figures of one channel, and of what a model leaves of it."""
         start, stop, _ = self.rows
         lead, rests, calm = self.lead, self.rests, self.kind == "etve"
         clock = self.recording.time[self.part] - self.recording.time[start]
         time = clock[lead:]
         told, remains = (
-            None if v is None else course(clock, v, lead, lead + stop - start, rests=rests, smooth=calm)
+            None if v is None else average_test(clock, v, lead, lead + stop - start, rests=rests, smooth=calm)
             for v in (measured, left)
         )
         assert told is not None
@@ -191,17 +191,19 @@ class _Stretch(NamedTuple):
         after = None if left is None or remains is None else left[lead:] - remains.zero.value
         run = slice(0, lead + stop - start + 1)
         settled = None if calm else settle(clock[run], measured[run], label, unit, self.warm, lead=lead, rests=rests)
-        return Curve(
+        return ThermalCurve(
             name=label,
             unit=unit,
             place=place,
             values=values,
             course=told,
-            figures=figures_of(time, told, values, stop - start),
+            figures=evaluate_averaged_curve(time, told, values, stop - start),
             settling=settled,
             after=after,
             after_course=remains,
-            after_figures=None if remains is None or after is None else figures_of(time, remains, after, stop - start),
+            after_figures=None
+            if remains is None or after is None
+            else evaluate_averaged_curve(time, remains, after, stop - start),
         )
 
 
@@ -246,7 +248,7 @@ def _evaluate(
 
 
 def _lengths(
-    part: _Stretch, measured: dict[str, FloatArray], after: dict[str, FloatArray], drawn: dict[str, Curve]
+    part: _Stretch, measured: dict[str, FloatArray], after: dict[str, FloatArray], drawn: dict[str, ThermalCurve]
 ) -> list[Targets]:
     """Return the targets of each axis, with what lies between the first and the last; they leave `drawn`."""
     targets = []
@@ -263,7 +265,7 @@ def _lengths(
     return targets
 
 
-def _about_curves(kind: Kind, curves: Sequence[Curve], targets: Sequence[Targets]) -> list[str]:
+def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[Targets]) -> list[str]:
     """Return which curves do not move, how calm a spindle test ended, and what grows with a model."""
     notes = []
     still = [c.name for c in curves if np.isfinite(c.values).any() and not c.course.noise.moves]
@@ -320,7 +322,7 @@ def _stations_words(stations: dict[str, str]) -> str:
     )
 
 
-def _about_the_end(curves: Sequence[Curve]) -> list[str]:
+def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
     """Return how calm a spindle test was when it ended: what the standard lets it end by."""
     shares = {c.name: c.figures.range_last / c.figures.range_60 for c in curves if c.figures.range_60 > 0}
     told = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if np.isfinite(share)]
@@ -348,7 +350,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
     if running < HOUR:
         notes.append(f"it ran for {running / 60:.0f} min only: nothing is told of the first 60 min")
     if kind == "etve":
-        if (on := drive(recording)) is not None and on.any():
+        if (on := find_driven_rows(recording)) is not None and on.any():
             notes.append("the spindle or an axis moves: that is no test of the environment alone")
         if running < 24 * HOUR * 0.99:
             notes.append(f"it is {running / HOUR:.1f} h long; the environment has a period of a day")

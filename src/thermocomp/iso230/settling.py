@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.iso230.averaging import WINDOW, Course, K, Noise, course
-from thermocomp.iso230.exponentials import Fit, fit
+from thermocomp.iso230.averaging import WINDOW, AveragedCurve, K, Noise, average_test
+from thermocomp.iso230.exponentials import ExponentialFit, fit
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -99,8 +99,8 @@ class Settling:
     settled: bool
     t63: float
     t90: float
-    one: Fit | None
-    two: Fit | None
+    one: ExponentialFit | None
+    two: ExponentialFit | None
 
     @property
     def words(self) -> str:
@@ -116,7 +116,7 @@ class Settling:
         return "" if self.settled else "not settled"
 
 
-def drive(recording: Recording) -> BoolArray | None:
+def find_driven_rows(recording: Recording) -> BoolArray | None:
     """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if nothing was recorded of it.
 
     On is: above 2 % of the highest speed or feed. A row without a value counts as the one before it.
@@ -151,7 +151,7 @@ def find_phases(recording: Recording, interruption: float = INTERRUPTION) -> tup
     tuple of Phase
         Empty if the drives never run, or nothing was recorded of them.
     """
-    on = drive(recording)
+    on = find_driven_rows(recording)
     if on is None or not on.any():
         return ()
     time = recording.time
@@ -242,7 +242,7 @@ def settle(
     nan = float("nan")
     if len(y) - lead < _ROWS:
         return Settling(channel, unit, phase, nan, nan, nan, False, False, False, False, False, nan, nan, None, None)
-    c = course(t, y, lead, len(y) - 1, rests=rests)
+    c = average_test(t, y, lead, len(y) - 1, rests=rests)
     t, y, curve = t[lead:] - time[min(np.flatnonzero(there)[lead], len(time) - 1)], y[lead:] - c.zero.value, c.values
     change, span = float(curve[-1]), float(np.ptp(curve))
     u = float(np.hypot(c.u[-1], c.zero.u))
@@ -283,7 +283,7 @@ def _rests(t: FloatArray, y: FloatArray, curve: FloatArray, limit: float, noise:
     return bool(not creeps and np.abs(curve - curve[-1]).max() <= width)
 
 
-def _reached(t: FloatArray, y: FloatArray, c: Course, share: float) -> float:
+def _reached(t: FloatArray, y: FloatArray, c: AveragedCurve, share: float) -> float:
     """Return when the average first reached a share of its change [s]; a parabola through the rows nearby tells it."""
     level = share * c.values[-1]
     done = c.values / c.values[-1]

@@ -9,7 +9,7 @@ import numpy as np
 from thermocomp.assessment.choice import Cell, Table
 from thermocomp.iso230.part2 import UNCERTAINTY, PositioningResult
 from thermocomp.iso230.settling import Settling
-from thermocomp.iso230.thermaltest import Curve, Figures, Targets, ThermalTest
+from thermocomp.iso230.thermaltest import Figures, Targets, ThermalCurve, ThermalTest
 
 _CAPTION_60 = "Counted from the start of the test; rows averaged over {minutes:.3g} min."
 _CAPTION_U = " ±: expanded uncertainty (k = 2) by the noise, its serial correlation within that time minded."
@@ -35,7 +35,7 @@ def thermal_tables(test: ThermalTest) -> tuple[Table, ...]:
     -------
     tuple of Table
     """
-    groups: list[tuple[str, Sequence[Curve]]] = []
+    groups: list[tuple[str, Sequence[ThermalCurve]]] = []
     for unit, title in (("um", "Displacements [um]"), ("urad", "Angles [urad]")):
         groups.append((title, [c for c in test.curves if c.unit == unit]))
     groups.append(("Tilts [urad, the same in um/m]", test.tilts))
@@ -46,7 +46,7 @@ def thermal_tables(test: ThermalTest) -> tuple[Table, ...]:
     return (*found, *(_slopes(test, t) for t in test.targets))
 
 
-def _curves(test: ThermalTest, title: str, curves: Sequence[Curve]) -> Table:
+def _curves(test: ThermalTest, title: str, curves: Sequence[ThermalCurve]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for c in curves:
         rows.append((c.name, *_figures(test, c.figures), *_settled(test, c)))
@@ -92,7 +92,7 @@ def with_uncertainty(value: float, expanded: float) -> str:
     return f"{value:.{digits}f} ± {max(expanded, 0.5 * 10.0**-digits):.{digits}f}"
 
 
-def _settled(test: ThermalTest, curve: Curve) -> tuple[str, ...]:
+def _settled(test: ThermalTest, curve: ThermalCurve) -> tuple[str, ...]:
     if test.kind == "etve" or curve.settling is None:
         return ()
     return (_minutes(curve.settling, curve.settling.t90),)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.iso230.averaging import Course, K
+from thermocomp.iso230.averaging import AveragedCurve, K
 from thermocomp.iso230.settling import Settling
 from thermocomp.recording.recording import Recording
 
@@ -118,7 +118,7 @@ class Figures:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class ThermalCurve:
     """A displacement, a tilt or a change of length over the time of a test.
 
     Parameters
@@ -145,11 +145,11 @@ class Curve:
     unit: str
     place: str
     values: FloatArray
-    course: Course
+    course: AveragedCurve
     figures: Figures
     settling: Settling | None
     after: FloatArray | None = None
-    after_course: Course | None = None
+    after_course: AveragedCurve | None = None
     after_figures: Figures | None = None
 
 
@@ -173,8 +173,8 @@ class Targets:
     name: str
     axis: str
     positions: FloatArray
-    curves: tuple[Curve, ...]
-    length: Curve
+    curves: tuple[ThermalCurve, ...]
+    length: ThermalCurve
 
     @property
     def distance(self) -> float:
@@ -219,8 +219,8 @@ class ThermalTest:
     stop: int
     end: int
     load: str
-    curves: tuple[Curve, ...]
-    tilts: tuple[Curve, ...]
+    curves: tuple[ThermalCurve, ...]
+    tilts: tuple[ThermalCurve, ...]
     pairs: tuple[Pair, ...]
     targets: tuple[Targets, ...]
     ambient: Channel | None
@@ -251,13 +251,13 @@ class ThermalTest:
         return "; ".join(parts)
 
     @property
-    def all_curves(self) -> tuple[Curve, ...]:
+    def all_curves(self) -> tuple[ThermalCurve, ...]:
         """Everything that was evaluated: displacements, tilts, targets, lengths."""
         at_targets = (c for t in self.targets for c in (*t.curves, t.length))
         return (*self.curves, *self.tilts, *at_targets)
 
 
-def figures_of(time: FloatArray, course: Course, rows: FloatArray, stop: int) -> Figures:
+def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: FloatArray, stop: int) -> Figures:
     """Return what is told of an averaged curve, with its uncertainty.
 
     Parameters
@@ -274,7 +274,7 @@ def figures_of(time: FloatArray, course: Course, rows: FloatArray, stop: int) ->
     -------
     Figures
     """
-    told = figures(time, course.values, stop)
+    told = evaluate_curve(time, course.values, stop)
     known = np.flatnonzero(np.isfinite(course.values))
     run, after = known[known <= stop], known[known > stop]
     if not run.size:
@@ -290,7 +290,7 @@ def figures_of(time: FloatArray, course: Course, rows: FloatArray, stop: int) ->
     )
 
 
-def figures(time: FloatArray, values: FloatArray, stop: int) -> Figures:
+def evaluate_curve(time: FloatArray, values: FloatArray, stop: int) -> Figures:
     """Return what is told of a curve as it stands, row by row.
 
     Parameters

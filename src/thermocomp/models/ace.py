@@ -17,7 +17,7 @@ _NOTHING = Curve((), (0.0,), "step")
 
 
 @dataclass(frozen=True)
-class Table:
+class SampledFunction:
     """A function of one variable as points, for plots.
 
     Parameters
@@ -99,12 +99,12 @@ class TransformRegressor(StaticRegressor):
         self._curves = tuple(curves.get(j, _NOTHING) for j in range(X.shape[1]))
         self._inverse = inverse
         by_y = np.argsort(y, kind="stable")
-        self.theta_ = Table(y[by_y], theta[by_y])
-        self.sum_phi_ = Table(theta[by_y], total[by_y])
+        self.theta_ = SampledFunction(y[by_y], theta[by_y])
+        self.sum_phi_ = SampledFunction(theta[by_y], total[by_y])
         tables = []
         for j, curve in enumerate(self._curves):
             rising = np.sort(X[:, j])
-            tables.append(Table(rising, curve(rising)))
+            tables.append(SampledFunction(rising, curve(rising)))
         self.phi_ = tuple(tables)
         steps = np.diff(self.theta_.y)[np.diff(self.theta_.x) > 0]
         self.falling_theta_ = float(np.mean(steps < 0)) if steps.size else 0.0
@@ -211,10 +211,10 @@ class ACE(TransformRegressor):
         for k, j in enumerate(varied.tolist()):
             rows = by_y[order[k]]
             total[rows] += phi[k]
-            tables[j] = Table(X[rows, j], phi[k])
+            tables[j] = SampledFunction(X[rows, j], phi[k])
             curves[j] = nearest(tables[j], self.neighbours)
         by_theta = np.argsort(theta, kind="stable")
-        inverse = nearest(Table(theta[by_theta], y[by_theta]), self.neighbours)
+        inverse = nearest(SampledFunction(theta[by_theta], y[by_theta]), self.neighbours)
         if self.psi_ == 0.0:
             curves, inverse = {}, Curve((), (float(y.mean()),), "step")
         self._keep(X, y, theta, total, curves, inverse)
@@ -240,7 +240,7 @@ def half_window(n_rows: int, fixed: int, share: float | None) -> int:
     return max(1, min(wanted, (n_rows - 1) // 4))
 
 
-def nearest(table: Table, k: int) -> Curve:
+def nearest(table: SampledFunction, k: int) -> Curve:
     """Return the mean of the k entries that are nearest, as a function of the place: a step curve.
 
     The k nearest of sorted entries are neighbours of each other; entry i makes room for entry i + k half way between

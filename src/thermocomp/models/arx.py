@@ -12,7 +12,7 @@ from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel, Input
 from thermocomp.models.base import FloatArray, IntArray
-from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, rms, too_few
+from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, TriedSetting, rms, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.freerun import Coefficients, output_error
 from thermocomp.models.numerics.leastsquares import triangle
@@ -141,7 +141,7 @@ class ARX(ClockedRegressor):
             raise InputError(f"criterion {self.criterion!r}: want fpe, aic, bic or free-run")
         ks, ms = self._orders(self.k, self.k_max, "k"), self._orders(self.m, self.m_max, "m")
         data = [
-            Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
+            Clocked(h, ticks.put_on_clock(inputs, step, h), deviation, step, folds)
             for h in self._intervals(self.interval, step)
         ]
         constants = (False, True) if self.fit_intercept is None else (self.fit_intercept,)
@@ -180,7 +180,7 @@ class ARX(ClockedRegressor):
         """
         rows, step = self._given(X, dt)
         inputs = self._used(rows)
-        runs = ticks.on_clock(inputs, step, self.interval_)
+        runs = ticks.put_on_clock(inputs, step, self.interval_)
         measured = np.asarray(y, dtype=np.float64)
         data = Clocked(self.interval_, runs, measured, step, np.zeros(len(inputs), dtype=np.intp))
         work = data.lagged(data.targets(), self.k_, self.m_)
@@ -219,7 +219,7 @@ class ARX(ClockedRegressor):
                 raise FitError(too_few(len(work), K, M, data))
             ks, ms = ks[: max(len(ks) - 1, 1)], ms[: max(len(ms) - 1, 1)]
         tri = triangle(work, intercept=constant)
-        found = orders.table(tri, J, ks, ms, data.largest_root)
+        found = orders.compute_orders(tri, J, ks, ms, data.largest_root)
         chosen = orders.best(found, "fpe" if self.criterion == "free-run" else self.criterion)
         if chosen is None:
             raise FitError(
@@ -232,7 +232,7 @@ class ARX(ClockedRegressor):
         found_at = Coefficients(weights[:k], weights[k:].reshape(m + 1, J), intercept)
         return found_at, found, math.sqrt(chosen.sse / chosen.n_rows)
 
-    def _judge(self, setting: _Setting) -> Trial:
+    def _judge(self, setting: _Setting) -> TriedSetting:
         """Judge a setting by its free run over the folds, each left out in turn."""
         data, errors = setting.data, []
         for fold in range(int(data.folds.max()) + 1):
@@ -243,4 +243,4 @@ class ARX(ClockedRegressor):
                 break
             errors.append(data.free_run_rms(c, data.folds == fold))
         ks, ms = setting.ks, setting.ms
-        return Trial(data.interval, max(ks), max(ms), setting.intercept, 0, float(np.mean(errors)))
+        return TriedSetting(data.interval, max(ks), max(ms), setting.intercept, 0, float(np.mean(errors)))

@@ -15,10 +15,10 @@ from thermocomp.core.model import Input
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.models.arx import ARX
 from thermocomp.models.base import FloatArray, IntArray
-from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, Trial, too_few
+from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, TriedSetting, too_few
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.backprop import learning_rates, scaling_in, scaling_out, train_net
-from thermocomp.models.numerics.ticks import Run
+from thermocomp.models.numerics.ticks import TickedRun
 from thermocomp.models.timed import Time
 
 #: ticks after which a row without time is taken to have settled
@@ -34,7 +34,7 @@ class _Net:
     def tick(self, regressors: FloatArray) -> FloatArray:
         return self.scale_out(self.net.evaluate(self.scale_in(regressors)))[..., 0]
 
-    def ticked(self, run: Run) -> FloatArray:
+    def ticked(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each tick."""
         k, n = self.k, len(run.drive)
         own = np.zeros(n + k)  # k ticks of rest in front
@@ -46,10 +46,10 @@ class _Net:
             own[t + k] = self.tick(row)
         return own[k:]
 
-    def at_rows(self, run: Run) -> FloatArray:
+    def at_rows(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each row of the test."""
         ticked = self.ticked(run)
-        return ticks.at_rows(
+        return ticks.interpolate_at_rows(
             run, ticked, lambda t, now: self.tick(ticks.regressors(ticked, run.drive, t + 1, self.k, self.m, now))
         )
 
@@ -172,14 +172,16 @@ class NetARX(ClockedRegressor):
         if not sizes or min(sizes) < 1:
             raise InputError(f"hidden = {self.hidden}: want numbers of nodes, at least 1")
         h = self._intervals(self.interval, step)[0]
-        data = Clocked(h, ticks.on_clock(inputs, step, h), deviation, step, folds)
+        data = Clocked(h, ticks.put_on_clock(inputs, step, h), deviation, step, folds)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)
-        judged: list[Trial] = []
+        judged: list[TriedSetting] = []
         if len(sizes) > 1 and self.time != "none":
             jobs = [(size, fold) for size in sizes for fold in range(int(folds.max()) + 1)]
             errors = Parallel(n_jobs=self.jobs, prefer="threads")(delayed(self._judge)(data, *job) for job in jobs)
             means = np.reshape(errors, (len(sizes), -1)).mean(axis=1).tolist()
-            judged = [Trial(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)]
+            judged = [
+                TriedSetting(h, self.k_, self.m_, False, size, mean) for size, mean in zip(sizes, means, strict=True)
+            ]
         self.hidden_, self.interval_ = sizes[self._chosen(judged)], h
         self._net = self._train(data, self.hidden_, None)
         self.net_ = self._net.net

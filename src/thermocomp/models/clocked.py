@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import ticks
-from thermocomp.models.numerics.ticks import Run
+from thermocomp.models.numerics.ticks import TickedRun
 from thermocomp.models.timed import TimedRegressor
 
 BoolArray = NDArray[np.bool_]
@@ -28,7 +28,7 @@ NO_SPEED = (
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedSetting:
     """One setting that was tried, judged in free run on thermal cycles left out.
 
     Parameters
@@ -66,7 +66,7 @@ class Clocked:
     """
 
     interval: float
-    runs: list[Run]
+    runs: list[TickedRun]
     y: FloatArray
     dt: FloatArray
     folds: IntArray
@@ -117,7 +117,7 @@ class Recursion(Protocol):
     def settled(self, inputs: FloatArray) -> FloatArray:
         """Return the deviation at which it would come to rest with each row's inputs."""
 
-    def at_rows(self, run: Run) -> FloatArray:
+    def at_rows(self, run: TickedRun) -> FloatArray:
         """Return its free run through a test, at the rows."""
 
 
@@ -151,7 +151,7 @@ class ClockedRegressor(TimedRegressor):
         inputs = self._used(rows)
         if self.time == "none":
             return self._recursion.settled(inputs)
-        runs = ticks.on_clock(inputs, step, self.interval_)
+        runs = ticks.put_on_clock(inputs, step, self.interval_)
         parts = [self._recursion.at_rows(r) for r in runs]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
@@ -170,7 +170,7 @@ class ClockedRegressor(TimedRegressor):
         """Return the columns of the inputs; no copy if that is all: it takes as long as the rest."""
         return rows[:, self._columns] if self._some else rows
 
-    def _chosen(self, trials: Sequence[Trial]) -> int:
+    def _chosen(self, trials: Sequence[TriedSetting]) -> int:
         """Note what was judged; return the place of the best, the first if nothing was."""
         self.trials_ = tuple(trials)
         best = int(np.argmin([t.cv_rms for t in trials])) if trials else 0
@@ -184,7 +184,7 @@ class ClockedRegressor(TimedRegressor):
     @staticmethod
     def _intervals(interval: float | Sequence[float] | None, dt: FloatArray) -> list[float]:
         if interval is None:
-            return [ticks.usual(dt)]
+            return [ticks.median_step(dt)]
         found = [float(h) for h in np.atleast_1d(interval)]
         if not found or not all(0 < h < math.inf for h in found):
             raise InputError(f"interval {interval}: want positive, finite seconds")

@@ -29,7 +29,7 @@ _ROWS = 600  # of the training that points are taken from
 _BLOCKS = 8  # left out at most
 
 
-def cover(change: FloatArray, channels: Sequence[Channel], cycle: IntArray) -> JointSupport | None:
+def find_joint_support(change: FloatArray, channels: Sequence[Channel], cycle: IntArray) -> JointSupport | None:
     """Return the joint support of training rows.
 
     Parameters

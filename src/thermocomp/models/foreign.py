@@ -46,9 +46,9 @@ class ForeignRegressor(UnfrozenRegressor):
         self.estimator_ = clone(self.estimator).fit(self._table(change), deviation)
 
     def _predict(self, change: FloatArray) -> FloatArray:
-        with refused(f"{self.name} cannot predict"):
+        with catch_failures(f"{self.name} cannot predict"):
             found = self.estimator_.predict(self._table(change))
-        return numbers(found, len(change), self.name)
+        return check_numbers(found, len(change), self.name)
 
     def _table(self, change: FloatArray) -> FloatArray | pd.DataFrame:
         return pd.DataFrame(change, columns=self._names()) if hasattr(self, "feature_names_in_") else change
@@ -58,7 +58,7 @@ class ForeignRegressor(UnfrozenRegressor):
 
 
 @contextmanager
-def refused(what: str) -> Iterator[None]:
+def catch_failures(what: str) -> Iterator[None]:
     """Make a `FitError` of whatever an estimator raises, so that it costs no other one its result.
 
     Errors of thermocomp's own pass: they tell what to set otherwise.
@@ -83,7 +83,7 @@ def refused(what: str) -> Iterator[None]:
         raise FitError(f"{what}: {type(e).__name__}: {e}") from e
 
 
-def numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
+def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     """Return what was predicted as one finite number per row.
 
     Parameters
@@ -102,7 +102,7 @@ def numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     FitError
         It is not that.
     """
-    with refused(f"{name} predicts no numbers"):
+    with catch_failures(f"{name} predicts no numbers"):
         found = np.asarray(predicted, dtype=np.float64)
     if found.shape not in ((n_rows,), (n_rows, 1)):
         raise FitError(f"{name}: predict gave an array of shape {found.shape} for {n_rows} rows")
@@ -112,7 +112,7 @@ def numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     return found.reshape(n_rows)
 
 
-def adopted(estimator: Any) -> Any:
+def adopt_estimator(estimator: Any) -> Any:
     """Return an estimator that was handed in as one that can be trained and judged.
 
     Parameters

@@ -6,8 +6,8 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.terms import Variable
 from thermocomp.models.base import FloatArray, StaticRegressor
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import solve, table, triangle
-from thermocomp.models.selection.collinearity import contributions, correlation, spectrum, varying
+from thermocomp.models.numerics.leastsquares import join_columns, solve, triangle
+from thermocomp.models.selection.collinearity import contributions, correlation, find_varying, spectrum
 from thermocomp.models.selection.exhaustive import Subset
 from thermocomp.models.selection.grouping import choose, group, interval_of, intervals
 
@@ -110,16 +110,16 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
         zero = self._reference_index(names)
         values = change if zero is None else change - change[:, [zero]]
         size = np.abs(change).max(axis=0)
-        moving = varying(change)
+        moving = find_varying(change)
         if zero is not None:
-            moving &= varying(values, np.maximum(size, size[zero]))
+            moving &= find_varying(values, np.maximum(size, size[zero]))
         others = [i for i in range(len(names)) if i != zero]
         self.candidates_ = tuple(i for i in others if moving[i])
         self.left_out_ = tuple(i for i in others if not moving[i])
         if not self.candidates_:
             raise FitError(f"none of the {len(others)} temperatures varies: there is nothing to group")
         self.correlation_ = correlation(change[:, self.candidates_])
-        tri = triangle(table(values[:, self.candidates_], deviation), intercept=self.fit_intercept)
+        tri = triangle(join_columns(values[:, self.candidates_], deviation), intercept=self.fit_intercept)
         choice = choose(tri, group(self.correlation_, self.threshold, absolute=self.absolute))
 
         def features(columns: tuple[int, ...]) -> tuple[int, ...]:

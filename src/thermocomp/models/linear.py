@@ -9,7 +9,14 @@ from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.models.base import FloatArray, MemorylessRegressor
-from thermocomp.models.numerics.leastsquares import Solution, Triangle, effective_sample_size, solve, table, triangle
+from thermocomp.models.numerics.leastsquares import (
+    Solution,
+    Triangle,
+    effective_sample_size,
+    join_columns,
+    solve,
+    triangle,
+)
 
 
 class TermRegressor(MemorylessRegressor):
@@ -68,7 +75,7 @@ class TermRegressor(MemorylessRegressor):
         self, change: FloatArray, deviation: FloatArray, columns: Sequence[int], tri: Triangle | None = None
     ) -> None:
         """Note the least squares on some of the inputs; `tri` is that of all, if it is there already."""
-        tri = tri or triangle(table(change, deviation), intercept=self.fit_intercept)
+        tri = tri or triangle(join_columns(change, deviation), intercept=self.fit_intercept)
         found = solve(change, deviation, tri, columns=columns)
         self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
 

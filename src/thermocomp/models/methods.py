@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.foreign import adopted, title
+from thermocomp.models.foreign import adopt_estimator, title
 
 #: asks for every method where names of methods are given
 ALL_METHODS = "all"
@@ -55,19 +55,19 @@ class Method:
         return self.kind(**self.settings, **columns, **({"time": "routed"} if "dt" in self.takes else {}))
 
 
-class Named(str):
+class NamedEstimator(str):
     """The name of an estimator that was handed in, which it carries along: it stands where names of methods do.
 
     Parameters
     ----------
     name : str
     estimator : estimator
-        See `thermocomp.models.foreign.adopted`.
+        See `thermocomp.models.foreign.adopt_estimator`.
     """
 
     estimator: Any
 
-    def __new__(cls, name: str, estimator: Any) -> "Named":
+    def __new__(cls, name: str, estimator: Any) -> "NamedEstimator":
         """Make the string."""
         made = super().__new__(cls, name)
         made.estimator = estimator
@@ -134,7 +134,7 @@ METHODS: dict[str, Method] = {
 }
 
 
-def method(name: str) -> Method:
+def find_method(name: str) -> Method:
     """Find a method.
 
     Raises
@@ -150,7 +150,7 @@ def method(name: str) -> Method:
     return found
 
 
-def given(estimator: Any) -> Method:
+def make_method(estimator: Any) -> Method:
     """Return what an estimator with settings of its own is as a method: it takes all inputs."""
     kind = type(estimator)
     known: tuple[Literal["dt", "cycle"], ...] = ("dt", "cycle")
@@ -179,19 +179,19 @@ def expand(names: Sequence[Any]) -> list[str]:
         raise InputError("no model given: name at least one method, such as dynamic, or all of them by all")
     listed: dict[str, None] = {}
     for entry in names:
-        if isinstance(entry, Named):
+        if isinstance(entry, NamedEstimator):
             listed[entry] = None
         elif isinstance(entry, str):
-            listed.update(dict.fromkeys(METHODS if entry == ALL_METHODS else [method(entry).name]))
+            listed.update(dict.fromkeys(METHODS if entry == ALL_METHODS else [find_method(entry).name]))
         else:
-            estimator = adopted(entry)
+            estimator = adopt_estimator(entry)
             same = sum(n.partition(" #")[0] == title(estimator) for n in listed)
-            listed[Named(title(estimator) + (f" #{same + 1}" if same else ""), estimator)] = None
+            listed[NamedEstimator(title(estimator) + (f" #{same + 1}" if same else ""), estimator)] = None
     return list(listed)
 
 
 def deployable(name: str) -> bool:
     """Return whether models of this name can run at a machine: False for methods that cannot be frozen."""
-    if isinstance(name, Named):
+    if isinstance(name, NamedEstimator):
         return bool(getattr(name.estimator, "freezable", True))
     return name not in METHODS or METHODS[name].kind.freezable

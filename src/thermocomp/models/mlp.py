@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.network import Affine
 from thermocomp.models.base import FloatArray, IntArray
-from thermocomp.models.nets import NetRegressor, thinned
+from thermocomp.models.nets import NetRegressor, thin_rows
 from thermocomp.models.numerics.backprop import TrainedNet, constant, learning_rates, scaling_in, scaling_out, train_net
 
 #: hidden counts in a row that bring no gain and end a sweep
@@ -199,7 +199,7 @@ class SigmoidNet(NetRegressor):
     ) -> tuple[TrainedNet, Affine, Affine]:
         """Train a net; return it, the scaling of its inputs and that of its outputs."""
         into, out_of = self._input_scaling(X), scaling_out(y.min(axis=0), y.max(axis=0))
-        rows = thinned(len(X), self.max_patterns)
+        rows = thin_rows(len(X), self.max_patterns)
         trained = train_net(
             into(X[rows]),
             scaling_in(y.min(axis=0), y.max(axis=0))(y[rows]),

@@ -8,7 +8,7 @@ from sklearn.exceptions import ConvergenceWarning
 
 from thermocomp.core.network import Activation, Affine, Perceptron
 from thermocomp.models.base import FloatArray, StaticRegressor
-from thermocomp.models.nets import NetRegressor, thinned
+from thermocomp.models.nets import NetRegressor, thin_rows
 from thermocomp.models.numerics.backprop import constant
 
 _NAMES: dict[str, Activation] = {"logistic": "sigmoid", "tanh": "tanh"}
@@ -85,7 +85,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
 
         (gain, offset, _), (out_gain, out_offset, unit) = _standard(change), _standard(deviation)
         into = Affine(tuple(gain.tolist()), tuple(offset.tolist()))
-        rows = thinned(len(change), self.max_patterns)
+        rows = thin_rows(len(change), self.max_patterns)
         targets = deviation[rows] * out_gain + out_offset
         peer = MLPRegressor(
             hidden_layer_sizes=(self.hidden,),

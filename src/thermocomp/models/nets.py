@@ -118,7 +118,7 @@ class NetRegressor(MemorylessRegressor):
             )
 
 
-def thinned(n_rows: int, n_most: int) -> IntArray:
+def thin_rows(n_rows: int, n_most: int) -> IntArray:
     """Return the indices of at most `n_most` of `n_rows` rows, spread evenly, the first and the last among them."""
     if n_most < 2:
         raise InputError(f"at most {n_most} patterns: want at least 2")

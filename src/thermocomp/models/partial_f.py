@@ -1,7 +1,7 @@
 """`partial-f`: temperature points by stepwise regression with fixed thresholds on partial F."""
 
 from thermocomp.models.base import FloatArray
-from thermocomp.models.numerics.leastsquares import table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.numerics.stepwise import FThresholds, alpha_of_f, r_squared_of_f
 from thermocomp.models.steplog import StepwiseRegressor
 
@@ -62,7 +62,7 @@ class PartialF(StepwiseRegressor):
         self.fit_intercept = fit_intercept
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
-        tri = triangle(table(change, deviation), intercept=self.fit_intercept)
+        tri = triangle(join_columns(change, deviation), intercept=self.fit_intercept)
         self._regress(change, deviation, self._select(tri, self._names()), tri)
 
     def _rule(self) -> FThresholds:

@@ -19,12 +19,12 @@ from thermocomp.models.geometric import ProfileFit, fit_profile
 from thermocomp.models.positionoptions import (
     POWERS,
     PositionOptions,
-    counted,
-    enough,
-    learned,
+    blank_unlearned,
+    choose_power,
+    is_worthwhile,
     reference_position,
     remainder,
-    worth,
+    set_cold_profiles,
 )
 from thermocomp.models.training import Trained, train
 from thermocomp.recording.profiles import QUANTITY, Profiles, Slopes
@@ -79,13 +79,13 @@ class PositionFit:
     @property
     def enough(self) -> int:
         """The smallest m to which a higher one adds little: a tenth of the rest, or a twentieth of the thermal part."""
-        return enough(self.remainders, self.thermal_rms) or 1
+        return choose_power(self.remainders, self.thermal_rms) or 1
 
     @property
     def shifts(self) -> bool:
         """True if an offset would take away more than that: the profiles turn about another position, or shift."""
         rest = self.remainders.get(len(self.model.slopes), np.nan)
-        return self.model.offset is None and worth(rest, self.offset_remainder, self.thermal_rms)
+        return self.model.offset is None and is_worthwhile(rest, self.offset_remainder, self.thermal_rms)
 
 
 def fit_position(
@@ -119,10 +119,10 @@ def fit_position(
     FitError
         There is too little to fit to.
     """
-    tests = counted((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
     samples, slopes = slope_samples(tests, options, learn)
     seen = np.ones(len(samples), dtype=np.bool_) if learn is None else learn
-    used = learned(tests, options, learn)
+    used = blank_unlearned(tests, options, learn)
     position = np.concatenate([test.position for test in used])
     _refuse_unreached(position, np.concatenate([test.cold(options.reference) for test in used]), tests[0])
     # every cold state by itself: repeats tell the noise
@@ -190,7 +190,7 @@ def slope_samples(
     for test in tests[1:]:
         if (test.target, test.unit, test.axis) != (first.target, first.unit, first.axis):
             raise InputError(f"profiles of {first.target} and of {test.target}: fit one component at a time")
-    tests = counted(tests, options, learn)
+    tests = set_cold_profiles(tests, options, learn)
     zero_at, highest = reference_position(tests, options), options.slopes or (0 if options.offset else 1)
     slopes = tuple(
         test.slopes(highest, offset=options.offset, reference=options.reference, reference_position=zero_at)

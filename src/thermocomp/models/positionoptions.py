@@ -76,7 +76,7 @@ class PositionOptions:
         return tuple(range(0 if self.offset else 1, self.slopes + 1))
 
 
-def suited(
+def fill_options(
     profiles: Profiles | Sequence[Profiles],
     options: PositionOptions = PositionOptions(),
     left_open: Sequence[Setting] = SETTINGS,
@@ -110,22 +110,22 @@ def suited(
     FitError
         No state may be looked at.
     """
-    tests = counted((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
-    tests = learned(tests, options, learn)
+    tests = set_cold_profiles((profiles,) if isinstance(profiles, Profiles) else tuple(profiles), options, learn)
+    tests = blank_unlearned(tests, options, learn)
     thermal = remainder(tests, replace(options, offset=False), 0)
     shifted = {m: remainder(tests, replace(options, offset=True), m) for m in POWERS}
     if "reference_position" in left_open:
-        m = enough(shifted, thermal) or 1 if "slopes" in left_open else options.slopes
+        m = choose_power(shifted, thermal) or 1 if "slopes" in left_open else options.slopes
         options = replace(options, reference_position=_quietest(tests, options, m))
     if "offset" in left_open:
         # beside all powers, lest a bent profile is taken for a shifted one
         known = [m for m in POWERS if np.isfinite(shifted[m])]
         m = max(known, default=1) if "slopes" in left_open else options.slopes
         without, with_it = (remainder(tests, replace(options, offset=o), m) for o in (False, True))
-        options = replace(options, offset=worth(without, with_it, 0.0))
+        options = replace(options, offset=is_worthwhile(without, with_it, 0.0))
     if "slopes" in left_open:
         rests = {m: remainder(tests, options, m) for m in (0, *POWERS)}
-        options = replace(options, slopes=enough(rests, thermal) or 0)
+        options = replace(options, slopes=choose_power(rests, thermal) or 0)
     return options
 
 
@@ -143,7 +143,7 @@ def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> f
     return float(min(max(0.0, low), high))
 
 
-def counted(
+def set_cold_profiles(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
     """Return the tests with the profile that counts as cold: each its own, or all the mean (`PositionOptions.rezero`).
@@ -167,11 +167,11 @@ def counted(
             raise InputError(
                 f"profiles of {test.target}: to count from one cold state all tests need the same positions"
             )
-    zero = np.mean([test.cold(options.reference) for test in learned(tests, options, learn)], axis=0)
+    zero = np.mean([test.cold(options.reference) for test in blank_unlearned(tests, options, learn)], axis=0)
     return tuple(replace(test, zero=zero) for test in tests)
 
 
-def learned(
+def blank_unlearned(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
     """Return what may be learned from: the other states are blank, tests of which there is none are left out.
@@ -234,12 +234,12 @@ def remainder(tests: Sequence[Profiles], options: PositionOptions, m: int) -> fl
     return float(np.sqrt(np.mean([f.remainder**2 for f in fits])))
 
 
-def worth(before: float, after: float, thermal: float) -> bool:
+def is_worthwhile(before: float, after: float, thermal: float) -> bool:
     """Return whether a term is worth it that leaves less of a thermal part: a tenth of the rest, a twentieth of it."""
     return before - after > max(WORTH_OF_REST * before, WORTH_OF_THERMAL * thermal)
 
 
-def enough(remainders: Mapping[int, float], thermal: float) -> int | None:
+def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
     """Return the smallest m to which a higher one adds little; None if nothing is known.
 
     Parameters
@@ -250,7 +250,9 @@ def enough(remainders: Mapping[int, float], thermal: float) -> int | None:
         The thermal part itself [unit].
     """
     known = {m: rest for m, rest in remainders.items() if np.isfinite(rest)}
-    return next((m for m in known if not worth(known[m], min(known[k] for k in known if k >= m), thermal)), None)
+    return next(
+        (m for m in known if not is_worthwhile(known[m], min(known[k] for k in known if k >= m), thermal)), None
+    )
 
 
 def _quietest(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:

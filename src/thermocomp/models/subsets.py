@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import solve, table, triangle
+from thermocomp.models.numerics.leastsquares import join_columns, solve, triangle
 from thermocomp.models.selection.subsets import Subsets, best_subsets
 
 Criterion = Literal["mse", "adjr2", "cp", "bic", "cycles"]
@@ -245,7 +245,7 @@ class BestSubset(TermRegressor):
             return errors
         if found.stopped == "interrupted":
             raise KeyboardInterrupt
-        tri = triangle(table(train, known), intercept=self.fit_intercept)
+        tri = triangle(join_columns(train, known), intercept=self.fit_intercept)
         for best in found.best:
             if len(best.columns) in sizes:
                 model: Any = solve(train, known, tri, columns=best.columns)

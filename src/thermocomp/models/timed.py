@@ -19,7 +19,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
 from thermocomp.models.numerics.folds import number_folds
-from thermocomp.models.numerics.ticks import steps as checked_steps
+from thermocomp.models.numerics.ticks import check_steps as checked_steps
 
 Time = Literal["column", "routed", "none"]
 
@@ -214,7 +214,7 @@ class TimedRegressor(ThermalRegressor):
             return rows, np.full(len(rows), np.inf)
         if rows.shape[1] < 2:
             raise InputError("time='column': X has one column, the time, and no input beside it")
-        return rows[:, 1:], from_column(rows[:, 0], getattr(X, "index", None), fitting=fitting)
+        return rows[:, 1:], derive_steps(rows[:, 0], getattr(X, "index", None), fitting=fitting)
 
     def _cycles(self, cycle: ArrayLike | None, step: FloatArray) -> ArrayLike | None:
         """Return the thermal cycles to choose settings by: those given, else the tests if there are several."""
@@ -259,7 +259,7 @@ def _is_plain(X: ArrayLike, n_columns: int) -> TypeGuard[FloatArray]:
         return math.isfinite(X.sum())
 
 
-def from_column(time: FloatArray, index: object = None, *, fitting: bool = False) -> FloatArray:
+def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = False) -> FloatArray:
     """Return the time since the row before from a column that counts from the start of each test.
 
     Parameters

@@ -17,9 +17,9 @@ from thermocomp.core.exceptions import FitError
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel, Provenance, Support
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.covering import cover
-from thermocomp.models.foreign import adopted, numbers, refused, title
-from thermocomp.models.methods import Method, Named, given, method
+from thermocomp.models.covering import find_joint_support
+from thermocomp.models.foreign import adopt_estimator, catch_failures, check_numbers, title
+from thermocomp.models.methods import Method, NamedEstimator, find_method, make_method
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.models.unfrozen import UnfrozenRegressor
 from thermocomp.recording.fingerprints import fingerprint
@@ -56,7 +56,7 @@ class Trained:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedMethod:
     """A method that knows its rows, before it is frozen.
 
     Parameters
@@ -81,14 +81,14 @@ class Fitted:
     predicted: FloatArray
 
 
-def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: BoolArray) -> Fitted:
+def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: BoolArray) -> FittedMethod:
     """Fit a method to some of the rows.
 
     Parameters
     ----------
     name : str or estimator
         Of the method; or an estimator with settings of its own, which gets all inputs and is not changed itself, see
-        `thermocomp.models.foreign.adopted`.
+        `thermocomp.models.foreign.adopt_estimator`.
     samples : Samples
     target : int
         Index into ``samples.targets``.
@@ -105,11 +105,13 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
     FitError
         Too few rows, or the method cannot be fitted to them, or does not give a finite number per row.
     """
-    own = name.estimator if isinstance(name, Named) else None if isinstance(name, str) else adopted(name)
+    own = (
+        name.estimator if isinstance(name, NamedEstimator) else None if isinstance(name, str) else adopt_estimator(name)
+    )
     how = (
-        method(str(name))
+        find_method(str(name))
         if own is None
-        else replace(given(own), name=str(name) if isinstance(name, str) else title(own))
+        else replace(make_method(own), name=str(name) if isinstance(name, str) else title(own))
     )
     columns = tuple(j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed")
     if not columns:
@@ -122,7 +124,7 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
         )
     _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")
-    with refused(f"{how.name} cannot be fitted to {channel.name}"):
+    with catch_failures(f"{how.name} cannot be fitted to {channel.name}"):
         estimator = how.build(speeds) if own is None else clone(own)
     if isinstance(estimator, TimedRegressor) and estimator.columns == "speed" and not getattr(estimator, "speed", None):
         estimator.set_params(speed=speeds)  # the recording knows which inputs are
@@ -135,15 +137,15 @@ def fitted(name: str | BaseEstimator, samples: Samples, target: int, learn: Bool
     driven = samples.take(rows)
     clock: dict[str, Any] = {"dt": pd.Series(driven.dt())} if "dt" in how.takes else {}
     cycles: dict[str, Any] = {"cycle": np.where(learned, driven.cycle, -1)} if "cycle" in how.takes else {}
-    with refused(f"{how.name} cannot be fitted to {channel.name}"):
+    with catch_failures(f"{how.name} cannot be fitted to {channel.name}"):
         estimator.fit(frame.iloc[rows], y, **clock, **cycles)
     seconds = time.perf_counter() - begin
     everywhere: dict[str, Any] = {"dt": pd.Series(samples.take(valid).dt())} if "dt" in how.takes else {}
     predicted = np.full(len(samples), np.nan)
-    with refused(f"{how.name} cannot predict {channel.name}"):
+    with catch_failures(f"{how.name} cannot predict {channel.name}"):
         found = estimator.predict(frame.iloc[valid], **everywhere)
-    predicted[valid] = numbers(found, int(valid.sum()), how.name)
-    return Fitted(how, estimator, columns, seen, seconds, predicted)
+    predicted[valid] = check_numbers(found, int(valid.sum()), how.name)
+    return FittedMethod(how, estimator, columns, seen, seconds, predicted)
 
 
 def train(
@@ -178,7 +180,7 @@ def train(
     FitError
         See `fitted`.
     """
-    fit = fitted(name, samples, target, learn)
+    fit = fit_method(name, samples, target, learn)
     how, estimator, seen, predicted = fit.how, fit.estimator, fit.seen, fit.predicted
     r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))
     freeze: Any = estimator.freeze
@@ -214,7 +216,9 @@ def _refuse_unknown_counts(samples: Samples, seen: BoolArray) -> None:
 def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport | None:
     """Return the joint support of the model's inputs in the rows that were learned from."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
-    return cover(samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen])
+    return find_joint_support(
+        samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen]
+    )
 
 
 def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, target: int, seen: BoolArray) -> Provenance:

@@ -17,7 +17,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.training import train
-from thermocomp.papers.study import BoolArray, FloatArray, Table
+from thermocomp.papers.study import BoolArray, FloatArray, StudyTable
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD
@@ -31,7 +31,7 @@ PAPERS_SUPPORT = Support(margin=1e3)
 # -- recordings ----------------------------------------------------------------------------------------------------
 
 
-def renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
+def rename_channels(recording: Recording, names: Mapping[str, str]) -> Recording:
     """Return some of the channels of a recording under the names of a paper, in the order given.
 
     Parameters
@@ -54,7 +54,7 @@ def renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
     return replace(recording, table=pd.DataFrame(columns, columns=[c.name for c in channels]), channels=channels)
 
 
-def derived(recording: Recording, channel: Channel, weights: Mapping[str, float]) -> Recording:
+def add_derived_channel(recording: Recording, channel: Channel, weights: Mapping[str, float]) -> Recording:
     """Return a recording with one more channel: a weighted sum of others, such as a mean or a difference.
 
     Parameters
@@ -150,7 +150,7 @@ def cut_off(samples: Samples, name: str) -> Samples:
 # -- models --------------------------------------------------------------------------------------------------------
 
 
-def fitted(
+def fit_and_freeze(
     estimator: ThermalRegressor,
     samples: Samples,
     targets: Sequence[str],
@@ -255,7 +255,7 @@ def frozen(
     )
 
 
-def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
+def predict_deviation(model: ErrorModel, samples: Samples) -> FloatArray:
     """Replay a frozen model reading by reading from the start of every test; return its deviation at all rows.
 
     Parameters
@@ -272,14 +272,14 @@ def predicted(model: ErrorModel, samples: Samples) -> FloatArray:
     return replay(model, samples, every(samples))[0]
 
 
-def measured(samples: Samples, target: str) -> FloatArray:
+def take_measured(samples: Samples, target: str) -> FloatArray:
     """Return the measured deviation of a target, shape (n_rows,)."""
     return samples.deviations[:, [c.name for c in samples.targets].index(target)]
 
 
 def residual(model: ErrorModel, samples: Samples) -> FloatArray:
     """Return what a model, replayed, leaves of its target, shape (n_rows,) [unit of the model]."""
-    return measured(samples, model.target) - predicted(model, samples)
+    return take_measured(samples, model.target) - predict_deviation(model, samples)
 
 
 # -- errors ---------------------------------------------------------------------------------------------------------
@@ -317,7 +317,7 @@ def described(residual: FloatArray, deviation: FloatArray) -> float:
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
 
 
-def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[Item], str]]) -> Table:
+def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[Item], str]]) -> StudyTable:
     """Lay items out, a row each.
 
     Parameters
@@ -331,10 +331,10 @@ def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[I
     -------
     Table
     """
-    return Table(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
+    return StudyTable(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
 
 
-def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> Table:
+def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], unit: str = "um") -> StudyTable:
     """Lay errors out: a row per residual.
 
     Parameters
@@ -354,4 +354,4 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
         e = Errors.of(residual)
         rows.append([what, method, *(f"{v:.2f}" for v in (e.rms, e.mae, e.max_abs, e.peak_to_peak))])
     header = ("", "method", f"RMS [{unit}]", f"MAE [{unit}]", f"max [{unit}]", f"peak-to-peak [{unit}]")
-    return Table(caption, header, rows)
+    return StudyTable(caption, header, rows)

@@ -14,7 +14,7 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
 from thermocomp.papers.common import rms, stacked
 from thermocomp.papers.pictures import curves, single
-from thermocomp.papers.study import Claim, Figure, Progress, Study, Table, silent
+from thermocomp.papers.study import Claim, Figure, Progress, Study, StudyTable, tell_nobody
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 
@@ -25,7 +25,7 @@ NONE = "none"
 
 
 @dataclass(frozen=True)
-class Experiment:
+class CrossExperiment:
     """A paper's experiment as a task: some tests are learned, the last ones are unseen.
 
     Parameters
@@ -51,13 +51,13 @@ class Experiment:
 
 
 EXPERIMENTS = (
-    Experiment("chen1996", "z_um", unseen=2, then="chen1996-new"),
-    Experiment("wessel-fem", -1),
-    Experiment("wessel-tool", 0),
-    Experiment("wessel-milling", 0),
-    Experiment("hwang", "z_um", then="hwang"),
-    Experiment("precompensation", 0),
-    Experiment("stepwise2017", "x1_um", then="stepwise2017-online"),
+    CrossExperiment("chen1996", "z_um", unseen=2, then="chen1996-new"),
+    CrossExperiment("wessel-fem", -1),
+    CrossExperiment("wessel-tool", 0),
+    CrossExperiment("wessel-milling", 0),
+    CrossExperiment("hwang", "z_um", then="hwang"),
+    CrossExperiment("precompensation", 0),
+    CrossExperiment("stepwise2017", "x1_um", then="stepwise2017-online"),
 )
 
 
@@ -117,7 +117,7 @@ class Row:
     failure: str = ""
 
 
-def virtual(experiment: Experiment, seed: int) -> Task:
+def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
     """Run an experiment on the virtual machine: its last tests are unseen.
 
     Parameters
@@ -138,7 +138,7 @@ def virtual(experiment: Experiment, seed: int) -> Task:
     return Task(f"{experiment.name}, {name}", samples, Judging("whole tests left out", (split,)))
 
 
-def measured(recordings: Sequence[Recording], target: str) -> Task:
+def take_task(recordings: Sequence[Recording], target: str) -> Task:
     """Take the recordings of a machine: every thermal cycle is unseen once (X-02).
 
     Parameters
@@ -162,7 +162,7 @@ def measured(recordings: Sequence[Recording], target: str) -> Task:
     return Task(name, samples, leave_one_cycle_out(samples))
 
 
-def judge(task: Task, methods: Sequence[str], progress: Progress = silent) -> list[Row]:
+def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody) -> list[Row]:
     """Judge methods on a task, none first.
 
     Parameters
@@ -193,11 +193,11 @@ def judge(task: Task, methods: Sequence[str], progress: Progress = silent) -> li
 
 def run(
     seed: int,
-    progress: Progress = silent,
+    progress: Progress = tell_nobody,
     recordings: Sequence[Recording] = (),
     *,
     methods: Sequence[str] = FAST,
-    experiments: Sequence[Experiment] = EXPERIMENTS,
+    experiments: Sequence[CrossExperiment] = EXPERIMENTS,
     targets: Sequence[str] | None = None,
 ) -> Study:
     """Judge the methods on all experiments, and on measured recordings.
@@ -227,7 +227,7 @@ def run(
     names = expand(methods)
     if targets is None:
         targets = [c.name for c in recordings[0].displacements] if recordings else []
-    real = [measured(recordings, target) for target in targets]  # first of all: what cannot be used is told at once
+    real = [take_task(recordings, target) for target in targets]  # first of all: what cannot be used is told at once
     n = len(experiments) + len(real)
     rows: list[list[Row]] = []
 
@@ -236,7 +236,7 @@ def run(
 
     for experiment in experiments:
         tell(0.0, f"{experiment.name}: recording")
-        rows.append(judge(virtual(experiment, seed), names, tell))
+        rows.append(judge(simulate_task(experiment, seed), names, tell))
     for task in real:
         rows.append(judge(task, names, tell))
     progress(1.0, "done")
@@ -332,7 +332,7 @@ def _claims(rows: Sequence[Row], *, real: bool) -> tuple[Claim, ...]:
     )
 
 
-def _overview(rows: Sequence[Sequence[Row]]) -> Table:
+def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
     """Return the one table of X-03."""
     cells = [
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
@@ -342,10 +342,10 @@ def _overview(rows: Sequence[Sequence[Row]]) -> Table:
         "RMS [um] in tests that were not learned from (X-03). Every method is offered all temperatures and the spindle "
         "speed, and takes what it can use; -: it could not be fitted."
     )
-    return Table(caption, ("method", *(mine[0].task.replace(", ", " ") for mine in rows)), cells)
+    return StudyTable(caption, ("method", *(mine[0].task.replace(", ", " ") for mine in rows)), cells)
 
 
-def _table(rows: Sequence[Row]) -> Table:
+def _table(rows: Sequence[Row]) -> StudyTable:
     header = ("method", "fit", "unseen", "max", "p-p", "noise", "cut off", "worst input", "inputs", "fit [s]")
     cells = []
     for r in rows:
@@ -358,7 +358,7 @@ def _table(rows: Sequence[Row]) -> Table:
         f"{rows[0].task}: RMS of the fit and where it was unseen, its maximum and peak-to-peak, RMS with noise of "
         "0.4 degC on all temperatures and with the worst input cut off [um]"
     )
-    return Table(caption, header, cells)
+    return StudyTable(caption, header, cells)
 
 
 def _figure(rows: Sequence[Sequence[Row]]) -> Figure:

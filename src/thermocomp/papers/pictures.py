@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from thermocomp.papers.study import Curve, Figure, FloatArray, Panel, Style
+from thermocomp.papers.study import Figure, FloatArray, Panel, PlotCurve, Style
 from thermocomp.recording.samples import Samples
 
 
@@ -15,7 +15,7 @@ def curves(
     *,
     dashed: Sequence[str] = (),
     points: Sequence[str] = (),
-) -> list[Curve]:
+) -> list[PlotCurve]:
     """Return curves over the same x.
 
     Parameters
@@ -34,11 +34,11 @@ def curves(
     """
     styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
     styles.update(dict.fromkeys(points, "points"))
-    return [Curve(label, x, y, styles.get(label, style)) for label, y in values.items()]
+    return [PlotCurve(label, x, y, styles.get(label, style)) for label, y in values.items()]
 
 
 def single(
-    key: str, caption: str, axes: tuple[str, str], curves: Sequence[Curve], *, title: str = "", columns: int = 1
+    key: str, caption: str, axes: tuple[str, str], curves: Sequence[PlotCurve], *, title: str = "", columns: int = 1
 ) -> Figure:
     """Return a figure with one panel.
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 
-from thermocomp.papers.study import Claim, Progress, Study, silent
+from thermocomp.papers.study import Claim, Progress, Study, tell_nobody
 
 #: each is a package beside this module, with ``redo.run(seed, progress) -> Study``
 STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")
@@ -12,7 +12,7 @@ STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")
 APART = 100
 
 
-def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
+def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody) -> Study:
     """Redo a paper's study on the virtual machine.
 
     Parameters
@@ -32,7 +32,7 @@ def run(name: str, *, seed: int = 0, progress: Progress = silent) -> Study:
     return study
 
 
-def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = silent) -> Study:
+def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = tell_nobody) -> Study:
     """Redo a study several times, each with a weather, a noise and lots of its own.
 
     Parameters

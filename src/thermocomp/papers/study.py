@@ -16,7 +16,7 @@ Style = Literal["line", "dashed", "points"]
 Progress = Callable[[float, str], None]
 
 
-def silent(_: float, __: str) -> None:
+def tell_nobody(_: float, __: str) -> None:
     """Tell nobody."""
 
 
@@ -133,7 +133,7 @@ class Claims(Generic[Found]):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class PlotCurve:
     """One curve of a panel.
 
     Parameters
@@ -165,7 +165,7 @@ class Panel:
     title: str
     xlabel: str
     ylabel: str
-    curves: Sequence[Curve]
+    curves: Sequence[PlotCurve]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +190,7 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class StudyTable:
     """A table of a study.
 
     Parameters
@@ -216,7 +216,7 @@ class Part:
     """
 
     claims: Sequence[Claim]
-    tables: Sequence[Table]
+    tables: Sequence[StudyTable]
     figures: Sequence[Figure]
     numbers: dict[str, float]
 
@@ -241,7 +241,7 @@ class Study:
     name: str
     title: str
     claims: tuple[Claim, ...]
-    tables: tuple[Table, ...]
+    tables: tuple[StudyTable, ...]
     figures: tuple[Figure, ...]
     numbers: dict[str, float]
 

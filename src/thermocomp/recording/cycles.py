@@ -56,12 +56,12 @@ def find_cycles(
     """
     known = np.isfinite(speed)
     if not known.any():
-        return whole(len(time))
+        return make_single_cycle(len(time))
     last_known = np.maximum.accumulate(np.where(known, np.arange(len(speed)), 0))
     filled = np.abs(np.nan_to_num(speed[last_known]))
     top = filled.max()
     if top == 0:
-        return whole(len(time))
+        return make_single_cycle(len(time))
     turning = filled > 0.02 * top
     turning = _drop_short(time, turning, state=False, shorter_than=min_stop)
     turning = _drop_short(time, turning, state=True, shorter_than=min_run)
@@ -84,12 +84,12 @@ def find_cycles(
     return tuple(cycles)
 
 
-def whole(n_rows: int, name: str = "whole test") -> tuple[Cycle, ...]:
+def make_single_cycle(n_rows: int, name: str = "whole test") -> tuple[Cycle, ...]:
     """Return one cycle that covers everything."""
     return (Cycle(name, 0, n_rows),)
 
 
-def given_cycles(labels: Sequence[object]) -> tuple[Cycle, ...]:
+def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
     """Split by a column of labels: each stretch of equal labels is a cycle.
 
     Raises

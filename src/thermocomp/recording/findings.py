@@ -101,7 +101,7 @@ def runs(x: NDArray[np.generic]) -> tuple[IntArray, IntArray]:
     return starts, np.diff(starts, append=len(x))
 
 
-def at(row: int, time: FloatArray) -> str:
+def at_row(row: int, time: FloatArray) -> str:
     """Return a row as it is told: its number and its time [s]."""
     return f"row {row} ({time[row]:.10g} s)"
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.fingerprints import Prints, Runs, packed, unpacked
+from thermocomp.core.fingerprints import Prints, Runs, pack_marks, unpack_marks
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
@@ -308,8 +308,8 @@ def _kept(
         cell = rows // -(-len(whole) // most)
         order = np.lexsort((-score[rows], cell))
         rows = rows[order[np.flatnonzero(np.diff(cell[order], prepend=-1))]]
-    marks = {name: packed(np.where(windows[name].telling, windows[name].mark, 0)[rows]) for name in names}
-    return Runs(stride, packed(at[rows].astype(np.uint32)), packed(moving[rows].astype(np.uint32)), marks)
+    marks = {name: pack_marks(np.where(windows[name].telling, windows[name].mark, 0)[rows]) for name in names}
+    return Runs(stride, pack_marks(at[rows].astype(np.uint32)), pack_marks(moving[rows].astype(np.uint32)), marks)
 
 
 def _stretches(samples: Samples, learn: BoolArray) -> tuple[tuple[int, int], ...]:
@@ -338,7 +338,7 @@ def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, 
         inside = rows.starts(LENGTH * stride)
         marks = {n: np.where(inside, _marks(x, prints.steps[n], stride), 0) for n, x in columns.items()}
         found, of = _matches(run, marks)
-        there = unpacked(run.rows).astype(np.intp)[of]
+        there = unpack_marks(run.rows).astype(np.intp)[of]
         # long runs are for files that have other rows than those that were learned from: fewer, or more
         new = ~np.isin(samples.test[rows.at[found]], np.unique(samples.test[source >= 0]))
         if own:
@@ -360,7 +360,7 @@ def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
 def _matches(run: Runs, marks: dict[str, Marks]) -> tuple[IntArray, IntArray]:
     """Return where a run of the target and one of an input are those of a run that is kept, and of which."""
     first, *others = run.marks
-    stored = {name: unpacked(text) for name, text in run.marks.items()}
+    stored = {name: unpack_marks(text) for name, text in run.marks.items()}
     known, which = np.unique(stored[first], return_index=True)
     if known.size == 0:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
@@ -386,7 +386,7 @@ def _fill(
     own: bool,
 ) -> None:
     """Write into `source` the rows between matches that follow each other, and those beside them that may be known."""
-    learned, moving = unpacked(run.rows).astype(np.intp), unpacked(run.moving) > 0
+    learned, moving = unpack_marks(run.rows).astype(np.intp), unpack_marks(run.moving) > 0
     scale = stride / run.stride
     usual = float(np.median(np.diff(learned))) if learned.size > 1 else 0.0
     for mine in _chains(rows.at[found], learned[of], rows.test[found], scale, max(3.0 * usual, 2.0 * LENGTH)):

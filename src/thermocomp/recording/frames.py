@@ -12,8 +12,8 @@ from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import Meaning, understand
 from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import unit
-from thermocomp.recording.cycles import Cycle, find_cycles, given_cycles, whole
+from thermocomp.core.units import find_unit
+from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 
 FloatArray = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
     first = values[0]
     if isinstance(first, datetime | np.datetime64):
         return passed, pd.Timestamp(first).isoformat(), used
-    scale = 1.0 if isinstance(first, timedelta | np.timedelta64) else unit(symbol, "time").scale
+    scale = 1.0 if isinstance(first, timedelta | np.timedelta64) else find_unit(symbol, "time").scale
     return (passed - passed[0]) * scale, "", used
 
 
@@ -132,7 +132,7 @@ def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:
     """Return what a column is, by `units` or by its heading."""
     if column not in units:
         return understand(column)
-    meant = unit(units[column])
+    meant = find_unit(units[column])
     told = understand(column)
     if told is not None and told.unit.quantity == meant.quantity:
         return Meaning(told.name, told.base, meant)
@@ -151,5 +151,5 @@ def _cycles(labels: Sequence[object] | None, time: FloatArray, speed: FloatArray
     if labels is not None:
         if len(labels) != len(time):
             raise InputError(f"{name}: cycles: {len(labels)} labels for {len(time)} rows")
-        return given_cycles(labels)
-    return whole(len(time)) if speed is None else find_cycles(time, speed)
+        return split_by_labels(labels)
+    return make_single_cycle(len(time)) if speed is None else find_cycles(time, speed)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recording.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at
+from thermocomp.recording.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row
 
 #: smallest step that is told, by quantity [degC, um, urad]
 LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}
@@ -152,15 +152,15 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
         first, last = (int(r) for r in sorted([row, int(mine.after[back[0]])]))
         up = float(mine.height[min(lone)])
         text = (
-            f"is off by {up:+.3g} {channel.unit} from {at(first, time)} to {at(last - 1, time)}, by a step that no "
-            "other channel shares and that comes back: delete these values"
+            f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
+            "that no other channel shares and that comes back: delete these values"
         )
         return Finding("trouble", channel.name, "step", text, np.arange(first - 1, last))
     more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
     text = (
-        f"steps by {height:+.3g} {channel.unit} at {at(row, time)}{more}, which no other channel shares: a sensor or "
-        "probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract the "
-        "step behind it, or leave the channel out"
+        f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "
+        "or probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract "
+        "the step behind it, or leave the channel out"
     )
     return Finding("trouble", channel.name, "step", text, row=row)
 
@@ -182,7 +182,7 @@ def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) ->
 
 def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
     text = (
-        f"changes places with {b.channel.name} at {at(row, time)}: each goes on where the other was. Swap the two "
+        f"changes places with {b.channel.name} at {at_row(row, time)}: each goes on where the other was. Swap the two "
         "columns back from there on, or leave both out"
     )
     return Finding("trouble", a.channel.name, "swapped", text, row=row)

@@ -15,7 +15,7 @@ from thermocomp.recording.findings import (
     IntArray,
     Severity,
     Signal,
-    at,
+    at_row,
     count,
     runs,
     speed_changes,
@@ -169,7 +169,8 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
     row = int(wild[np.argmax(np.abs(values[wild]))])
     text = (
         f"{count(wild.size, 'value')} of {len(values)} beyond {least:g} to {most:g} {channel.unit}, the farthest "
-        f"{values[row]:g} at {at(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and sensor"
+        f"{values[row]:g} at {at_row(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and "
+        "sensor"
     )
     every = wild.size == np.isfinite(values).sum()
     return Finding("trouble", channel.name, "implausible", text, None if every else wild)
@@ -199,8 +200,9 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
     if gaps.size:
         longest = int(gaps[np.argmax(steps[gaps])])
         text = (
-            f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at(longest, time)}, where "
-            f"rows are {usual:g} s apart; a model's memory is unsure behind it: split the test there or record it again"
+            f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at_row(longest, time)}, "
+            f"where rows are {usual:g} s apart; a model's memory is unsure behind it: split the test there or "
+            "record it again"
         )
         yield Finding("warning", "", "gap", text, row=longest)
     kept = steps[steps <= 5 * usual]
@@ -252,7 +254,7 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
         )
     else:
         text = (
-            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at(first, time)}, hold {codes}, a "
+            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, hold {codes}, a "
             f"code for a missing value; mark it by a mapping, missing = [{codes}]"
         )
     return Finding("trouble", channel.name, "missing-value code", text, None if every else np.flatnonzero(coded))
@@ -276,6 +278,6 @@ def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -
     longest = int(np.argmax(lengths))
     text = (
         f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} "
-        f"in a row from {at(int(starts[longest]), time)}; models skip these rows: mend the sensor if they are many"
+        f"in a row from {at_row(int(starts[longest]), time)}; models skip these rows: mend the sensor if they are many"
     )
     yield Finding("trouble" if n > 0.2 * len(values) else "warning", name, "missing values", text)

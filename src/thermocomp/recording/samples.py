@@ -14,9 +14,9 @@ from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import Input
-from thermocomp.core.zero import FIRST_READING, Zeroing, centre, first_rows
+from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, robust_mean
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.starts import Start, bridged, find, level, resting
+from thermocomp.recording.starts import Start, bridge_files, find_resting_rows, find_starts, level
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -118,7 +118,7 @@ class Samples:
                 names = ", ".join(c.name for c in self.inputs)
                 raise RecordingError(f"{self.test_names[k]}: no row has a number in all of the inputs {names}")
             count, _ = first_rows(self.zeroing, self.time[rows], self.stands[rows])
-            zero[k] = np.where(self.rezeroed, centre(self.values[rows[:count]]), 0.0)
+            zero[k] = np.where(self.rezeroed, robust_mean(self.values[rows[:count]]), 0.0)
         return zero
 
     @property
@@ -140,7 +140,7 @@ class Samples:
     def _change(self) -> FloatArray:
         values = self.values.copy()
         for window in self._windows() if self.rezeroed.any() else []:
-            values[window] = centre(values[window])
+            values[window] = robust_mean(values[window])
         return values - self.reference()[self.test]
 
     def _windows(self) -> Iterator[IntArray]:
@@ -287,7 +287,7 @@ def stack(
     speed = first.speed
     zeroing = Zeroing(speed=speed.name if speed is not None else "") if zeroing is None else zeroing
     if starts is None:
-        starts = find(recordings, target_channels, zeroing=zeroing, absolute=not rezero)
+        starts = find_starts(recordings, target_channels, zeroing=zeroing, absolute=not rezero)
     starts = [starts] * len(recordings) if isinstance(starts, Start) else starts
     parts = [_part(r, s, input_channels, target_channels, zeroing) for r, s in zip(recordings, starts, strict=True)]
     cycle_names = [
@@ -361,7 +361,7 @@ class _Part(NamedTuple):
 def _part(
     recording: Recording, start: Start, inputs: Sequence[Channel], targets: Sequence[Channel], zeroing: Zeroing
 ) -> _Part:
-    start, begins = bridged(start, recording)
+    start, begins = bridge_files(start, recording)
     _refuse_the_absurd(recording, [*inputs, *targets])
     deviations = recording.values([recording.channel(c.name) for c in targets])
     if start.word == "rezeroed":
@@ -379,7 +379,7 @@ def _part(
             [-1] * before + [k for k, c in enumerate(recording.cycles) for _ in range(len(c))], dtype=np.intp
         ),
         row=np.array([-1] * before + list(range(len(recording))), dtype=np.intp),
-        resting=np.concatenate([resting(r, zeroing) for r in every]),
+        resting=np.concatenate([find_resting_rows(r, zeroing) for r in every]),
     )
 
 

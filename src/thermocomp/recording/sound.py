@@ -10,7 +10,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 
 
-def sound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
+def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
     """Return samples without what is in trouble.
 
     Parameters

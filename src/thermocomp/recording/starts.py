@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.core.zero import Zeroing, centre, first_rows
+from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -100,7 +100,7 @@ class Start:
 COLD = Start()
 
 
-def bridged(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
+def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
     """Bridge the time between the files of a test.
 
     Parameters
@@ -140,7 +140,7 @@ def bridged(start: Start, recording: Recording) -> tuple[Start, FloatArray]:
     return replace(start, why=why), np.array(begins)
 
 
-def find(
+def find_starts(
     recordings: Sequence[Recording],
     targets: Sequence[Channel],
     *,
@@ -184,7 +184,7 @@ def find(
     return tuple(whole(found[id(r)]) for r in recordings)
 
 
-def resting(recording: Recording, zeroing: Zeroing) -> BoolArray:
+def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
     """Return the rows in which the spindle is known to stand.
 
     Parameters
@@ -225,8 +225,8 @@ def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = Fals
     there = np.flatnonzero(np.isfinite(values))
     if not there.size:
         return float("nan")
-    count, _ = first_rows(zeroing, recording.time[there], resting(recording, zeroing)[there])
-    return float(centre(values[there[-1:]] if end else values[there[:count]]))
+    count, _ = first_rows(zeroing, recording.time[there], find_resting_rows(recording, zeroing)[there])
+    return float(robust_mean(values[there[-1:]] if end else values[there[:count]]))
 
 
 def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[Channel], zeroing: Zeroing) -> Start:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 from thermocomp.recording.recording import Recording
 
 
@@ -37,7 +37,7 @@ def with_tilts(tests: Sequence[Recording], tilts: Sequence[str]) -> tuple[list[R
     for text in tilts:
         name, equals, rest = text.partition("=")
         parts = rest.rsplit(":", 2)
-        distance = measured(parts[2], "position") if len(parts) == 3 else None
+        distance = read_with_unit(parts[2], "position") if len(parts) == 3 else None
         if not equals or name[:1] not in ("A", "B") or distance is None:
             raise InputError(
                 f"--tilt {text!r}: write name, probe at the tip, probe nearer to the spindle and their distance, such "

@@ -13,7 +13,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report import records
-from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, plain, svg, thinned
+from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, shorten_name, svg, thin_points
 from thermocomp.report.html import page
 from thermocomp.report.layout import Column, Layout
 
@@ -101,9 +101,9 @@ def _panel(
     for k, c in enumerate(ordered):
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
         style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-        line = ax.plot(*thinned(hours, values), style, color=COLOURS[k % len(COLOURS)], lw=1.0, zorder=3)[0]
+        line = ax.plot(*thin_points(hours, values), style, color=COLOURS[k % len(COLOURS)], lw=1.0, zorder=3)[0]
         handles.append(line)
-        names.append(plain(c.name))
+        names.append(shorten_name(c.name))
         for number, f in numbers.get(c.name, ()):
             _mark(ax, hours, np.clip(values, low, high), f, "--")
             if (row := _first(f)) is not None:

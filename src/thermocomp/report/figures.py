@@ -63,7 +63,7 @@ def measured(recording: Recording) -> str:
         rest = list(axes)
         if speed is not None:
             ax = rest.pop(0)
-            ax.plot(*thinned(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
+            ax.plot(*thin_points(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
             ax.set_ylabel("1/min")
             ax.set_title("spindle speed", pad=14)
             for cycle in recording.cycles:
@@ -82,7 +82,12 @@ def measured(recording: Recording) -> str:
             for k, c in enumerate(channels):
                 colour = COLOURS[k % len(COLOURS)]
                 style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-                ax.plot(*thinned(hours, recording.table[c.name].to_numpy()), style, color=colour, label=plain(c.name))
+                ax.plot(
+                    *thin_points(hours, recording.table[c.name].to_numpy()),
+                    style,
+                    color=colour,
+                    label=shorten_name(c.name),
+                )
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
@@ -111,7 +116,7 @@ def overview(comparison: Comparison) -> Drawn:
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
             ax.set_yticks(range(len(models)), models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
-            ax.set_ylabel(plain(target), fontweight="bold")
+            ax.set_ylabel(shorten_name(target), fontweight="bold")
             ax.set_xscale("log")
         panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
         for word, face in FILLED.items():
@@ -148,18 +153,20 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             hours = _clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
             ax.plot(
-                *thinned(hours, block.measured, points),
+                *thin_points(hours, block.measured, points),
                 color=MEASURED,
                 lw=1.8,
                 label="measured = without compensation",
             )
-            ax.plot(*thinned(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
+            ax.plot(*thin_points(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
             ax.plot(
-                *thinned(hours, block.measured - block.predicted), color=RESIDUAL, label="residual = with compensation"
+                *thin_points(hours, block.measured - block.predicted),
+                color=RESIDUAL,
+                label="residual = with compensation",
             )
             harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
             mark = "  HARMFUL" if harmful else ""
-            name = plain(block.block, 60)
+            name = shorten_name(block.block, 60)
             ax.set_title(
                 f"{name}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
                 fontsize=8,
@@ -167,7 +174,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             )
             ax.set_xlabel("time [h]")
         for ax in axes[:, 0]:
-            ax.set_ylabel(plain(f"{assessment.target.removesuffix('_um')} [um]"))
+            ax.set_ylabel(shorten_name(f"{assessment.target.removesuffix('_um')} [um]"))
         handles, labels = axes.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
         return svg(figure)
@@ -191,7 +198,12 @@ def robustness(comparison: Comparison, model: str) -> str:
             name, worst = r.worst_lost
             if lost:
                 ax.annotate(
-                    plain(name), (worst, k), xytext=(3, 5), textcoords="offset points", fontsize=7, color=RESIDUAL
+                    shorten_name(name),
+                    (worst, k),
+                    xytext=(3, 5),
+                    textcoords="offset points",
+                    fontsize=7,
+                    color=RESIDUAL,
                 )
         noise = found[0].robustness.noise if found and found[0].robustness else 0.0
         ax.plot([], [], "o", color=PREDICTED, label="clean")
@@ -224,7 +236,7 @@ def _shade_cycles(ax: Axes, recording: Recording) -> None:
             ax.axvspan(float(hours[cycle.start]), float(hours[cycle.stop - 1]), color=SHADE, lw=0, zorder=0)
 
 
-def thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
+def thin_points(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
     """Return at most about `points` points, the extremes of each stretch among them."""
     stretch = len(x) // (points // 2)
     if stretch < 2 or not np.isfinite(y).all():
@@ -236,7 +248,7 @@ def thinned(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatAr
     return x[picked], y[picked]
 
 
-def plain(name: str, longest: int = _LONGEST) -> str:
+def shorten_name(name: str, longest: int = _LONGEST) -> str:
     """Return a name as a figure shows it: short, on one line, with no sign that starts a formula or hides a legend."""
     text = "".join(c if c.isprintable() else " " for c in name)
     text = text if len(text) <= longest else text[: longest - 3] + "..."

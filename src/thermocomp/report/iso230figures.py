@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.settling import Settling
-from thermocomp.iso230.thermaltest import HOUR, Curve, ThermalTest
-from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, drawing, svg, thinned
+from thermocomp.iso230.thermaltest import HOUR, ThermalCurve, ThermalTest
+from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, drawing, svg, thin_points
 
 FloatArray = NDArray[np.float64]
 
@@ -44,8 +44,8 @@ def thermal(test: ThermalTest) -> str:
         return svg(figure)
 
 
-def _panels(test: ThermalTest) -> list[tuple[str, str, Sequence[Curve]]]:
-    panels: list[tuple[str, str, Sequence[Curve]]] = []
+def _panels(test: ThermalTest) -> list[tuple[str, str, Sequence[ThermalCurve]]]:
+    panels: list[tuple[str, str, Sequence[ThermalCurve]]] = []
     lengths = [c for c in test.curves if c.unit == "um"]
     if lengths:
         panels.append(("displacements", "um", lengths))
@@ -60,7 +60,7 @@ def _panels(test: ThermalTest) -> list[tuple[str, str, Sequence[Curve]]]:
     return panels
 
 
-def _draw(ax: Axes, test: ThermalTest, curves: Sequence[Curve]) -> None:
+def _draw(ax: Axes, test: ThermalTest, curves: Sequence[ThermalCurve]) -> None:
     """Draw curves, and in dashes what a model leaves of them."""
     hours = test.time / HOUR
     ax.axhline(0, color="#aaa", lw=0.8)
@@ -72,17 +72,17 @@ def _draw(ax: Axes, test: ThermalTest, curves: Sequence[Curve]) -> None:
     for c, colour in zip(curves, colours, strict=True):
         there = np.isfinite(c.values)
         thin = c.after is not None
-        ax.plot(*thinned(hours[there], c.values[there]), color=colour, label=c.name, lw=0.9 if thin else 1.2)
+        ax.plot(*thin_points(hours[there], c.values[there]), color=colour, label=c.name, lw=0.9 if thin else 1.2)
         if c.after is not None:
             left = np.isfinite(c.after)
-            ax.plot(*thinned(hours[left], c.after[left]), "--", color=colour, lw=1.5)
+            ax.plot(*thin_points(hours[left], c.after[left]), "--", color=colour, lw=1.5)
         _mark_t90(ax, c, colour)
     if any(c.after is not None for c in curves):
         ax.plot([], [], "--", color=MEASURED, label="with model")
     ax.legend(**_BESIDE)
 
 
-def _mark_t90(ax: Axes, curve: Curve, colour: str) -> None:
+def _mark_t90(ax: Axes, curve: ThermalCurve, colour: str) -> None:
     s = curve.settling
     if s is not None and s.settled and np.isfinite(s.t90):
         ax.plot(s.t90 / HOUR, 0.9 * s.change, "o", color=colour, mfc="white", ms=4.5, zorder=4)
@@ -97,7 +97,7 @@ def _temperatures(ax: Axes, test: ThermalTest) -> None:
     for k, c in enumerate(others):
         style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
         ax.plot(
-            *thinned(hours, table[c.name].to_numpy()[rows]),
+            *thin_points(hours, table[c.name].to_numpy()[rows]),
             style,
             color=COLOURS[k % len(COLOURS)],
             lw=0.9,
@@ -105,7 +105,7 @@ def _temperatures(ax: Axes, test: ThermalTest) -> None:
         )
     if test.ambient is not None:
         values = table[test.ambient.name].to_numpy()[rows]
-        ax.plot(*thinned(hours, values), color="black", lw=2.2, label=f"{test.ambient.name}: surroundings")
+        ax.plot(*thin_points(hours, values), color="black", lw=2.2, label=f"{test.ambient.name}: surroundings")
     ax.set_title("temperatures")
     ax.set_ylabel("degC")
     if 0 < len(channels) <= _NAMED:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from thermocomp.assessment.choice import Cell, Table, written
+from thermocomp.assessment.choice import Cell, Table, format_cell
 
 
 class Toned(str):
@@ -110,7 +110,7 @@ def laid_out(t: Table) -> Layout:
 
 
 def _cell(place: int, row: Sequence[Cell]) -> str:
-    return written(row[place])
+    return format_cell(row[place])
 
 
 def in_um(value: float | None) -> str:

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from thermocomp import __version__
-from thermocomp.papers.study import Curve, Figure, Study, Table
-from thermocomp.report.figures import COLOURS, POINTS, drawing, svg, thinned
+from thermocomp.papers.study import Figure, PlotCurve, Study, StudyTable
+from thermocomp.report.figures import COLOURS, POINTS, drawing, svg, thin_points
 from thermocomp.report.html import environment
 
 #: a cell that is a number, alone or with what stands for none
@@ -22,7 +22,7 @@ PANEL_HEIGHT = 2.7
 COLUMNS, INDENT = 88, "    "
 
 
-def counted(study: Study) -> dict[str, int]:
+def count_verdicts(study: Study) -> dict[str, int]:
     """Return how many claims there are by verdict: ``yes``, ``no``, ``some`` (runs do not agree) and ``-``."""
     words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
     return {word: words.count(word) for word in ("yes", "no", "some", "-")}
@@ -30,7 +30,7 @@ def counted(study: Study) -> dict[str, int]:
 
 def headline(study: Study) -> str:
     """Return one line about a study: how many of its claims hold."""
-    n = counted(study)
+    n = count_verdicts(study)
     runs = max((1 + len(c.again) for c in study.claims), default=1)
     line = f"{n['yes']} of {n['yes'] + n['no'] + n['some']} claims hold on the virtual machine"
     if runs > 1:
@@ -65,7 +65,7 @@ def text(study: Study, *ids: str) -> str:
     return "\n".join(lines)
 
 
-def laid_out(table: Table) -> str:
+def format_table(table: StudyTable) -> str:
     """Return a table as plain text: its caption, then columns side by side, numbers on the right."""
     left, lines = words(table), [list(table.header), *rows(table)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(table.header))]
@@ -77,13 +77,13 @@ def laid_out(table: Table) -> str:
     return "\n".join([textwrap.fill(table.caption, COLUMNS), *said])
 
 
-def words(table: Table) -> list[int]:
+def words(table: StudyTable) -> list[int]:
     """Return which columns of a table hold words: in the others most cells are numbers, and stand on the right."""
     cells = [[row[k] for row in table.rows if row[k]] for k in range(len(table.header))]
     return [k for k, column in enumerate(cells) if column and 2 * sum(map(_is_number, column)) <= len(column)]
 
 
-def rows(table: Table) -> list[list[str]]:
+def rows(table: StudyTable) -> list[list[str]]:
     """Return the rows of a table; words of the first column are said once, not in every row beneath."""
     above = ["", *(row[0] for row in table.rows)] if 0 in words(table) else [""] * len(table.rows)
     return [["" if row[0] == said else row[0], *row[1:]] for row, said in zip(table.rows, above, strict=False)]
@@ -175,10 +175,10 @@ def _is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
-def _draw(ax: Axes, curve: Curve, colour: str) -> None:
+def _draw(ax: Axes, curve: PlotCurve, colour: str) -> None:
     known: dict[str, Any] = {"label": curve.label} if curve.label else {}
     if curve.style == "points":
         # as a picture inside the page where there are many: one element each would make it slow
         ax.plot(curve.x, curve.y, ".", color=colour, ms=4, rasterized=len(curve.x) > POINTS, **known)
     else:
-        ax.plot(*thinned(curve.x, curve.y), "--" if curve.style == "dashed" else "-", color=colour, **known)
+        ax.plot(*thin_points(curve.x, curve.y), "--" if curve.style == "dashed" else "-", color=colour, **known)

@@ -8,7 +8,7 @@ from thermocomp.assessment.results import Assessment
 MOST = 4
 
 
-def told(assessments: Sequence[Assessment]) -> list[str]:
+def describe_running(assessments: Sequence[Assessment]) -> list[str]:
     """Return what the compensator around the models did to the figures.
 
     Parameters

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.pareto import Budget
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.report.figures import COLOURS, NONE, Drawn, drawing, plain, svg
+from thermocomp.report.figures import COLOURS, NONE, Drawn, drawing, shorten_name, svg
 
 
 def draw(choice: Choice) -> tuple[Drawn, str] | None:
@@ -56,7 +56,7 @@ def grouping(g: CorrelationGrouping, target: str) -> Drawn:
         _log(curve)
         curve.set_xlabel("number of representatives")
         curve.set_ylabel("smallest MSE$_p$ [um$^2$]")
-        curve.set_title(plain(target))
+        curve.set_title(shorten_name(target))
         curve.xaxis.set_major_locator(MaxNLocator(integer=True))
         curve.legend()
         return svg(figure)
@@ -82,7 +82,7 @@ def budget(b: Budget) -> Drawn:
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
         _log(errors)
         errors.set_ylabel("RMS unseen [um]")
-        errors.set_title(f"{plain(b.target)}: error against the number of temperature sensors")
+        errors.set_title(f"{shorten_name(b.target)}: error against the number of temperature sensors")
         errors.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)

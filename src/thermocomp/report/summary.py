@@ -18,7 +18,7 @@ from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report import records
-from thermocomp.report.running import told
+from thermocomp.report.running import describe_running
 
 #: rows that are unlike the training are a caution if their RMS is so many times that of all rows
 WORSE = 1.25
@@ -47,9 +47,11 @@ def summarise(
     return {
         "judging": comparison.judging.name,
         "verdict": verdict(comparison),
-        "covered": None if samples is None else _covered(coverage.cover(samples, comparison.judging, recordings)),
+        "covered": None
+        if samples is None
+        else _covered(coverage.find_validity(samples, comparison.judging, recordings)),
         "cautions": cautions(comparison),
-        "running": told(comparison.overall()),
+        "running": describe_running(comparison.overall()),
         "starts": [start.told(name) for name, start in comparison.starts],
         "usable": [t for t in targets if comparison.best(t) is not None],
         "targets": [_target(comparison, t, samples) for t in targets],
@@ -105,7 +107,9 @@ def cautions(comparison: Comparison) -> list[str]:
         found.append(f"many rows are outside the range the models were trained in: {_list(beyond)}.")
     # where the error there is as elsewhere, it is no caution: left-out cycles have judged such rows
     found += [
-        f"{a.target}: {unlike(r)}." for a, r in known if r.unlike > 0.1 and r.unlike_rms > WORSE * a.metric("rms")
+        f"{a.target}: {describe_unlike(r)}."
+        for a, r in known
+        if r.unlike > 0.1 and r.unlike_rms > WORSE * a.metric("rms")
     ]
     return found
 
@@ -123,7 +127,7 @@ def harms(comparison: Comparison) -> list[str]:
     ]
 
 
-def unlike(r: Robustness) -> str:
+def describe_unlike(r: Robustness) -> str:
     """Say how many rows are outside the joint support, and the error there."""
     return (
         f"{100 * r.unlike:.0f} % of the rows are unlike the training (inputs together, or a speed between trained "

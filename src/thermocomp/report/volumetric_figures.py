@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment.volumetric import Moment, Volumetric
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.report.figures import COLOURS, MEASURED, drawing, svg, thinned
+from thermocomp.report.figures import COLOURS, MEASURED, drawing, svg, thin_points
 from thermocomp.volumetric.kinematics import INDEX
 
 FloatArray = NDArray[np.float64]
@@ -33,10 +33,10 @@ def over_time(study: Volumetric) -> str:
         )[: 1 + tilted]:
             ax.axhline(0, color="#aaa", lw=0.8)
             for k, name in enumerate(names):
-                ax.plot(*thinned(hours, values[:, k]), color=COLOURS[k], label=name)
+                ax.plot(*thin_points(hours, values[:, k]), color=COLOURS[k], label=name)
             ax.set_ylabel(unit)
         length = np.linalg.norm(course.error, axis=-1)
-        axes[0].plot(*thinned(hours, length), color=MEASURED, ls="--", lw=1.0, label="length")
+        axes[0].plot(*thin_points(hours, length), color=MEASURED, ls="--", lw=1.0, label="length")
         for moment in study.moments:
             for ax in axes:
                 ax.axvline(moment.time / 3600, color="#999", lw=0.8, ls=":")
@@ -80,7 +80,7 @@ def curves(study: Volumetric) -> str:
                 along = np.linspace(*machine.axis(name).travel, 61)
                 points = np.tile(np.asarray(study.course.point), (len(along), 1))
                 points[:, "XYZ".index(name)] = along
-                for k, moment in enumerate(shown(study)):
+                for k, moment in enumerate(choose_moments(study)):
                     values = moment.field.components(points)[:, INDEX[component.code]]
                     ax.plot(along, values, color=COLOURS[k], ls=("-", "--", "-.")[k % 3], label=moment.name)
                 ax.margins(x=0)
@@ -106,7 +106,10 @@ def scalars(study: Volumetric) -> str:
                 style = ("-", "--", ":")[k // len(COLOURS)]
                 values = course.values[:, INDEX[c.code]]
                 ax.plot(
-                    *thinned(hours, values), style, color=COLOURS[k % len(COLOURS)], label=f"{c.code} {c.description}"
+                    *thin_points(hours, values),
+                    style,
+                    color=COLOURS[k % len(COLOURS)],
+                    label=f"{c.code} {c.description}",
                 )
             ax.set_ylabel(unit)
             ax.margins(x=0)
@@ -117,7 +120,7 @@ def scalars(study: Volumetric) -> str:
 
 def contributions(study: Volumetric) -> str:
     """Show which components the error comes from in each state: at the point, and all over the work volume."""
-    moments = shown(study)
+    moments = choose_moments(study)
     parts = [study.course.contributions(m.row) for m in moments]
     lengths = np.max(
         [np.maximum(np.linalg.norm(p, axis=-1), m.shares) for p, m in zip(parts, moments, strict=True)], axis=0
@@ -168,7 +171,7 @@ def contributions(study: Volumetric) -> str:
         return svg(figure)
 
 
-def shown(study: Volumetric) -> list[Moment]:
+def choose_moments(study: Volumetric) -> list[Moment]:
     """Return the moments that find room on a page: the one with the largest error is always among them."""
     others = [m for m in study.moments if m is not study.worst][: MAX_MOMENTS - 1]
     return [m for m in study.moments if m is study.worst or m in others]

@@ -15,9 +15,9 @@ from matplotlib.quiver import Quiver
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from thermocomp.assessment.volumetric import Moment, Volumetric, over_travel
+from thermocomp.assessment.volumetric import Moment, Volumetric, lay_grid
 from thermocomp.report.figures import MEASURED, drawing, svg
-from thermocomp.report.volumetric_figures import SMALL, WIDTH, shown
+from thermocomp.report.volumetric_figures import SMALL, WIDTH, choose_moments
 
 FloatArray = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ _Section = tuple[int, int, FloatArray, FloatArray, FloatArray, FloatArray]
 
 def boxes(study: Volumetric) -> str:
     """Show how the work volume is bent in each state, and what the straight lines of the axes leave of it."""
-    moments = shown(study)
-    travels = over_travel(study.machine, 2).reshape(-1, 3)
+    moments = choose_moments(study)
+    travels = lay_grid(study.machine, 2).reshape(-1, 3)
     largest = max(SMALL, *(m.straight.before.largest for m in moments))
     with drawing("boxes"):
         axes: NDArray[np.object_]
@@ -143,7 +143,7 @@ def _bent(
         ax.add_collection(
             LineCollection(list(pieces), colors=colour, linewidths=0.6 if face else 1.9, capstyle="round")
         )
-    travels = over_travel(study.machine, 2).reshape(-1, 3)
+    travels = lay_grid(study.machine, 2).reshape(-1, 3)
     found = error(travels)
     start, way = _seen(travels), _seen(1e-3 * magnified * found)
     ax.quiver(
@@ -259,7 +259,7 @@ def _scale(ax: Axes, study: Volumetric, magnified: float, largest: float) -> Non
     """Draw how long an error of a round number of um is."""
     size = _nice(0.7 * largest)
     length = 1e-3 * size * magnified
-    corners = _seen(over_travel(study.machine, 2).reshape(-1, 3))
+    corners = _seen(lay_grid(study.machine, 2).reshape(-1, 3))
     x, y = corners[:, 0].min(), corners[:, 1].min() - 0.12 * float(np.ptp(corners[:, 1]))
     ax.plot([x, x + length], [y, y], color=MEASURED, lw=1.6, marker="|", ms=6)
     ax.text(

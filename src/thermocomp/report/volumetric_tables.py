@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.assessment.volumetric import Moment, Volumetric, models_of, told_by
+from thermocomp.assessment.volumetric import Moment, Volumetric, describe_source, models_of
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.machine import Vector
 from thermocomp.report.layout import Column, Layout
@@ -141,7 +141,7 @@ def listed(study: Volumetric) -> list[dict[str, Any]]:
             "code": c.code,
             "description": c.description,
             "unit": c.unit,
-            "source": told_by(study.machine.components.get(c.code)),
+            "source": describe_source(study.machine.components.get(c.code)),
             "values": [float(study.course.values[m.row, INDEX[c.code]]) for m in study.moments],
         }
         for c in COMPONENTS

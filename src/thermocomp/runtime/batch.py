@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import Gathered, begin, centre, first_rows
-from thermocomp.runtime.gate import implausible, plausible
-from thermocomp.runtime.limits import limited
+from thermocomp.core.zero import Gathered, find_zero, first_rows, robust_mean
+from thermocomp.runtime.gate import explain_implausible, find_plausible_range
+from thermocomp.runtime.limits import limit_offset
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-class Run(NamedTuple):
+class ModelRun(NamedTuple):
     """What a model says in a test, and what a compensator with it does."""
 
     deviation: FloatArray  #: (n_rows,), of the model alone: every complete reading is used, nothing is limited
@@ -40,7 +40,7 @@ def run(
     reference: Sequence[float] | FloatArray | None = None,
     resting: BoolArray | None = None,
     anew: int | None = None,
-) -> Run:
+) -> ModelRun:
     """Run a model, and a compensator with it, through a test.
 
     Parameters
@@ -68,7 +68,7 @@ def run(
     stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
     complete = np.asarray(np.isfinite(values).all(axis=1))
     gate = _gated(model, time, values, stands, model.init(reference).reference)
-    zero, rested = begun(model, time, values, stands, complete, reference)
+    zero, rested = find_test_zero(model, time, values, stands, complete, reference)
     alone, outside = _said(model, time, rested, complete, zero)
     same = np.array_equal(gate.passed, complete)
     gated = alone if same else _said(model, time, *_of_gate(values, gate))[0]
@@ -76,10 +76,10 @@ def run(
     if anew is not None:
         alone, _ = _counted(alone, model, time, complete, stands, anew)
         gated, known = _counted(gated, model, time, gate.passed, stands, anew)
-    return Run(alone, _moved(gated, gate.passed, time, limits, known), outside, complete & ~gate.passed, gate.why)
+    return ModelRun(alone, _moved(gated, gate.passed, time, limits, known), outside, complete & ~gate.passed, gate.why)
 
 
-def begun(
+def find_test_zero(
     model: ErrorModel,
     time: FloatArray,
     values: FloatArray,
@@ -106,7 +106,7 @@ def begun(
     values : ndarray of shape (n_rows, n_inputs)
         With the readings of the zero taken as their mean.
     """
-    return begin(model.zeroing, model.init(reference).reference, time, values, resting, usable)
+    return find_zero(model.zeroing, model.init(reference).reference, time, values, resting, usable)
 
 
 class _Gate(NamedTuple):
@@ -121,7 +121,7 @@ def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, Fl
     """Return the readings with those of the zero taken as their mean, which of them pass, and the zero."""
     rested = values.copy()
     if gate.window:
-        rested[gate.window] = centre(values[gate.window])
+        rested[gate.window] = robust_mean(values[gate.window])
     return rested, gate.passed, gate.zero
 
 
@@ -132,7 +132,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
     if np.isnan(zero).any():  # the first readings that pass decide what counts as zero
         gathered, known = Gathered(), len(time)
         for row in np.flatnonzero(complete).tolist():
-            found = implausible(model, values[row].tolist(), zero.tolist())
+            found = explain_implausible(model, values[row].tolist(), zero.tolist())
             if found:
                 passed[row], why = False, why or found
                 continue
@@ -144,15 +144,15 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
             known = row
             break
         if gathered.times:
-            zero = np.where(np.isnan(zero), centre(gathered.values), zero)
+            zero = np.where(np.isnan(zero), robust_mean(gathered.values), zero)
     later = slice(min(known + 1, len(time)) if known else 0, None)
-    bounds = [plausible(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
+    bounds = [find_plausible_range(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
     low, high = np.array(bounds).reshape(-1, 2).T
     with np.errstate(invalid="ignore"):
         passed[later] &= ((values[later] >= low) & (values[later] <= high)).all(axis=1)
     turned = np.flatnonzero(complete & ~passed)
     if turned.size and not why:
-        why = implausible(model, values[turned[0]].tolist(), zero.tolist())
+        why = explain_implausible(model, values[turned[0]].tolist(), zero.tolist())
     return _Gate(passed, zero, known, why, window)
 
 
@@ -200,6 +200,6 @@ def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: L
     for k in range(known, len(time)):
         if passed[k] and math.isfinite(deviation[k]):
             wanted = Correction.opposing(Deviation(float(deviation[k])))
-            offset = limited(wanted.offset, offset, travels[k], limits)
+            offset = limit_offset(wanted.offset, offset, travels[k], limits)
         found[k] = 0.0 - offset
     return found

@@ -21,9 +21,9 @@ from thermocomp.core.machine import Machine
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
-from thermocomp.core.zero import Gathered, centre
-from thermocomp.runtime.gate import implausible, untimely
-from thermocomp.runtime.limits import limited_line
+from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.runtime.gate import explain_implausible, explain_untimely
+from thermocomp.runtime.limits import limit_line
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import best_line, best_lines
 
@@ -49,7 +49,7 @@ class Compensated(NamedTuple):
     outside: tuple[str, ...]  #: inputs outside the trained range of a model
 
 
-class Line(NamedTuple):
+class DeviationLine(NamedTuple):
     """What some models together say of one target or axis, in the form that controllers take."""
 
     models: slice  #: which they are, of the compensator's models
@@ -78,7 +78,7 @@ class Compensator:
     """
 
     models: tuple[ErrorModel, ...]
-    lines: dict[str, Line]
+    lines: dict[str, DeviationLine]
     limits: Limits = Limits()
 
     def __post_init__(self) -> None:
@@ -105,17 +105,17 @@ class Compensator:
         if len(set(targets)) != len(targets):
             raise InputError(f"two models for the same target among {', '.join(targets)}")
         models: list[ErrorModel] = []
-        lines: dict[str, Line] = {}
+        lines: dict[str, DeviationLine] = {}
         for source in sources:
             if source.unit != "um":
                 raise InputError(f"model of {source.target} predicts {source.unit}; a compensator corrects um")
             begin = len(models)
             if isinstance(source, PositionModel):
                 models += source.models
-                lines[source.target] = Line(slice(begin, len(models)), source.travel, _straight(source))
+                lines[source.target] = DeviationLine(slice(begin, len(models)), source.travel, _straight(source))
             else:
                 models.append(source)
-                lines[source.target] = Line(slice(begin, len(models)), (0.0, 0.0), _constant)
+                lines[source.target] = DeviationLine(slice(begin, len(models)), (0.0, 0.0), _constant)
         return cls(tuple(models), lines, limits)
 
     @classmethod
@@ -147,7 +147,7 @@ class Compensator:
 
         every = slice(0, len(model.stack.models))
         axes = [machine.axis(name) for name in "XYZ" if name in machine.structure.axes]
-        return cls(model.stack.models, {a.name: Line(every, a.travel, along(a.name)) for a in axes}, limits)
+        return cls(model.stack.models, {a.name: DeviationLine(every, a.travel, along(a.name)) for a in axes}, limits)
 
     def start(self) -> CompensatorState:
         """Return the state of a compensator that has seen no reading: all corrections are zero."""
@@ -178,12 +178,12 @@ class Compensator:
         -------
         str
         """
-        why = untimely(reading, state.time, now, self.limits)
+        why = explain_untimely(reading, state.time, now, self.limits)
         for model, memory in zip(self.models, state.models, strict=True):
             if why:
                 break
             values = [reading.values.get(i.name) for i in model.inputs]
-            why = implausible(model, values, memory.reference.tolist())
+            why = explain_implausible(model, values, memory.reference.tolist())
         return why
 
     def step(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Compensated]:
@@ -227,7 +227,7 @@ class Compensator:
             told = said[line.models]
             if all(map(math.isfinite, told)):
                 wanted = Correction.opposing(line.deviation(told))
-                corrections[target] = limited_line(wanted, corrections[target], line.travel, travel, self.limits)
+                corrections[target] = limit_line(wanted, corrections[target], line.travel, travel, self.limits)
         new = CompensatorState(tuple(states), corrections, reading.time, _later(state.clock, now), tuple(begins))
         return new, Compensated(corrections, "", tuple(dict.fromkeys(outside)))
 
@@ -269,8 +269,8 @@ def _zeroed(
         gathered = gathered.add(*reading)
         if not gathered.complete(model.zeroing):
             return memory, gathered, False, values
-        values = centre(gathered.values)
-    mean, last = centre(gathered.values), gathered.times[0]
+        values = robust_mean(gathered.values)
+    mean, last = robust_mean(gathered.values), gathered.times[0]
     memory = memory._replace(reference=np.where(np.isnan(memory.reference), mean, memory.reference))
     for time in before.times:
         memory, _ = model.step(memory, mean, time - last)

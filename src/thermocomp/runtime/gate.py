@@ -33,7 +33,7 @@ WIDE = 10.0
 CLOCK_SKEW = 1.0
 
 
-def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
+def explain_implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
     """Say which value of a reading must not be used and why; the empty string if all may.
 
     Parameters
@@ -52,7 +52,7 @@ def implausible(model: ErrorModel, values: Sequence[object], reference: Sequence
     for channel, value, zero in zip(model.inputs, values, reference, strict=True):
         if value is None:
             return f"{channel.name} is missing"
-        low, high = plausible(channel, zero)
+        low, high = find_plausible_range(channel, zero)
         # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
         if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
             return f"{channel.name} = {value} {channel.unit} is not plausible"
@@ -73,7 +73,7 @@ def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
     return ""
 
 
-def untimely(reading: Reading, last: float | None, now: float, limits: Limits) -> str:
+def explain_untimely(reading: Reading, last: float | None, now: float, limits: Limits) -> str:
     """Say why a reading comes at a wrong time; the empty string if it does not.
 
     Parameters
@@ -100,7 +100,7 @@ def untimely(reading: Reading, last: float | None, now: float, limits: Limits) -
     return ""
 
 
-def plausible(channel: Input, zero: float) -> tuple[float, float]:
+def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
     """Return the range outside which a value says that the sensor is broken, not that the machine is warm.
 
     `zero` is what counts as zero now; nan while it is not known.

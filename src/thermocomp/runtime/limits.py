@@ -5,7 +5,7 @@ import math
 from thermocomp.core.correction import Correction, Limits
 
 
-def limited(target: float, current: float, dt: float, limits: Limits) -> float:
+def limit_offset(target: float, current: float, dt: float, limits: Limits) -> float:
     """Move a correction towards its target as far as the limits allow.
 
     Parameters
@@ -35,7 +35,7 @@ def limited(target: float, current: float, dt: float, limits: Limits) -> float:
     return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))
 
 
-def limited_line(
+def limit_line(
     target: Correction, current: Correction, travel: tuple[float, float], dt: float, limits: Limits
 ) -> Correction:
     """Move a correction with a slope towards its target as far as the limits allow at both ends of the travel.
@@ -61,7 +61,7 @@ def limited_line(
     """
     low, high = travel
     if low == high or target.slope == current.slope == 0.0:
-        return Correction(limited(target.offset, current.offset, dt, limits), 0.0, target.reference_position)
-    at_low, at_high = (limited(target.at(p), current.at(p), dt, limits) for p in travel)
+        return Correction(limit_offset(target.offset, current.offset, dt, limits), 0.0, target.reference_position)
+    at_low, at_high = (limit_offset(target.at(p), current.at(p), dt, limits) for p in travel)
     slope = (at_high - at_low) / (high - low)  # um/mm
     return Correction(at_low + slope * (target.reference_position - low), 1e3 * slope, target.reference_position)

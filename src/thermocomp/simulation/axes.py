@@ -19,7 +19,7 @@ STATIONS = {"x": tuple(range(0, 601, 100)), "y": tuple(range(0, 551, 50)), "z": 
 N_HATS = 7
 
 
-def between(axis: str, positions: ArrayLike) -> FloatArray:
+def weigh_stations(axis: str, positions: ArrayLike) -> FloatArray:
     """Return the weights of an axis' stations in what is between them: cubic pieces with a continuous slope.
 
     Parameters

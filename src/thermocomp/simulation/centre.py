@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.heat import HeatSources
-from thermocomp.simulation.joints import Joints, play
+from thermocomp.simulation.joints import Joints, slide_with_friction
 from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
@@ -163,7 +163,7 @@ class MachiningCentre:
         place = dict(zip(self.places, temperatures.T, strict=True))
         index = {name: k for k, name in enumerate(self.observables)}
         wish = observables[:, index["slide"]]
-        slide = play(slid, wish, self.joints.stiction)
+        slide = slide_with_friction(slid, wish, self.joints.stiction)
         shaft = self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
         # What the foot does not slide, the column is pushed.
         observables[:, index["z"]] += self.joints.share * (slide - wish) - shaft

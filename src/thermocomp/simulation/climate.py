@@ -128,12 +128,12 @@ def wandering(state: FloatArray, keep: FloatArray, kicks: FloatArray) -> tuple[F
         After the last step.
     paths : ndarray of shape (n_steps, n_paths)
     """
-    first = remember(keep, np.sqrt((1.0 - keep**2) * (1.0 + keep) ** 2 / (1.0 + keep**2)) * kicks, state[0])
-    second = remember(keep, (1.0 - keep) * first, state[1])
+    first = filter_first_order(keep, np.sqrt((1.0 - keep**2) * (1.0 + keep) ** 2 / (1.0 + keep**2)) * kicks, state[0])
+    second = filter_first_order(keep, (1.0 - keep) * first, state[1])
     return np.array([first[-1], second[-1]]), second
 
 
-def remember(keep: FloatArray, added: FloatArray, before: FloatArray) -> FloatArray:
+def filter_first_order(keep: FloatArray, added: FloatArray, before: FloatArray) -> FloatArray:
     """Return ``y[k] = keep y[k-1] + added[k]`` with ``y[-1] = before``, without a loop over the steps.
 
     Parameters

@@ -8,14 +8,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.instruments import Instrument
 from thermocomp.simulation.kits import Kit
 from thermocomp.simulation.machine import Truth, VirtualMachine
-from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Programme, stream
-from thermocomp.simulation.sensors import Fault, follow, read, with_faults
+from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Programme, make_seed
+from thermocomp.simulation.sensors import Fault, apply_lags, read, with_faults
 from thermocomp.simulation.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
@@ -105,7 +105,7 @@ def simulate(
     machine = MACHINES[experiment.machine]()
 
     def test(programme: Programme) -> SimulatedTest:
-        weather, noise = (np.random.default_rng(stream(seed, programme.name, what)) for what in ("weather", "noise"))
+        weather, noise = (np.random.default_rng(make_seed(seed, programme.name, what)) for what in ("weather", "noise"))
         options: dict[str, Any] = {"sensor_noise": sensor_noise, "faults": faults, "whole": whole}
         return run(machine, experiment.kit, programme, weather, noise, **options)
 
@@ -177,7 +177,7 @@ def run(
         sky, air = programme.climate.air(sky, first * tick, tick, len(part), weather)
         state, done = machine.run(state, part, air, tick)
         values = _values(done, air, weights)
-        followed = follow(lags, felt, true, values, tick)
+        followed = apply_lags(lags, felt, true, values, tick)
         felt, true = followed[-1], values[-1]
         rows = slice(1 + first // every, 1 + (first + len(part)) // every)
         recorded[rows, : len(sensors)] = read(sensors, followed[every - 1 :: every] + shift, time[rows], noise)
@@ -224,7 +224,7 @@ def _weights(machine: VirtualMachine[S], instruments: Sequence[Instrument]) -> F
     for k, instrument in enumerate(instruments):
         for name, weight in instrument.reads.items():
             if name not in names:
-                raise unknown("value", name, names)
+                raise explain_unknown("value", name, names)
             weights[names[name], k] = weight
         weights[-3:, k] = instrument.air
     return weights

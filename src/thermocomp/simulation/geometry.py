@@ -81,7 +81,7 @@ SQUARENESS = {"C0Y": 14.0, "B0Z": -21.0, "A0Z": 17.0}
 SAG = 2.0
 
 
-def cold(code: str, points: FloatArray) -> FloatArray:
+def find_cold_component(code: str, points: FloatArray) -> FloatArray:
     """Return a component of an axis in the cold machine.
 
     Parameters

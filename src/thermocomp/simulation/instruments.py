@@ -15,7 +15,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.simulation.axes import AXES, TRAVEL
 from thermocomp.simulation.kits import Kit, check_labels
 from thermocomp.simulation.machine import Air
-from thermocomp.simulation.probes import Probe, touched
+from thermocomp.simulation.probes import Probe, weigh_tool_point
 from thermocomp.simulation.sensors import Sensor
 
 FloatArray = NDArray[np.float64]
@@ -171,7 +171,7 @@ class Touch:
                     noise=0.0 if perfect else self.noise,
                     resolution=0.0 if perfect else self.resolution,
                 ),
-                touched(axis, dict(zip(AXES, point, strict=True))),
+                weigh_tool_point(axis, dict(zip(AXES, point, strict=True))),
                 zeroed=True,
                 touches=True,
             )

@@ -45,7 +45,7 @@ class Joints:
         return result
 
 
-def play(slid: float, wish: FloatArray, stiction: float) -> FloatArray:
+def slide_with_friction(slid: float, wish: FloatArray, stiction: float) -> FloatArray:
     """Return how far a part has slid that follows its wish, but for the friction that holds it.
 
     Parameters

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from thermocomp.core.exceptions import SettingError, unknown
+from thermocomp.core.exceptions import SettingError, explain_unknown
 from thermocomp.simulation.axes import AXES, STATIONS
 from thermocomp.simulation.geometry import SQUARENESS
 from thermocomp.simulation.heat import HeatSources
@@ -18,8 +18,8 @@ from thermocomp.simulation.probes import (
     at_position,
     component,
     laser,
+    make_squareness_probe,
     pitch,
-    square,
     station,
     station_name,
 )
@@ -127,7 +127,7 @@ class Kit:
             raise SettingError(f"{name!r} turns: it can only be calculated, with perfect = true")
         known = {**self.places, **self.inner} if perfect else self.places
         if name not in known:
-            raise unknown("place", name, [*known, *self.outfits])
+            raise explain_unknown("place", name, [*known, *self.outfits])
         return known[name]
 
     def probe(self, name: str | Mapping[str, float]) -> Probe:
@@ -141,7 +141,7 @@ class Kit:
         if not isinstance(name, str):
             for observable in name:
                 if observable not in self.observables:
-                    raise unknown("observable", observable, self.observables)
+                    raise explain_unknown("observable", observable, self.observables)
             return Probe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
         if name in self.probes:
             return self.probes[name]
@@ -153,7 +153,7 @@ class Kit:
             return component(code, float(at), *([float(z)] if z else []))
         found = re.fullmatch(r"([xyz])_(laser|at)_(\d+)", name) if self.top_speed else None
         if not found:
-            raise unknown("probe", name, [*self.probes, *self.nests])
+            raise explain_unknown("probe", name, [*self.probes, *self.nests])
         axis, kind, position = found.groups()
         return (laser if kind == "laser" else at_position)(axis, float(position))
 
@@ -221,7 +221,7 @@ def _profile(code: str) -> tuple[str, ...]:
 CENTRE = Kit(
     places=PLACES | {f"{p}_low": words.replace("upper", "lower") for p, words in _COLUMN.items()},
     air={"air": Air.REFERENCE_HEIGHT, "air_top": 2.6, "air_floor": 0.2},
-    probes=NEST | SPINDLE | {code: square(code) for code in SQUARENESS},
+    probes=NEST | SPINDLE | {code: make_squareness_probe(code) for code in SQUARENESS},
     observables=(
         *("x", "y", "z", "a", "b", "nose", "tip", "slide"),
         *(station_name(a, p) for a in AXES for p in STATIONS[a]),

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import SettingError
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL, between
-from thermocomp.simulation.geometry import SQUARENESS, cold, cold_profile
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_POSITION, TRAVEL, weigh_stations
+from thermocomp.simulation.geometry import SQUARENESS, cold_profile, find_cold_component
 
 FloatArray = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ def pitch(position: int) -> Probe:
     return Probe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
 
 
-def touched(axis: str, point: Mapping[str, float]) -> dict[str, float]:
+def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
     """Return the weights of the observables in the tool point's deviation along an axis, wherever the axes stand.
 
     What Z and X do across themselves is not in it: the machine does not tell.
@@ -122,7 +122,7 @@ def touched(axis: str, point: Mapping[str, float]) -> dict[str, float]:
 def at_position(axis: str, position: float) -> Probe:
     """Return a displacement probe at the tip of the test bar, with the axis at a position [mm]."""
     where = f"{axis.upper()} at the tip of the test bar with the {axis.upper()} axis at {position:g} mm"
-    return Probe(where, touched(axis, {axis: position}))
+    return Probe(where, weigh_tool_point(axis, {axis: position}))
 
 
 #: what an axis does, along or about which axis; the codes of ISO 230-1 end with the axis
@@ -182,7 +182,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
         raise SettingError(f"{code} cannot be measured with Z at {z:g} mm: only X can")
     test, point = (np.array([TEST_POSITION[a] for a in AXES], dtype=np.float64) for _ in range(2))
     point[AXES.index(axis)], point[2] = position, position if axis == "z" else z
-    weights, geometry = _between_two(code, position), float(cold(code, point))
+    weights, geometry = _between_two(code, position), float(find_cold_component(code, point))
     if unit == "um":
         for turn, arm in swing(code[1], point - test):
             # of the axes nearer to the workpiece, which stand still; of X itself if Z stands elsewhere
@@ -191,7 +191,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
         if axis == "x":
             for turn, arm in swing(code[1], np.array([0.0, 0.0, z - TEST_POSITION["z"]])):
                 weights = _summed((1.0, weights), (arm, _between_two(f"E{turn}X", position)))
-                geometry += arm * float(cold(f"E{turn}X", point))
+                geometry += arm * float(find_cold_component(f"E{turn}X", point))
     aside = "" if z == TEST_POSITION["z"] else f", Z at {z:g} mm"
     words = f"{code}: {MOTIONS[code[:2]]} of {axis.upper()} at {position:g} mm{aside}"
     return Probe(words, weights, geometry, unit, SIX_NOISE[unit], zeroed=False)
@@ -200,7 +200,7 @@ def component(code: str, position: float, z: float = TEST_POSITION["z"]) -> Prob
 def _between_two(code: str, position: float) -> dict[str, float]:
     """Return the weights of the observables in what a component is at a position less that at the test position."""
     axis = code[2].lower()
-    weights = between(axis, [position])[0] - between(axis, [TEST_POSITION[axis]])[0]
+    weights = weigh_stations(axis, [position])[0] - weigh_stations(axis, [TEST_POSITION[axis]])[0]
     found = zip(STATIONS[axis], weights.tolist(), strict=True)
     return {name: w for p, w in found if w for name in station(code, p)}
 
@@ -229,7 +229,7 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
     return [(turn, arm) for turn, arm in arms[along] if arm]
 
 
-def square(code: str) -> Probe:
+def make_squareness_probe(code: str) -> Probe:
     """Return the squareness of two axes at 20 degC, by an artefact; what heat does is in the lasers' straightness."""
     return Probe(f"{code}: squareness at 20 degC, artefact", {}, SQUARENESS[code], "urad", SIX_NOISE["urad"])
 

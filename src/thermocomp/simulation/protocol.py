@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from thermocomp.core.exceptions import SettingError, unknown
+from thermocomp.core.exceptions import SettingError, explain_unknown
 from thermocomp.core.machine import Channel
 from thermocomp.simulation.climate import Climate
 from thermocomp.simulation.instruments import Instrument, Touch, displacement, thermometer
 from thermocomp.simulation.kits import KITS, Kit, labelled
-from thermocomp.simulation.segments import Path, Segment, Stretch, values
+from thermocomp.simulation.segments import Path, SteadySegment, Stretch, values
 from thermocomp.simulation.sensors import Fault
 
 HOUR = 3600.0
@@ -30,7 +30,7 @@ MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup:
+class RecordingSetup:
     """What is recorded of a test, and where it stands.
 
     Parameters
@@ -79,10 +79,10 @@ class Setup:
             A place or probe is not there, or two channels have the same name.
         """
         perfect = self.perfect
-        with within("places"):
+        with add_path("places"):
             places = labelled(self.places, kit.outfits)
             found = [thermometer(kit, n, p, perfect=perfect, noise=noise) for n, p in places.items()]
-        with within("probes"):
+        with add_path("probes"):
             probes = labelled(self.probes, kit.nests)
             found += [displacement(n, kit.probe(p), perfect=perfect) for n, p in probes.items()]
         if self.touch:
@@ -97,7 +97,7 @@ class Setup:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Programme(Setup):
+class Programme(RecordingSetup):
     """One test that is ready to run; beside what `Setup` says of it.
 
     Parameters
@@ -110,8 +110,8 @@ class Programme(Setup):
     """
 
     name: str
-    segments: tuple[Segment, ...]
-    soak: tuple[Segment, ...] = (Segment(12 * HOUR),)
+    segments: tuple[SteadySegment, ...]
+    soak: tuple[SteadySegment, ...] = (SteadySegment(12 * HOUR),)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -120,7 +120,7 @@ class Programme(Setup):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(Setup, Stretch):
+class Plan(RecordingSetup, Stretch):
     """One test as it is written, or several alike; beside what `Setup` and `Stretch` say of it.
 
     Parameters
@@ -139,7 +139,7 @@ class Plan(Setup, Stretch):
     soak: Stretch = field(default_factory=lambda: Stretch(duration=12 * HOUR))
 
     def __post_init__(self) -> None:
-        Setup.__post_init__(self)
+        RecordingSetup.__post_init__(self)
         Stretch.__post_init__(self)
         if not 1 <= self.copies <= MOST_COPIES:
             raise SettingError(f"must be from 1 to {MOST_COPIES}", ("copies",))
@@ -163,7 +163,7 @@ class Plan(Setup, Stretch):
 
     def programme(self, name: str, rng: np.random.Generator) -> Programme:
         """Return a test that is ready to run, with all that is left open drawn by lot."""
-        setup = {f.name: getattr(self, f.name) for f in fields(Setup)}
+        setup = {f.name: getattr(self, f.name) for f in fields(RecordingSetup)}
         return Programme(name=name, segments=tuple(self.draw(rng)), soak=tuple(self.soak.draw(rng)), **setup)
 
     def check(self, kit: Kit) -> None:
@@ -172,7 +172,7 @@ class Plan(Setup, Stretch):
         channels += [c.name for c in (SPEED, FEED) if kit.top_speed]
         for k, fault in enumerate(self.faults):
             if fault.channel not in channels:
-                raise unknown("channel", fault.channel, channels, ("faults", k, "channel"))
+                raise explain_unknown("channel", fault.channel, channels, ("faults", k, "channel"))
         for path, given in (*self.leaves(), *((("soak", *path), given) for path, given in self.soak.leaves())):
             if given.get("speed") and not kit.top_speed:
                 raise SettingError("the machine has no spindle", (*path, "speed"))
@@ -185,7 +185,7 @@ class Plan(Setup, Stretch):
                 raise SettingError("the machine has no axes", (*path, "feed"))
             for place in given.get("loads", {}):
                 if place not in kit.loads:
-                    raise unknown("load", place, kit.loads, (*path, "loads"))
+                    raise explain_unknown("load", place, kit.loads, (*path, "loads"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,11 +209,11 @@ class Experiment:
 
     def __post_init__(self) -> None:
         if self.machine not in KITS:
-            raise unknown("machine", self.machine, KITS, ("machine",))
+            raise explain_unknown("machine", self.machine, KITS, ("machine",))
         if not self.tests:
             raise SettingError("an experiment needs a test", ("tests",))
         for k, plan in enumerate(self.tests):
-            with within("tests", k):
+            with add_path("tests", k):
                 plan.check(self.kit)
         names = self.names
         for k, name in enumerate(names):
@@ -239,18 +239,18 @@ class Experiment:
         """Return the tests, with all that is left open drawn by lot; each test has lots of its own."""
         plans = [plan for plan in self.tests for _ in range(plan.copies)]
         return [
-            plan.programme(name, np.random.default_rng(stream(seed, name, "lots")))
+            plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))
             for name, plan in zip(self.names, plans, strict=True)
         ]
 
 
-def stream(seed: int, test: str, what: str) -> list[int]:
+def make_seed(seed: int, test: str, what: str) -> list[int]:
     """Return the seed of one kind of chance in one test: no test, and no kind, depends on the others."""
     return [seed, *f"{test}/{what}".encode()]
 
 
 @contextmanager
-def within(*path: str | int) -> Iterator[None]:
+def add_path(*path: str | int) -> Iterator[None]:
     """Add where it stands to a `SettingError` that is raised inside."""
     try:
         yield

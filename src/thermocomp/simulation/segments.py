@@ -21,7 +21,7 @@ MOST_VALUES, MOST_REPEATS = 10_000, 10_000
 
 
 @dataclass(frozen=True)
-class Segment:
+class SteadySegment:
     """A stretch of a test in which everything stays as it is.
 
     Parameters
@@ -193,7 +193,7 @@ class Stretch:
         for k, s in enumerate(self.segments):
             yield from s.leaves(given, (*path, "segments", k))
 
-    def draw(self, rng: np.random.Generator, outer: Mapping[str, Any] | None = None) -> list[Segment]:
+    def draw(self, rng: np.random.Generator, outer: Mapping[str, Any] | None = None) -> list[SteadySegment]:
         """Return the segments, with all that is left open drawn by lot."""
         given = self._given(outer or {})
         if not self.segments:
@@ -220,7 +220,7 @@ def _drawn(number: Number, rng: np.random.Generator) -> float:
     return number.values[rng.integers(len(number.values))] if isinstance(number, Lot) else number
 
 
-def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> Segment:
+def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> SteadySegment:
     feed, stroke = given.get("feed", Feed()), given.get("stroke", Stroke())
     # The order of the draws is part of the protocol: duration first.
     duration = _drawn(given["duration"], rng)
@@ -236,4 +236,4 @@ def _segment(given: Mapping[str, Any], rng: np.random.Generator) -> Segment:
         cooled=given.get("cooled", True),
         powered=powered,
     )
-    return Segment(duration, drive)
+    return SteadySegment(duration, drive)

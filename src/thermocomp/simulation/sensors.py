@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.machine import Channel
-from thermocomp.simulation.climate import DAY, remember
+from thermocomp.simulation.climate import DAY, filter_first_order
 
 FloatArray = NDArray[np.float64]
 FaultKind = Literal["stuck", "lost", "drift", "spike"]
@@ -44,7 +44,7 @@ class Sensor:
     drift: float = 0.0
 
 
-def follow(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
+def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
     """Return what sensors feel that lag behind the truth.
 
     Parameters
@@ -70,7 +70,7 @@ def follow(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatAr
         new = 1.0 - lags[slow] / dt * (1.0 - keep)
         now = true[:, slow]
         past = np.vstack([before[slow], now[:-1]])
-        said[:, slow] = remember(keep, new * now + (1.0 - keep - new) * past, felt[slow])
+        said[:, slow] = filter_first_order(keep, new * now + (1.0 - keep - new) * past, felt[slow])
     return said
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.simulation.joints import play
+from thermocomp.simulation.joints import slide_with_friction
 from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
@@ -112,7 +112,7 @@ class RestingTool:
                 watched = float(after[-1])
         observables = self._linear(fields)
         wish = self._wish(observables)
-        slipped = play(state.slipped, wish, self.stiction)
+        slipped = slide_with_friction(state.slipped, wish, self.stiction)
         observables[:, self.observables.index("s1")] += slipped - wish
         ends = slice(parts - 1, None, parts)
         truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, between
-from thermocomp.simulation.geometry import SQUARENESS, cold
+from thermocomp.simulation.axes import AXES, STATIONS, TEST_BAR, TEST_POSITION, weigh_stations
+from thermocomp.simulation.geometry import SQUARENESS, find_cold_component
 from thermocomp.simulation.probes import COMPONENTS, station
 
 FloatArray = NDArray[np.float64]
@@ -47,7 +47,7 @@ class VolumetricTruth:
             row = np.zeros(len(observables))
             row[index[name]] = 1.0
             for axis in AXES:
-                row -= self._stations[f"E{code[0]}{axis.upper()}"] @ between(axis, [TEST_POSITION[axis]])[0]
+                row -= self._stations[f"E{code[0]}{axis.upper()}"] @ weigh_stations(axis, [TEST_POSITION[axis]])[0]
             self._spindle[code] = row
 
     def components(self, rows: FloatArray, points: ArrayLike) -> dict[str, FloatArray]:
@@ -69,11 +69,11 @@ class VolumetricTruth:
         """
         points = np.asarray(points, dtype=np.float64)
         found = {}
-        weights = {axis: between(axis, points[:, k]) for k, axis in enumerate(AXES)}
+        weights = {axis: weigh_stations(axis, points[:, k]) for k, axis in enumerate(AXES)}
         for code in COMPONENTS:
             found[code] = np.einsum("...k,...k->...", rows @ self._stations[code], weights[code[2].lower()])
             if self.geometry:
-                found[code] = found[code] + cold(code, points)
+                found[code] = found[code] + find_cold_component(code, points)
         for code, value in SQUARENESS.items():
             found[code] = np.full(len(points), value if self.geometry else 0.0)
         for code, row in self._spindle.items():

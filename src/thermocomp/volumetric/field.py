@@ -55,7 +55,7 @@ class ErrorField:
         InputError
             A position is not finite.
         """
-        places = finite("positions", points)
+        places = check_finite("positions", points)
         xyz = coordinates(places)
         # component by component in memory: each is computed at all points in one go
         values = np.empty((len(self.uniform), *places.shape[:-1]))
@@ -89,7 +89,7 @@ class ErrorField:
         places = np.asarray(points, dtype=np.float64)
         values = self.components(places)
         if tool is not None:
-            finite("tool", tool)
+            check_finite("tool", tool)
         if exact:
             return transforms.error(self.kinematics.machine, values, places, tool)
         return self.kinematics.synthesize(values, places, tool)[0]
@@ -146,7 +146,7 @@ class ErrorField:
         travel the correction at its end is held: nothing was measured there, and levers and slopes must not go on.
         """
         machine = self.kinematics.machine
-        places = np.clip(finite("positions", points), *self.kinematics.travel)
+        places = np.clip(check_finite("positions", points), *self.kinematics.travel)
         there = np.array([float(a in machine.structure.axes) for a in "XYZ"])
         found = 0.0 - there * self.error(places, tool)
         for _ in range(_STEPS):
@@ -179,10 +179,12 @@ class ErrorField:
         InputError
             A position or the tool is not finite.
         """
-        return self.kinematics.sensitivity(finite("position", point), None if tool is None else finite("tool", tool))
+        return self.kinematics.sensitivity(
+            check_finite("position", point), None if tool is None else check_finite("tool", tool)
+        )
 
 
-def finite(what: str, numbers: ArrayLike) -> FloatArray:
+def check_finite(what: str, numbers: ArrayLike) -> FloatArray:
     """Return an array of positions or a tool [mm]; raise `InputError` if a number in it is not finite."""
     found = np.asarray(numbers, dtype=np.float64)
     if not np.isfinite(found).all():

@@ -15,10 +15,10 @@ _NEAR = 1e-3
 
 def notes(machine: Machine) -> tuple[str, ...]:
     """Return what is to be said of a machine, in sentences: `untilted`, `counted_twice`, `held`."""
-    return (*untilted(machine), *counted_twice(machine), *held(machine))
+    return (*note_untilted(machine), *note_counted_twice(machine), *note_short_profiles(machine))
 
 
-def untilted(machine: Machine) -> tuple[str, ...]:
+def note_untilted(machine: Machine) -> tuple[str, ...]:
     """Return that the spindle's tilt is not known though the tool is not as long as what its drift was measured with.
 
     Parameters
@@ -37,7 +37,7 @@ def untilted(machine: Machine) -> tuple[str, ...]:
     )
 
 
-def counted_twice(machine: Machine) -> tuple[str, ...]:
+def note_counted_twice(machine: Machine) -> tuple[str, ...]:
     """Return the turns that were not zero while another axis was measured.
 
     An instrument between table and spindle that measures an axis j sees what the turn of an axis i nearer to the
@@ -78,7 +78,7 @@ def counted_twice(machine: Machine) -> tuple[str, ...]:
     return tuple(found)
 
 
-def held(machine: Machine) -> tuple[str, ...]:
+def note_short_profiles(machine: Machine) -> tuple[str, ...]:
     """Return the profiles and slopes that are known in a part of the travel only, one sentence each."""
     found = []
     for code, source in machine.components.items():

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.machine import Vector
 from thermocomp.core.size import Size
-from thermocomp.volumetric.field import ErrorField, finite
+from thermocomp.volumetric.field import ErrorField, check_finite
 
 FloatArray = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ def straight_lines(
     What a correction c leaves at a position P is e(P + c) + c: the machine errs as it does where it then stands.
     """
     machine = field.kinematics.machine
-    place = finite("at", at)
+    place = check_finite("at", at)
     axes = [(k, machine.axis(name)) for k, name in enumerate("XYZ") if name in machine.structure.axes]
 
     deviations = best_lines(field, place, tool, stations=stations, exact=exact)
@@ -113,11 +113,14 @@ def straight_lines(
         points[:, k] = np.linspace(*axis.travel, stations)
         deviation = deviations[axis.name]
         corrections[axis.name] = Correction.opposing(deviation)
-        along = left_by(field, points, {axis.name: corrections[axis.name]}, tool, exact=exact)
+        along = find_remaining_error(field, points, {axis.name: corrections[axis.name]}, tool, exact=exact)
         found.append((k, axis.name, deviation, Size.of(along[:, k])))
 
     volume = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3)
-    before, after = field.error(volume, tool, exact=exact), left_by(field, volume, corrections, tool, exact=exact)
+    before, after = (
+        field.error(volume, tool, exact=exact),
+        find_remaining_error(field, volume, corrections, tool, exact=exact),
+    )
     return StraightLines(
         at=(float(place[0]), float(place[1]), float(place[2])),
         lines=tuple(StraightLine(name, d, along, Size.of(after[:, k])) for k, name, d, along in found),
@@ -156,7 +159,7 @@ def best_lines(
     dict of str to Deviation
         By axis [um, um/m].
     """
-    machine, place = field.kinematics.machine, finite("at", at)
+    machine, place = field.kinematics.machine, check_finite("at", at)
     found: dict[str, Deviation] = {}
     for name in axes:
         if name in machine.structure.axes:
@@ -189,7 +192,7 @@ def best_line(positions: FloatArray, errors: FloatArray, reference: float) -> De
     return Deviation(float(mean + slope * 1e-3 * (reference - middle)), slope, reference)
 
 
-def left_by(
+def find_remaining_error(
     field: ErrorField,
     points: FloatArray,
     corrections: Mapping[str, Correction],

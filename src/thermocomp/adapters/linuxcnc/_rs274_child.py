@@ -32,7 +32,7 @@ MM = 25.4
 BLOCK = 2048
 
 
-def beside(name: str) -> Any:
+def load_sibling(name: str) -> Any:
     """Return the module of a file beside this one; its folder is not one that modules are looked for in."""
     spec = spec_from_file_location(name, __file__.replace("_rs274_child", name))
     assert spec is not None
@@ -42,7 +42,7 @@ def beside(name: str) -> Any:
     return module
 
 
-kinds = beside("_rs274_kinds")
+kinds = load_sibling("_rs274_kinds")
 INT, D, B, P, TEXT, Pose = kinds.INT, kinds.D, kinds.B, kinds.P, kinds.TEXT, kinds.Pose
 RECORD, KINDS, CODES, TOLD, PYTHON = kinds.RECORD, kinds.KINDS, kinds.CODES, kinds.TOLD, kinds.PYTHON
 RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
@@ -71,7 +71,7 @@ class Canon:
         self.path = (3, 0.0, 0.0)  # G64; tolerances [mm]
         self.file = b""
         self.files: dict[bytes, None] = {}  # that were opened
-        self.hooks = beside("_rs274_hooks").Hooks()
+        self.hooks = load_sibling("_rs274_hooks").Hooks()
         self.linked = ctypes.PyDLL("librs274.so.0")
         self.sequence = self.linked._ZN6Interp15sequence_numberEv
         self.sequence.argtypes = (P,)

@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from thermocomp.adapters.linuxcnc import rs274process
-from thermocomp.adapters.linuxcnc.rs274process import AXES, Job, Run
+from thermocomp.adapters.linuxcnc.rs274process import AXES, InterpreterJob, InterpreterRun
 from thermocomp.adapters.linuxcnc.stored import HIGHEST_TOOL, Stored
 from thermocomp.core.exceptions import ThermocompError
 
 __all__ = [
-    "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Frame", "Place", "Stored",
-    "installed", "read",
+    "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Place", "ProgramFrame",
+    "Stored", "find_obstacle", "read",
 ]  # fmt: skip
 
 PACKAGE = "linuxcnc-uspace"
@@ -65,7 +65,7 @@ class Canonical(NamedTuple):
     text: str
 
 
-class Frame:
+class ProgramFrame:
     """What stands between program and machine coordinates.
 
     Attributes
@@ -137,7 +137,7 @@ def _nine(values: Iterator[float] | Sequence[float]) -> Place:
 
 
 @cache
-def installed() -> str | None:
+def find_obstacle() -> str | None:
     """Return why the interpreter cannot be used here; None if it can."""
     advice = f"LinuxCNC's interpreter is needed: install the Debian package {PACKAGE} (apt-get install {PACKAGE})"
     python = rs274process.PYTHON
@@ -206,8 +206,8 @@ def read(
     InputError
         The file is not there, or the interpreter crashed.
     """
-    job = Job(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
-    with Run(job) as run:
+    job = InterpreterJob(path, stored or Stored(), inch, block_delete, subroutines, task, seconds)
+    with InterpreterRun(job) as run:
         yield from calls(run)
         if opened is not None:
             opened.update(run.opened())
@@ -215,9 +215,9 @@ def read(
             left.update(run.left())
 
 
-def calls(run: Run) -> Iterator[Canonical]:
+def calls(run: InterpreterRun) -> Iterator[Canonical]:
     """Yield the calls of the next job of a run; see `read`."""
-    frame, plane, file, turns = Frame(), 17, "", 1
+    frame, plane, file, turns = ProgramFrame(), 17, "", 1
     nowhere: tuple[Place, Place] = (ORIGIN, ORIGIN)
     centre = [0.0, 0.0]
     for records, more in run.blocks():

@@ -35,7 +35,7 @@ _ASCII = bytes(range(128)) + b"?" * 128
 _PIPE = 1 << 20
 
 
-class Block(NamedTuple):
+class CallBlock(NamedTuple):
     """Canonical calls that come together."""
 
     records: np.ndarray[tuple[int], np.dtype[Any]]  #: of `RECORD`; moves in program coordinates [mm, deg]
@@ -43,7 +43,7 @@ class Block(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Job:
+class InterpreterJob:
     """A program, and the controller it is run in.
 
     Parameters
@@ -71,7 +71,7 @@ class Job:
     seconds: int = 600
 
 
-class Run:
+class InterpreterRun:
     """Runs of the interpreter, one after the other; it starts with the object, and ends with the block.
 
     Parameters
@@ -85,7 +85,7 @@ class Run:
         Of the kinds of calls.
     """
 
-    def __init__(self, *jobs: Job) -> None:
+    def __init__(self, *jobs: InterpreterJob) -> None:
         path, subroutines = jobs[0].path.absolute(), jobs[0].subroutines
         if not path.is_file():
             raise InputError(f"{path} is not a file")
@@ -112,7 +112,7 @@ class Run:
             )
         self.codes: dict[str, int] = {}
 
-    def __enter__(self) -> "Run":
+    def __enter__(self) -> "InterpreterRun":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -120,7 +120,7 @@ class Run:
         self.process.communicate()
         self._home.cleanup()
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[CallBlock]:
         """Yield what the interpreter tells of the next job; the last record is ``done``.
 
         Raises
@@ -142,7 +142,7 @@ class Run:
         while len(head := pipe.read(8)) == 8:
             count, size = np.frombuffer(head, "<u4").tolist()
             records = np.frombuffer(_all(pipe, count * RECORD.itemsize), RECORD).copy()
-            block = Block(records, json.loads(_all(pipe, size)))
+            block = CallBlock(records, json.loads(_all(pipe, size)))
             if not count:
                 if refusal:
                     where = f" (in {Path(file).name})" if file else ""
@@ -159,7 +159,7 @@ class Run:
             done = kind == self.codes["done"]
             if kind == self.codes["error"]:
                 refusal = block.more[-1]
-                block = Block(records[:-1], block.more)
+                block = CallBlock(records[:-1], block.more)
             if len(block.records):
                 yield block
         self._ended(line, self.process.wait())
@@ -197,7 +197,7 @@ def _all(pipe: IO[bytes], size: int) -> bytes:
     return found
 
 
-def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: Job) -> None:
+def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: InterpreterJob) -> None:
     """Write the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
     stored = job.stored
     folder.mkdir()

@@ -65,7 +65,7 @@ class Stored:
 
 
 @lru_cache(64)
-def drawn(seed: int, startup: str = "") -> Stored:
+def draw_controller(seed: int, startup: str = "") -> Stored:
     """Return a controller that has nothing else in common with that of another seed.
 
     Parameters

@@ -46,7 +46,7 @@ def write_expanded(
             subroutines=subroutines,
         ).sources
     sources = array("I")
-    with ncprogram.opened(program) as texts, ncprogram.created(out) as file:
+    with ncprogram.open_to_read(program) as texts, ncprogram.open_to_write(out) as file:
         for text, line in unroll(program_lines(texts), setup):
             file.write(text)
             sources.append(line)

@@ -7,7 +7,7 @@ from thermocomp.adapters.linuxcnc.verification.verify import Proof
 from thermocomp.nc.interpreter.block import Setup, system_name
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.nc.rewrite.elsewhere import AWAY, Elsewhere
-from thermocomp.nc.rewrite.header import wrapped
+from thermocomp.nc.rewrite.header import wrap_text
 
 UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
 #: most lines for the models, for the place, and for the proof
@@ -16,7 +16,7 @@ _MODELS, _PLACE, _PROOF = 2, 3, 4
 _ALWAYS = 7
 
 
-def lines(models: Sequence[str], taken: Sequence[str], *, by_position: bool, unproved: bool) -> int:
+def count_lines(models: Sequence[str], taken: Sequence[str], *, by_position: bool, unproved: bool) -> int:
     """Return how many lines a header has, before it is known what they say.
 
     Parameters
@@ -35,7 +35,7 @@ def lines(models: Sequence[str], taken: Sequence[str], *, by_position: bool, unp
     return _ALWAYS + told + _PLACE * by_position + (1 if unproved else _PROOF)
 
 
-def told_models(models: Sequence[str]) -> list[str]:
+def describe_models(models: Sequence[str]) -> list[str]:
     """Return the lines about the models, the last ones on one line."""
     said = [f"model {m}" for m in models]
     return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
@@ -46,24 +46,24 @@ def told_taken(taken: Sequence[str]) -> list[str]:
     return [f"unproven, taken by {'; '.join(taken)}"] if taken else []
 
 
-def told_bound(bounds: Sequence[Bound]) -> str:
+def describe_bound(bounds: Sequence[Bound]) -> str:
     """Return how far the tool may be off in the cuts."""
     return "bound " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )
 
 
-def told_proof(proof: Proof | None) -> list[str]:
+def describe_proof(proof: Proof | None) -> list[str]:
     """Return in which states of the controller it was proved."""
-    return [UNPROVED] if proof is None else wrapped(f"proved {proof.sentence}", _PROOF)
+    return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", _PROOF)
 
 
-def told_place(setup: Setup, elsewhere: Elsewhere, axes: Sequence[str]) -> list[str]:
+def describe_place(setup: Setup, elsewhere: Elsewhere, axes: Sequence[str]) -> list[str]:
     """Return for which origins and tools it was made, and what others would cost."""
-    return [*wrapped(f"made for {made_for(setup)}", _PLACE - 1), cost(elsewhere, axes)]
+    return [*wrap_text(f"made for {describe_origins(setup)}", _PLACE - 1), cost(elsewhere, axes)]
 
 
-def made_for(setup: Setup) -> str:
+def describe_origins(setup: Setup) -> str:
     """Return the origins and lengths of tools that a drift along the axes was computed for."""
     origins = [
         f"{system_name(system)} " + " ".join(f"{a}{v:g}" for a, v in zip("XYZ", place, strict=True))

@@ -14,7 +14,7 @@ from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prov
 from thermocomp.api.revision import headers
 from thermocomp.api.revision.expanded import write_expanded
 from thermocomp.core.exceptions import InputError, ProgramError
-from thermocomp.core.shown import shown
+from thermocomp.core.shown import replace_unprintable
 from thermocomp.files import jobstate, ncprogram
 from thermocomp.files.draft import publish, scratch
 from thermocomp.nc.parser.tokens import program_lines
@@ -184,18 +184,18 @@ def _revise(job: Job, phase: Phase) -> Done:
             with phase("proving") as tell:
                 proof = _proved(job, source, folder / PROGRAM, ledger, tell)
         # what is proved has a header that says nothing yet: from here on nothing but its comments changes
-        filled = header.filled(
+        filled = header.fill(
             _facts(job, bounds, proof), ending(blank[0]), len(blank), upper=job.revision.setup.controller == "fanuc"
         )
-        ncprogram.fill(folder / PROGRAM, drafts[paths.program], dict(zip(blank, filled, strict=True)))
-        ncprogram.fill(
+        ncprogram.replace_lines(folder / PROGRAM, drafts[paths.program], dict(zip(blank, filled, strict=True)))
+        ncprogram.replace_lines(
             folder / DIFF, drafts[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
         )
         drafts[paths.job].write_text(jobstate.dumps(job.drift.state(), job.when), encoding="utf-8")
         if paths.picture is not None:
             from thermocomp.report import revision as pictures
 
-            title = shown(f"{job.program.name}, {job.begun}")
+            title = replace_unprintable(f"{job.program.name}, {job.begun}")
             pictures.write(run, bounds, job.revision.tool_changes, title, drafts[paths.picture])
         # the program comes last: where it is, all is
         publish({path: drafts[path] for path in reversed(paths.all())}, overwrite=job.overwrite)
@@ -204,7 +204,7 @@ def _revise(job: Job, phase: Phase) -> Done:
 
 def _rehearse(job: Job, source: Path, phase: Phase) -> None:
     size = source.stat().st_size
-    with phase("checking") as tell, ncprogram.opened(source) as texts:
+    with phase("checking") as tell, ncprogram.open_to_read(source) as texts:
         read = 0
         for block in job.revision.rehearse(program_lines(texts)):
             read += len(block.line.text)
@@ -241,15 +241,15 @@ def _write(
             yield revised.text, revised.texts
 
     with (
-        ncprogram.opened(source) as texts,
-        ncprogram.created(folder / PROGRAM) as program,
-        ncprogram.created(folder / DIFF) as written,
+        ncprogram.open_to_read(source) as texts,
+        ncprogram.open_to_write(folder / PROGRAM) as program,
+        ncprogram.open_to_write(folder / DIFF) as written,
         table.open("w", encoding="utf-8", newline="\n") as rows,
     ):
         columns = (f"{what}_{'xyz'[k]}_um" for k in axes for what in ("drift", "correction"))
         rows.write(",".join(("line", "revised_line", "start_s", "end_s", *columns, "changed")) + "\n")
         pairs = told(program_lines(texts), program, rows)
-        names = header.plain(job.program.name), header.plain(job.paths.program.name)
+        names = header.clean_comment(job.program.name), header.clean_comment(job.paths.program.name)
         written.writelines(diff.unified(pairs, *names))
     return blank
 
@@ -283,18 +283,18 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
     """Return what the header says."""
     setup, place = job.revision.setup, list[str]()
     if job.drift.by_position:
-        place = headers.told_place(setup, job.revision.elsewhere, job.drift.axes)
+        place = headers.describe_place(setup, job.revision.elsewhere, job.drift.axes)
     return [
         f"thermocomp {__version__}, {job.when.date()}, for {setup.controller}",
         f"program {job.program.name}",
-        *headers.told_models(job.models),
+        *headers.describe_models(job.models),
         *headers.told_taken(job.taken),
         f"start {job.start}",
         job.zero,
         job.method,
-        headers.told_bound(bounds),
+        headers.describe_bound(bounds),
         *place,
-        *headers.told_proof(proof),
+        *headers.describe_proof(proof),
     ]
 
 

@@ -10,11 +10,11 @@ from thermocomp.api.revision.values import (
     m_code_of,
     origin_of,
     point_of,
-    positive,
+    read_positive,
+    read_value,
     rotations_of,
     startup_of,
     tool_of,
-    value,
 )
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
@@ -23,16 +23,16 @@ from thermocomp.files import forecast as forecasts
 from thermocomp.files import jobstate, modelfile
 from thermocomp.files.machines import read_machine
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.planner.timeline import Kinematics
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
-from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.text import DIGITS
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
-from thermocomp.nc.thermal.inputs import SPEED, Signal, constants
-from thermocomp.nc.thermal.start import Start
+from thermocomp.nc.thermal.inputs import SPEED, InputSignal, constants
+from thermocomp.nc.thermal.start import ThermalStart
 from thermocomp.nc.thermal.stations import Station, stations
 
 Zero = Literal["start", "cold", "last"]
@@ -77,7 +77,7 @@ class Drifting:
         models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
         return stations(models, self.axis or ())
 
-    def others(self, found: Sequence[Station]) -> tuple[dict[str, Signal], list[str]]:
+    def others(self, found: Sequence[Station]) -> tuple[dict[str, InputSignal], list[str]]:
         """Return the inputs that the program does not tell, and what was not read of them."""
         models = [s.model for s in found]
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
@@ -101,7 +101,7 @@ class Drifting:
         notes = [f"{self.forecast}: {name} is no input of the models" for name in read.columns if name not in wanted]
         notes += [f"{self.forecast}: {text}" for text in read.left_out]
         notes += _taken(signals, "held at a constant") + _taken(wanted & set(read.columns), "forecast")
-        return signals | {n: Signal(*column) for n, column in read.columns.items() if n in wanted}, notes
+        return signals | {n: InputSignal(*column) for n, column in read.columns.items() if n in wanted}, notes
 
     def hashes(self) -> dict[str, str]:
         """Return the name of the file and the beginning of its SHA-256 by target."""
@@ -166,16 +166,16 @@ class Starting:
         if self.pause is not None and self.carried is None:
             raise InputError("--pause is the time since the last job: it goes with --carried")
 
-    def start(self, found: Sequence[Station], others: Mapping[str, Signal]) -> Start:
+    def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
         """Return the state of the models."""
         if self.carried is not None:
-            pause = 0.0 if self.pause is None else value(self.pause, "time", "--pause", "30 min")
-            return start.carried(found, jobstate.read(self.carried).state, pause)
+            pause = 0.0 if self.pause is None else read_value(self.pause, "time", "--pause", "30 min")
+            return start.carry_over(found, jobstate.read(self.carried).state, pause)
         if self.measured is not None:
-            return start.measured(found, start.deviations(self.measured), others)
-        return start.cold(found, others)
+            return start.begin_measured(found, start.deviations(self.measured), others)
+        return start.begin_cold(found, others)
 
-    def drift(self, found: Sequence[Station], others: Mapping[str, Signal]) -> Drift:
+    def drift(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> Drift:
         """Return the drift at the start of the program."""
         return Drift(found, self.start(found, others), others, zero=self._zero)
 
@@ -241,14 +241,14 @@ class Way:
 
     def demand(self) -> Demand:
         """Return when the correction is renewed."""
-        every = None if self.every is None else positive(self.every, "time", "--every", "10 min")
-        tolerance = positive(self.tolerance, "displacement", "--tolerance", "1 um")
-        return Demand(tolerance, every, positive(self.largest, "displacement", "--largest", "400 um"))
+        every = None if self.every is None else read_positive(self.every, "time", "--every", "10 min")
+        tolerance = read_positive(self.tolerance, "displacement", "--tolerance", "1 um")
+        return Demand(tolerance, every, read_positive(self.largest, "displacement", "--largest", "400 um"))
 
-    def made(self, setup: Setup, axes: Sequence[str]) -> Method:
+    def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
         """Return the method."""
-        digits, step = DIGITS[setup.controller], positive(self.step, "displacement", "--step", "1 um")
-        safe = None if self.safe_z is None else value(self.safe_z, "position", "--safe-z", "5 mm")
+        digits, step = DIGITS[setup.controller], read_positive(self.step, "displacement", "--step", "1 um")
+        safe = None if self.safe_z is None else read_value(self.safe_z, "position", "--safe-z", "5 mm")
         if self.method == "coordinates":
             # a helix is an option of older Fanucs
             return Coordinates(digits, step, safe_z=safe, helix=setup.controller == "linuxcnc")
@@ -343,7 +343,7 @@ class Controller:
             controller=self.whose,
             inch=None if self.units is None else self.units == "inch",
             startup="" if self.startup is None else startup_of(self.startup, self.whose),
-            speed=0.0 if self.speed is None else positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
+            speed=0.0 if self.speed is None else read_positive(self.speed, "spindle_speed", "--speed", "6000 1/min"),
             offsets=dict(origin_of(text) for text in self.origin or ()),
             tools=dict(tool_of(text, "--tool", "120 mm") for text in self.tool or ()),
             home=None if self.home is None else point_of(self.home, f"--home {self.home!r}"),
@@ -351,7 +351,7 @@ class Controller:
             no_shift=self.no_g92,
             rotary={} if machine is None else dict(machine.structure.rotary),
             integers=self.integers or ("whole" if self.whose == "linuxcnc" else "refuse"),
-            least=positive(self.least, "position", "--least", "1 um"),
+            least=read_positive(self.least, "position", "--least", "1 um"),
             skip_optional=self.block_delete == "on",
             harmless=frozenset(m_code_of(text, self.whose) for text in self.harmless or ()),
         )
@@ -387,17 +387,17 @@ class Timing:
         """Return the machine, if there is a file of it."""
         return None if self.machine is None else read_machine(self.machine)
 
-    def kinematics(self, machine: Machine | None) -> tuple[Kinematics, list[str]]:
+    def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:
         """Return how fast the machine is, and what of it is a guess."""
-        change = value(self.tool_change, "time", "--tool-change", "8 s")
-        stop = value(self.stop, "time", "--stop", "60 s")
+        change = read_value(self.tool_change, "time", "--tool-change", "8 s")
+        stop = read_value(self.stop, "time", "--stop", "60 s")
         if machine is None:
             guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
-            return Kinematics(tool_change=change, stop=stop), [guess]
+            return MotionLimits(tool_change=change, stop=stop), [guess]
         axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
         notes = [
             f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"
             for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
             if (silent := [a.name for a in axes if getattr(a, what) is None])
         ]
-        return Kinematics.of(machine, tool_change=change, stop=stop), notes
+        return MotionLimits.of(machine, tool_change=change, stop=stop), notes

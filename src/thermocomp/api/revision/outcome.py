@@ -69,16 +69,16 @@ def warnings(job: Job, done: Done) -> list[str]:
     return found
 
 
-def place(job: Job, done: Done) -> list[str]:
+def describe_place(job: Job, done: Done) -> list[str]:
     """Return for which origins a program was made, where the drift depends on the place."""
     if not (done.written and job.drift.by_position):
         return []
     revision = job.revision
     cost = headers.cost(revision.elsewhere, job.drift.axes)
-    return [f"it is made for {headers.made_for(revision.setup)}; {cost}"]
+    return [f"it is made for {headers.describe_origins(revision.setup)}; {cost}"]
 
 
-def nothing(job: Job, done: Done) -> str:
+def explain_nothing(job: Job, done: Done) -> str:
     """Return why nothing was taken off a program, and what to do."""
     revision, most = job.revision, max((b.without for b in done.bounds), default=0.0)
     said = f"nothing was taken off: the drift in the cuts is {most:.1f} um at most"
@@ -122,7 +122,7 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
     return {
         "program": str(job.program),
         "written": done.written,
-        "nothing": None if done.written else nothing(job, done),
+        "nothing": None if done.written else explain_nothing(job, done),
         "files": {
             name: None if path is None or not done.written else str(path)
             for name, path in zip(paths._fields, paths, strict=True)
@@ -151,7 +151,7 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
         "proof": None if done.proof is None else _proof(done.proof),
         "other_offset_um": dict(zip("xyz", revision.elsewhere.most, strict=True)) if job.drift.by_position else None,
         "warnings": warnings(job, done),
-        "notes": [*notes, *place(job, done)],
+        "notes": [*notes, *describe_place(job, done)],
         "us_per_line": 1e6 * done.seconds / max(revision.lines, 1),
         "revising_s": done.seconds,
         "proving_s": done.proving,

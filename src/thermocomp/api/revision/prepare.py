@@ -60,7 +60,7 @@ def prepare_job(
     """
     if controller.controller is None:
         _refuse_number(program)
-    ncprogram.opened(program).close()
+    ncprogram.open_to_read(program).close()
     starting.check()
     found = drifting.stations()
     others, notes = drifting.others(found)
@@ -71,7 +71,7 @@ def prepare_job(
     method = way.made(setup, drift.driven)
     models = _files(found, drifting.hashes())
     taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
-    header_lines = headers.lines(models, taken, by_position=drift.by_position, unproved=way.unproved)
+    header_lines = headers.count_lines(models, taken, by_position=drift.by_position, unproved=way.unproved)
     revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
     _check_interpreter(way, setup, diameters=controller.diameter is not None)
     if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
@@ -113,7 +113,7 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
 
 def _refuse_number(program: Path) -> None:
     """Raise `InputError` if a program begins as a Fanuc's do, and nobody has said whose it is."""
-    with ncprogram.opened(program) as lines:
+    with ncprogram.open_to_read(program) as lines:
         first = list(islice(lines, FIRST))
     if number := program_number(first):
         raise InputError(
@@ -124,7 +124,7 @@ def _refuse_number(program: Path) -> None:
 
 def _refuse_optional(program: Path) -> None:
     """Raise `InputError` if the program has optional lines: written out, they would be run always, or never."""
-    with ncprogram.opened(program) as lines:
+    with ncprogram.open_to_read(program) as lines:
         for line in read_lines(lines):
             if line.optional:
                 raise InputError(
@@ -135,13 +135,13 @@ def _refuse_optional(program: Path) -> None:
 
 def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
     """Raise `InputError` before any work if the interpreter is needed and cannot be had."""
-    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.installed()) is not None:
+    if way.expand and setup.controller == "linuxcnc" and (reason := rs274.find_obstacle()) is not None:
         raise InputError(f"--expand: {reason}")
     if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
         raise InputError(
             "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms stand in its file, and its G41 stays"
         )
-    if not way.unproved and (reason := rs274.installed()):
+    if not way.unproved and (reason := rs274.find_obstacle()):
         raise InputError(f"it cannot be proved: {reason}; {ALL_THE_SAME}")
 
 

@@ -4,17 +4,17 @@ import re
 from collections.abc import Sequence
 
 from thermocomp.core.exceptions import InputError, UnitError
-from thermocomp.core.units import measured as with_unit
+from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.interpreter.codes import find
+from thermocomp.nc.interpreter.codes import find_code
 from thermocomp.nc.parser.tokens import Controller
 
 _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
-def value(text: str, quantity: str, option: str, example: str) -> float:
+def read_value(text: str, quantity: str, option: str, example: str) -> float:
     """Return the value of an option in house units.
 
     Parameters
@@ -46,7 +46,7 @@ def value(text: str, quantity: str, option: str, example: str) -> float:
     return number
 
 
-def positive(text: str, quantity: str, option: str, example: str) -> float:
+def read_positive(text: str, quantity: str, option: str, example: str) -> float:
     """Return the value of an option that must be positive.
 
     Parameters
@@ -69,7 +69,7 @@ def positive(text: str, quantity: str, option: str, example: str) -> float:
     InputError
         It is none, or not positive.
     """
-    number = value(text, quantity, option, example)
+    number = read_value(text, quantity, option, example)
     if not number > 0:
         raise InputError(f"{option} {text!r}: must be positive")
     return number
@@ -162,7 +162,7 @@ def point_of(text: str, said: str) -> Point:
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: want X, Y and Z, such as 100 mm, 50 mm, 0 mm")
-    x, y, z = (value(part, "position", said, "100 mm") for part in parts)
+    x, y, z = (read_value(part, "position", said, "100 mm") for part in parts)
     return x, y, z
 
 
@@ -214,7 +214,7 @@ def m_code_of(text: str, controller: Controller) -> int:
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
         raise InputError(f"--harmless {text!r}: want an M code, such as M88")
-    if (code := find("M", float(number), controller)) is not None:
+    if (code := find_code("M", float(number), controller)) is not None:
         raise InputError(f"--harmless {text!r}: {code.name} is known ({code.does}), and is followed as that")
     return int(number)
 
@@ -244,4 +244,4 @@ def tool_of(text: str, option: str, example: str) -> tuple[int, float]:
     number = name.upper().removeprefix("T")
     if not number.isdecimal():
         raise InputError(f'{option} {text!r}: want the number of a tool and a length, such as "1={example}"')
-    return int(number), value(length, "position", f"{option} {text!r}", example)
+    return int(number), read_value(length, "position", f"{option} {text!r}", example)

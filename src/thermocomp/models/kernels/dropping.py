@@ -286,7 +286,7 @@ def pivot(A: FloatArray, k: int) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=CONTRACT)
-def warm_up(triangle: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, largest: int) -> None:  # noqa: PLR0912
+def list_good_sets(triangle: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, largest: int) -> None:  # noqa: PLR0912
     """List good sets of every size: let the cheapest leave, then swap a pair for as long as that helps.
 
     This works on products and has no guard: what it finds is taken at the value that QR gives.

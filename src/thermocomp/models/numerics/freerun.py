@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.autoregressive import companion, slowest
+from thermocomp.core.autoregressive import companion, find_largest_root
 from thermocomp.models.numerics import ticks
-from thermocomp.models.numerics.ticks import Run
+from thermocomp.models.numerics.ticks import TickedRun
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Coefficients:
     b: FloatArray
     intercept: float = 0.0
 
-    def ticked(self, run: Run) -> FloatArray:
+    def ticked(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each tick, (n_ticks + 1,)."""
         products = self.b @ run.drive.T
         driven = products[0] + self.intercept
@@ -50,11 +50,11 @@ class Coefficients:
         value: FloatArray = regressors @ np.concatenate([self.a, self.b.ravel()]) + self.intercept
         return value
 
-    def at_rows(self, run: Run) -> FloatArray:
+    def at_rows(self, run: TickedRun) -> FloatArray:
         """Run freely from a cold start; return the deviation at each row of the test."""
         ticked = self.ticked(run)
         k, m = len(self.a), len(self.b) - 1
-        return ticks.at_rows(
+        return ticks.interpolate_at_rows(
             run, ticked, lambda t, now: self.one_step(ticks.regressors(ticked, run.drive, t + 1, k, m, now))
         )
 
@@ -80,7 +80,7 @@ def polynomial(poles: FloatArray) -> FloatArray:
 
 
 def output_error(
-    runs: Sequence[Run],
+    runs: Sequence[TickedRun],
     targets: Sequence[FloatArray],
     k: int,
     m: int,
@@ -134,7 +134,7 @@ class _Problem:
 
     def __init__(
         self,
-        runs: Sequence[Run],
+        runs: Sequence[TickedRun],
         targets: Sequence[FloatArray],
         k: int,
         m: int,
@@ -228,7 +228,9 @@ class _Problem:
                 first = trial[: self._k]
                 if self._by_poles:
                     first[:] = np.clip(first, 0.0, self.most)
-                if (self._by_poles or slowest(first) < self._largest) and (value := self.squares(trial)) < now:
+                if (self._by_poles or find_largest_root(first) < self._largest) and (
+                    value := self.squares(trial)
+                ) < now:
                     theta, now, damping = trial, value, max(damping / 10, 1e-12)
                     break
                 damping *= 10

@@ -62,7 +62,7 @@ class Triangle:
         return np.asarray((64 + self.factor.shape[1]) * self.last_place)
 
 
-def table(X: FloatArray, y: FloatArray) -> FloatArray:
+def join_columns(X: FloatArray, y: FloatArray) -> FloatArray:
     """Return [X y] in Fortran order, the work space of `triangle`."""
     out = np.empty((X.shape[0], X.shape[1] + 1), order="F")
     out[:, :-1] = X
@@ -145,7 +145,7 @@ def lstsq(X: FloatArray, y: FloatArray, *, intercept: bool = True) -> Solution:
     -------
     Solution
     """
-    return solve(X, y, triangle(table(X, y), intercept=intercept))
+    return solve(X, y, triangle(join_columns(X, y), intercept=intercept))
 
 
 def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int] | None = None) -> Solution:

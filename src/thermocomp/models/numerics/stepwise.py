@@ -184,7 +184,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Selection:
+class StepwiseSelection:
     """What stepwise regression found.
 
     Parameters
@@ -208,7 +208,7 @@ def stepwise(
     *,
     needs: Sequence[frozenset[int]] | None = None,
     tolerance: float = TOLERANCE,
-) -> Selection:
+) -> StepwiseSelection:
     """Select terms by partial F.
 
     One action a step. If the worst term inside has an F below the threshold, it is deleted; else the candidate with
@@ -258,7 +258,7 @@ def stepwise(
         inside = frozenset(work.active)
         cycled = inside in seen
         seen.add(inside)
-    return Selection(tuple(sorted(work.active)), tuple(steps), cycled)
+    return StepwiseSelection(tuple(sorted(work.active)), tuple(steps), cycled)
 
 
 class _Tableau:

@@ -20,7 +20,7 @@ MOST_TICKS = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class TickedRun:
     """One test on the clock: without a break, from a cold start.
 
     Parameters
@@ -49,7 +49,7 @@ class Run:
         return self.since is self.drive
 
 
-def steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
+def check_steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
     """Check time steps [s]; without any, every row is a test of its own.
 
     Raises
@@ -65,13 +65,13 @@ def steps(dt: ArrayLike | None, n_rows: int) -> FloatArray:
     return found
 
 
-def usual(dt: FloatArray) -> float:
+def median_step(dt: FloatArray) -> float:
     """Return the median of the time steps within tests [s]; 1 if there are none."""
     inside = dt[np.isfinite(dt) & (dt > 0)]
     return float(np.median(inside)) if inside.size else 1.0
 
 
-def on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Run]:
+def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[TickedRun]:
     """Put a recording on the clock.
 
     Parameters
@@ -92,10 +92,10 @@ def on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Run]:
     return [_run(inputs, dt, slice(i, j), interval) for i, j in pairwise([*starts.tolist(), len(dt)])]
 
 
-def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> Run:
+def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun:
     u, n = inputs[rows], rows.stop - rows.start
     if (dt[rows][1:] == h).all():
-        return Run(rows, np.arange(n), np.zeros(n), u, u)
+        return TickedRun(rows, np.arange(n), np.zeros(n), u, u)
     step = dt[rows].copy()
     step[0] = 0.0
     time = np.cumsum(step)
@@ -106,7 +106,7 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> Run:
     phase = share - count
     phase[phase <= EARLY] = 0.0
     if not phase.any() and (np.diff(count) == 1).all():  # one row per tick
-        return Run(rows, count, phase, u, u)
+        return TickedRun(rows, count, phase, u, u)
     total = np.cumsum(step[:, None] * u, axis=0)
     at = np.searchsorted(count, np.arange(count[-1] + 1))  # row that makes each tick; it may come later
     late = (time[at] - np.arange(count[-1] + 1) * h)[:, None]
@@ -114,11 +114,11 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> Run:
     until[0] = 0.0
     drive = np.vstack([u[:1], np.diff(until, axis=0) / h])
     since = (total - until[count]) / np.where(phase > 0, phase * h, np.inf)[:, None]
-    return Run(rows, count, phase, since, drive)
+    return TickedRun(rows, count, phase, since, drive)
 
 
 def displacements(
-    runs: Sequence[Run], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
+    runs: Sequence[TickedRun], y: FloatArray, dt: FloatArray, known: NDArray[np.bool_], h: float
 ) -> list[FloatArray]:
     """Return the displacement at each tick, interpolated between the rows around it; nan where it is not known.
 
@@ -136,7 +136,7 @@ def displacements(
     list of ndarray of shape (n_ticks + 1,)
         Per test.
     """
-    near = NEAR * usual(dt)
+    near = NEAR * median_step(dt)
     found = []
     for run in runs:
         inside, may = y[run.rows], known[run.rows]
@@ -156,7 +156,9 @@ def displacements(
     return found
 
 
-def at_rows(run: Run, ticked: FloatArray, ahead: Callable[[IntArray, FloatArray], FloatArray]) -> FloatArray:
+def interpolate_at_rows(
+    run: TickedRun, ticked: FloatArray, ahead: Callable[[IntArray, FloatArray], FloatArray]
+) -> FloatArray:
     """Return the deviation at the rows of a test from that at its ticks.
 
     Parameters

@@ -68,7 +68,7 @@ def spectrum(X: FloatArray) -> Spectrum:
     return Spectrum(tuple((singular**2).tolist()))
 
 
-def varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
+def find_varying(X: FloatArray, size: FloatArray | None = None) -> BoolArray:
     """Say which columns are not constant.
 
     Parameters
@@ -105,7 +105,7 @@ def correlation(X: FloatArray) -> FloatArray:
     FitError
         A column is constant: it has no correlation with anything.
     """
-    constant = np.flatnonzero(~varying(X))
+    constant = np.flatnonzero(~find_varying(X))
     if constant.size:
         raise FitError(f"column {constant[0]} is constant and has no correlation with the others: leave it out")
     Z = X - X.mean(axis=0)
@@ -129,7 +129,7 @@ def contributions(X: FloatArray, y: FloatArray) -> FloatArray:
         nan for a constant column, or if y is constant.
     """
     both = np.column_stack([X, y])
-    moves = varying(both)
+    moves = find_varying(both)
     found = np.full(X.shape[1], np.nan)
     if moves[-1]:
         found[moves[:-1]] = correlation(both[:, moves])[-1, :-1]

@@ -51,12 +51,12 @@ class Equivalents:
         """Sets that are equivalent to the best for every displacement; the choice among them is the user's (W-11)."""
         return tuple(self.subsets[k] for k in np.flatnonzero(self.equivalent.all(axis=0)))
 
-    def table(self) -> tuple["Row", ...]:
+    def table(self) -> tuple["SensorSet", ...]:
         """Return a row per set: first those that are equivalent for most displacements, then by the sum of psi."""
         total = self.summed.sum(axis=0)
         order = np.lexsort((-total, -self.equivalent.sum(axis=0)))
         return tuple(
-            Row(
+            SensorSet(
                 subset=self.subsets[k],
                 summed=tuple(self.summed[:, k].tolist()),
                 p_values=tuple(self.p_values[:, k].tolist()),
@@ -67,7 +67,7 @@ class Equivalents:
 
 
 @dataclass(frozen=True)
-class Row:
+class SensorSet:
     """One set of sensors.
 
     Parameters

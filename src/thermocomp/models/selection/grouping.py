@@ -174,7 +174,7 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
     tuple of int
         In the order of the regressions.
     """
-    images = uncentred(tri)
+    images = uncentre(tri)
     rounding = float(tri.noise[-1]) ** 2
     home = {column: number for number, members in enumerate(groups) for column in members}
     residual = images[:, -1].copy()
@@ -196,7 +196,7 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
     return tuple(found)
 
 
-def uncentred(tri: Triangle) -> FloatArray:
+def uncentre(tri: Triangle) -> FloatArray:
     """Return a small matrix with the same products as [X y] before it was centred; row 0 holds the means."""
     return np.vstack([np.sqrt(tri.n_rows) * tri.centre, tri.factor])
 
@@ -301,7 +301,7 @@ def sweep(temperatures: FloatArray, tri: Triangle, *, absolute: bool = False, li
     tuple of Swept
         By rising threshold.
     """
-    images = uncentred(tri)
+    images = uncentre(tri)
     found = []
     for interval in intervals(correlation(temperatures), absolute=absolute):
         try:

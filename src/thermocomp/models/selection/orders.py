@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from thermocomp.core.autoregressive import slowest
+from thermocomp.core.autoregressive import find_largest_root
 from thermocomp.models.numerics.leastsquares import Triangle
 
 FloatArray = NDArray[np.float64]
@@ -71,7 +71,7 @@ def final_prediction_error(sse: float, n: int, d: int) -> float:
     return sse / n * (n + d) / (n - d) if d < n else math.inf
 
 
-def table(
+def compute_orders(
     tri: Triangle, n_inputs: int, ks: Sequence[int], ms: Sequence[int], largest_root: float = 1.0
 ) -> tuple[Order, ...]:
     """Compute all orders from the triangle of the greatest one, on the same rows, so that they can be compared.
@@ -149,7 +149,7 @@ def _largest_root(R: FloatArray, head: FloatArray, noise: FloatArray) -> float:
         return 0.0
     if R.shape[0] != R.shape[1] or (np.abs(np.diag(R)) <= noise).any():
         return math.inf
-    return slowest(linalg.solve_triangular(R, head))
+    return find_largest_root(linalg.solve_triangular(R, head))
 
 
 def best(orders: Sequence[Order], criterion: Criterion) -> Order | None:

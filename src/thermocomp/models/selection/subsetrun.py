@@ -19,7 +19,7 @@ Route = Literal["dropping", "adding"]
 Stop = Literal["", "nodes", "seconds", "interrupted"]
 
 
-class Result:
+class SearchResult:
     """A search that has ended, one way or the other.
 
     Parameters
@@ -79,7 +79,7 @@ def run(
     nodes: int | None,
     seconds: float | None,
     progress: Callable[[str], None] | None,
-) -> Result:
+) -> SearchResult:
     """Search.
 
     Parameters
@@ -104,7 +104,7 @@ def run(
     limit[1 : sizes + 1] = np.inf
     bound = limit.copy()
     kind: Any = {"dropping": Dropping, "adding": Adding}[route]
-    result = Result(problem, limit, n_best)
+    result = SearchResult(problem, limit, n_best)
     result.parts = [kind(problem, sizes, n_best, limit, bound) for _ in range(jobs)]
     n_tasks = result.parts[0].tasks
     for part in result.parts:
@@ -144,7 +144,7 @@ class _Watch:
     """What stops a search, and who is told of it."""
 
     def __init__(
-        self, result: Result, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None
+        self, result: SearchResult, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None
     ) -> None:
         self.result, self.nodes, self.seconds, self.progress = result, nodes, seconds, progress
         self.began = self.said = time.monotonic()
@@ -166,7 +166,7 @@ class _Watch:
 
 
 @contextmanager
-def _interrupts(result: Result) -> Iterator[None]:
+def _interrupts(result: SearchResult) -> Iterator[None]:
     """Let the keyboard stop a search: raised, an interrupt may get lost in a callback of the threads that search."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.numerics.leastsquares import Triangle, solve, table, triangle
+from thermocomp.models.numerics.leastsquares import Triangle, join_columns, solve, triangle
 from thermocomp.models.selection.subsetrun import Route, Stop, run
 from thermocomp.models.selection.subsetsearch import Problem
 
@@ -165,7 +165,7 @@ def best_subsets(
     """
     if n_best < 1 or jobs < 1 or (max_size is not None and max_size < 1):
         raise InputError(f"n_best {n_best}, jobs {jobs}, max_size {max_size}: want at least 1")
-    tri = triangle(table(X, y), intercept=intercept)
+    tri = triangle(join_columns(X, y), intercept=intercept)
     kept, same = _distinct(X, tri)
     if not kept:
         raise FitError("best subsets: every column is constant; there is nothing to select from")
@@ -186,7 +186,7 @@ def best_subsets(
         for columns in search.sets(size):
             where = tuple(sorted(kept[i] for i in columns))
             some = X[:, where]
-            fresh = triangle(table(some, y), intercept=intercept)
+            fresh = triangle(join_columns(some, y), intercept=intercept)
             found = solve(some, y, fresh)
             # what one unit in the last place of every number can do to the residual
             blur = float(fresh.last_place[:-1] @ np.abs(found.coefficients)) + problem.y_noise

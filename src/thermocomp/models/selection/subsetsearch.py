@@ -138,9 +138,9 @@ class Swapping(Search):
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)
-        from thermocomp.models.kernels.dropping import warm_up
+        from thermocomp.models.kernels.dropping import list_good_sets
 
-        warm_up(problem.triangle, problem.least, self.lists, self.inside, sizes)
+        list_good_sets(problem.triangle, problem.least, self.lists, self.inside, sizes)
 
     def start(self, first: int, last: int) -> None:
         """Take nothing."""

@@ -70,7 +70,7 @@ class Program:
         for i in range(begin + 1, self.stop):
             text = self.texts[i]
             if "END" in text.upper():
-                found = _END.fullmatch(squeezed(read_line(text, i + 1, "fanuc").flow))
+                found = _END.fullmatch(squeeze(read_line(text, i + 1, "fanuc").flow))
                 if found and int(found.group(1)) == loop:
                     return i
         raise ProgramError(begin + 1, f"DO{loop} without END{loop} behind it in this program")
@@ -145,6 +145,6 @@ class File:
         return self.find(last, line, who), times
 
 
-def squeezed(text: str) -> str:
+def squeeze(text: str) -> str:
     """Return a text without blanks, in upper case."""
     return "".join(text.split()).upper()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.expansion.programs import File, Program, squeezed
+from thermocomp.nc.expansion.programs import File, Program, squeeze
 from thermocomp.nc.expansion.variables import Variables, arguments
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.parser.expressions import Key
@@ -132,7 +132,7 @@ class _Unroller:
             self._refuse_optional(line)
             self._acted = True
             if line.flow:
-                self._steer(frame, line, squeezed(line.flow))
+                self._steer(frame, line, squeeze(line.flow))
             for assignment in line.assignments:
                 frame.variables.assign(line.number, assignment)
             if line.words:
@@ -261,7 +261,7 @@ class _Unroller:
             text = self._texts[i]
             if i in inside or "DO" not in text.upper():
                 continue
-            found = _LOOP.fullmatch(squeezed(read_line(text, i + 1, "fanuc").flow))
+            found = _LOOP.fullmatch(squeeze(read_line(text, i + 1, "fanuc").flow))
             if found and frame.program.closing(i, int(found.group("loop"))) >= place:
                 raise ProgramError(line, f"{who} leads into a loop (line {i + 1}), which controls refuse")
         frame.place = place

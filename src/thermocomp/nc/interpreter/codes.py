@@ -259,7 +259,7 @@ REFUSED_LETTERS: Final[dict[str, str]] = {
 }
 
 
-def find(letter: str, number: float, controller: Controller) -> Code | None:
+def find_code(letter: str, number: float, controller: Controller) -> Code | None:
     """Return the code of a G or M word; None if it is unknown.
 
     Parameters

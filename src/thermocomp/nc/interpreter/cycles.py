@@ -18,7 +18,7 @@ class CycleError(Exception):
     """The cycle cannot be; the text says why."""
 
 
-class Step(NamedTuple):
+class CycleMove(NamedTuple):
     """A move of a cycle."""
 
     rapid: bool
@@ -43,7 +43,7 @@ _TAPS: Final = ("G74", "G84")
 
 
 @dataclass(slots=True)
-class Cycle:
+class CannedCycle:
     """One line of a cycle.
 
     Parameters
@@ -80,7 +80,7 @@ class Cycle:
     repeats: int = 1
     direct: bool = False
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Iterator[CycleMove]:
         """Yield the moves; their number does not change if the whole cycle is shifted a little.
 
         Raises
@@ -101,7 +101,7 @@ class Cycle:
         level = self.level
         if level < r:
             level = now = r
-        yield Step(True, self._at(a, b, now))
+        yield CycleMove(True, self._at(a, b, now))
         back = r if self.to_r else level
         height = now if now > r + ROUNDING or self.direct else back
         da, db = self.named.get("XYZ"[first]), self.named.get("XYZ"[second])
@@ -110,8 +110,8 @@ class Cycle:
                 a, b = a if da is None else da, b if db is None else db
             else:
                 a, b = a + (da or 0.0), b + (db or 0.0)
-            yield Step(True, self._at(a, b, height))
-            yield Step(True, self._at(a, b, r))
+            yield CycleMove(True, self._at(a, b, height))
+            yield CycleMove(True, self._at(a, b, r))
             yield from self._hole(a, b, r, bottom, back)
             height = back
 
@@ -121,34 +121,34 @@ class Cycle:
             return (a, b, c)
         return (b, c, a) if self.plane == 18 else (c, a, b)
 
-    def _hole(self, a: float, b: float, r: float, bottom: float, back: float) -> Iterator[Step]:
+    def _hole(self, a: float, b: float, r: float, bottom: float, back: float) -> Iterator[CycleMove]:
         """Yield the moves from R to the bottom and back."""
         code, sticky, at = self.code, self.sticky, self._at
         if code == "G87":
             beside = a + sticky["I"], b + sticky["J"]
             top = sticky["K"] + (0.0 if self.absolute else bottom)
-            yield Step(True, at(*beside, r))
-            yield Step(True, at(*beside, bottom))
-            yield Step(True, at(a, b, bottom))
-            yield Step(False, at(a, b, top))
-            yield Step(False, at(a, b, bottom))
-            yield Step(True, at(*beside, bottom))
-            yield Step(True, at(*beside, back))
-            yield Step(True, at(a, b, back))
+            yield CycleMove(True, at(*beside, r))
+            yield CycleMove(True, at(*beside, bottom))
+            yield CycleMove(True, at(a, b, bottom))
+            yield CycleMove(False, at(a, b, top))
+            yield CycleMove(False, at(a, b, bottom))
+            yield CycleMove(True, at(*beside, bottom))
+            yield CycleMove(True, at(*beside, back))
+            yield CycleMove(True, at(a, b, back))
             return
         if code in ("G73", "G83"):
             off = BACK_OFF if self.inch else BACK_OFF * 25.4
             depth = r - sticky["Q"]
             while depth > bottom:
-                yield Step(False, at(a, b, depth))
+                yield CycleMove(False, at(a, b, depth))
                 if code == "G83":
-                    yield Step(True, at(a, b, r))
-                yield Step(True, at(a, b, depth + off))
+                    yield CycleMove(True, at(a, b, r))
+                yield CycleMove(True, at(a, b, depth + off))
                 depth -= sticky["Q"]
-        yield Step(False, at(a, b, bottom))
+        yield CycleMove(False, at(a, b, bottom))
         if code == "G85":
-            yield Step(False, at(a, b, r))
-        yield Step(code not in ("G89", *_TAPS), at(a, b, back))
+            yield CycleMove(False, at(a, b, r))
+        yield CycleMove(code not in ("G89", *_TAPS), at(a, b, back))
 
 
 def pause(code: str, sticky: dict[str, float]) -> float:

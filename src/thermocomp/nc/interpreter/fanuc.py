@@ -4,8 +4,8 @@ from typing import Final
 
 from thermocomp.nc.interpreter.block import PLANES
 from thermocomp.nc.interpreter.codes import CYCLES
-from thermocomp.nc.interpreter.state import State
-from thermocomp.nc.interpreter.words import Orders
+from thermocomp.nc.interpreter.state import InterpreterState
+from thermocomp.nc.interpreter.words import BlockWords
 
 _PLANE_LETTERS: Final = frozenset("XY")
 _STRAIGHT: Final = ("G0", "G1")
@@ -16,7 +16,7 @@ _ONCE_NOT_TURNED: Final = frozenset({"G10", "G28", "G30", "G52", "G53", "G92", "
 _SAME: Final = 1e-6
 
 
-def motion_beside_g80(state: State, orders: Orders) -> str:
+def motion_beside_g80(state: InterpreterState, words: BlockWords) -> str:
     """Return the motion that the axis words beside a lone G80 make: that in force before the cycle.
 
     Raises
@@ -27,23 +27,23 @@ def motion_beside_g80(state: State, orders: Orders) -> str:
     modal = state.modal.motion
     before = state.under if modal in CYCLES else modal
     if before not in _STRAIGHT:
-        raise orders.error("axis words beside G80, and neither G0 nor G1 was in force before the cycle; write G0 there")
+        raise words.error("axis words beside G80, and neither G0 nor G1 was in force before the cycle; write G0 there")
     return before
 
 
-def put_in_force(state: State, motion: str) -> None:
+def put_in_force(state: InterpreterState, motion: str) -> None:
     """Put a motion code in force that stands beside a code which takes the axis words, such as ``G0 G91 G28 Z0.``."""
     state.moves_by(motion)
     state.level, state.sticky = None, {}
 
 
-def check_codes(state: State, orders: Orders, code: str) -> None:
+def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
     """Refuse what controls of this kind read in several ways, before anything of the line takes effect.
 
     Parameters
     ----------
     state : State
-    orders : Orders
+    words : Orders
     code : str
         The motion that the line makes.
 
@@ -51,33 +51,31 @@ def check_codes(state: State, orders: Orders, code: str) -> None:
     ------
     ProgramError
     """
-    modal, groups = state.modal, orders.groups
+    modal, groups = state.modal, words.groups
     if "distance" in groups and modal.motion in CYCLES and (groups["distance"] == "G90") != modal.absolute:
         told = groups.get("motion")
         if told is None or told in CYCLES:
-            raise orders.error(
+            raise words.error(
                 f"{groups['distance']} while {modal.motion} is in force: whether R and Z of the cycle change their "
                 "meaning depends on the control; write G80 before"
             )
-    if groups.get("once") == "G92.1" and not orders.values.keys() >= {"X", "Y", "Z"}:
-        raise orders.error(
-            "G92.1 without X, Y and Z: what is taken back of the others depends on the control; name all"
-        )
+    if groups.get("once") == "G92.1" and not words.values.keys() >= {"X", "Y", "Z"}:
+        raise words.error("G92.1 without X, Y and Z: what is taken back of the others depends on the control; name all")
     rotation = groups.get("rotation")
     if modal.turned and rotation != "G69":
         wrong = sorted((_NOT_TURNED & groups.keys()) | ({groups.get("once", "")} & _ONCE_NOT_TURNED))
         if wrong:
-            raise orders.error(
+            raise words.error(
                 f"{groups.get(wrong[0], wrong[0])} while G68 is in force, which controls do not allow or read in "
                 "several ways; write G69 before"
             )
     if rotation is not None and modal.cutter:
-        raise orders.error(f"{rotation} under cutter compensation; write G40 before")
+        raise words.error(f"{rotation} under cutter compensation; write G40 before")
     if rotation is not None and code in CYCLES:
-        raise orders.error(f"{rotation} on a line that drills; put it on a line of its own")
+        raise words.error(f"{rotation} on a line that drills; put it on a line of its own")
 
 
-def rotate(state: State, orders: Orders) -> None:
+def rotate(state: InterpreterState, words: BlockWords) -> None:
     """G68 X Y R and G69: turn the program's X and Y about a place of theirs.
 
     Raises
@@ -87,46 +85,46 @@ def rotate(state: State, orders: Orders) -> None:
         settings of the control.
     """
     modal, offsets = state.modal, state.offsets
-    if orders.groups["rotation"] == "G69":
+    if words.groups["rotation"] == "G69":
         if modal.turned:
             offsets.turn(None)
             _turned(state, "G69")
         return
     if modal.plane != 17:
-        raise orders.error(f"G68 in G{modal.plane} is not supported; write the coordinates out")
+        raise words.error(f"G68 in G{modal.plane} is not supported; write the coordinates out")
     if not modal.absolute:
-        raise orders.error("G68 in G91: whether its words count from where the tool stands depends on the control; G90")
+        raise words.error("G68 in G91: whether its words count from where the tool stands depends on the control; G90")
     if modal.motion in CYCLES:
-        raise orders.error(f"G68 while {modal.motion} is in force; write G80 before")
-    values = orders.values
+        raise words.error(f"G68 while {modal.motion} is in force; write G80 before")
+    values = words.values
     missing = [letter for letter in "XYR" if letter not in values]
     if missing:
-        raise orders.error(
+        raise words.error(
             f"G68 without {' '.join(missing)}: {'the angle' if missing == ['R'] else 'its centre'} then depends on the "
             "control; write X, Y and R"
         )
     if "Z" in values:
-        raise orders.error("G68 with Z; X, Y and R are supported")
+        raise words.error("G68 with Z; X, Y and R are supported")
     if modal.turned:
-        raise orders.error("G68 while G68 is in force: whether the angles add depends on the control; write G69 before")
+        raise words.error("G68 while G68 is in force: whether the angles add depends on the control; write G69 before")
     offsets.turn((values["X"] * state.scale, values["Y"] * state.scale), values["R"])
     _turned(state, "G68")
 
 
-def _turned(state: State, code: str) -> None:
+def _turned(state: InterpreterState, code: str) -> None:
     state.renamed((False, False, True))
     state.changed(rotation=state.offsets.rotation, turned=code == "G68")
     state.turned_anew = code
 
 
-def check_place(state: State, orders: Orders, code: str) -> None:
+def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
     """Refuse the first move of X or Y behind G68 or G69 that does not name both: from where it goes is not certain.
 
     Parameters
     ----------
     state : State
         Something has been turned, and X and Y have not been named since.
-    orders : Orders
+    words : Orders
     code : str
         The motion that the line makes.
 
@@ -134,31 +132,31 @@ def check_place(state: State, orders: Orders, code: str) -> None:
     ------
     ProgramError
     """
-    if not code or orders.groups.get("once") == "G53":
+    if not code or words.groups.get("once") == "G53":
         return
-    named = _PLANE_LETTERS & orders.values.keys()
+    named = _PLANE_LETTERS & words.values.keys()
     straight = code in _STRAIGHT
     if not named and straight:
         return
     if named != _PLANE_LETTERS or not state.modal.absolute or not (straight or code in CYCLES):
-        raise orders.error(
+        raise words.error(
             f"the first move behind {state.turned_anew} has to go to X and Y in G90, straight: where the control takes "
             "the tool to stand is not certain before"
         )
     state.turned_anew = ""
 
 
-def check_dwell(orders: Orders) -> None:
+def check_dwell(words: BlockWords) -> None:
     """Refuse a dwell in P with a decimal point: it counts seconds for a Haas, and a Fanuc does not take it."""
-    word = orders.words.get("P")
+    word = words.words.get("P")
     if word is not None and word.number is not None and "." in word.value:
-        raise orders.error(
+        raise words.error(
             f"P{word.value.strip()} for a dwell: with a decimal point it counts seconds for a Haas, and a Fanuc does "
             "not take it; write milliseconds without a point"
         )
 
 
-def dwell_of_x(state: State, orders: Orders) -> float:
+def dwell_of_x(state: InterpreterState, words: BlockWords) -> float:
     """Return the time of G4 X [s].
 
     Raises
@@ -166,18 +164,18 @@ def dwell_of_x(state: State, orders: Orders) -> float:
     ProgramError
         It has no decimal point, and what it counts then is not said.
     """
-    word = orders.words["X"]
+    word = words.words["X"]
     if word.number is None or "." in word.value or not word.number:
-        return orders.values["X"]
+        return words.values["X"]
     if state.setup.integers == "refuse":
-        raise orders.error(
+        raise words.error(
             f"G4 X{word.value.strip()} has no decimal point: whether it counts seconds or milliseconds depends on the "
             "control; say which with --integers, or write the point"
         )
-    return orders.values["X"] / (1000.0 if state.setup.integers == "least" else 1.0)
+    return words.values["X"] / (1000.0 if state.setup.integers == "least" else 1.0)
 
 
-def drills(state: State, orders: Orders) -> bool:
+def drills(state: InterpreterState, words: BlockWords) -> bool:
     """Return whether a line of a cycle drills: with K0 or L0 it stores its words only.
 
     Raises
@@ -185,26 +183,26 @@ def drills(state: State, orders: Orders) -> bool:
     ProgramError
         K0 or L0 beside X or Y of another place, to which some controls go; R above the level of the cycle.
     """
-    _check_level(state, orders)
-    if not any(orders.values.get(letter) == 0.0 for letter in "KL"):
+    _check_level(state, words)
+    if not any(words.values.get(letter) == 0.0 for letter in "KL"):
         return True
     across = PLANES[state.modal.plane][2]
-    for i, place in state.axis_values(orders).items():
+    for i, place in state.axis_values(words).items():
         if i != across and not (state.modal.absolute and state.known[i] and abs(place - state.place[i]) < _SAME):
-            raise orders.error(
-                f"{'XYZ'[i]} beside {'K0' if 'K' in orders.values else 'L0'}, which stores the words of the cycle: "
+            raise words.error(
+                f"{'XYZ'[i]} beside {'K0' if 'K' in words.values else 'L0'}, which stores the words of the cycle: "
                 f"some controls go there; write {'XYZ'[i]} on a line before"
             )
     return False
 
 
-def _check_level(state: State, orders: Orders) -> None:
+def _check_level(state: InterpreterState, words: BlockWords) -> None:
     """Refuse a cycle whose R is above the level where it begins: when the tool goes up to it depends on the control."""
     plane, level = state.sticky["R"] * state.scale, state.level or 0.0
     above = plane - level if state.modal.absolute else plane
     sure = state.level_known or not state.modal.absolute
     if sure and above > _SAME:
-        raise orders.error(
+        raise words.error(
             f"R is {above:g} mm above the level where the cycle begins: when the tool goes up depends on the control; "
             "go to that level before"
         )

@@ -12,8 +12,8 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter import fanuc, modal, motion, offsetcodes
 from thermocomp.nc.interpreter.block import Block, Setup
 from thermocomp.nc.interpreter.codes import CYCLES, STOPS, TAKES_AXES
-from thermocomp.nc.interpreter.state import State
-from thermocomp.nc.interpreter.words import Orders, Reader
+from thermocomp.nc.interpreter.state import InterpreterState
+from thermocomp.nc.interpreter.words import BlockWords, Reader
 from thermocomp.nc.parser.expressions import Parameters
 from thermocomp.nc.parser.line import Line
 
@@ -25,7 +25,7 @@ _STATED_ANEW: Final = frozenset({"", "G0", "G1", "G2", "G3"})
 _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
-def follow(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
+def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
     """Follow a program.
 
     Parameters
@@ -58,7 +58,7 @@ class Follower:
     """
 
     def __init__(self, setup: Setup) -> None:
-        self.state = State(setup)
+        self.state = InterpreterState(setup)
         self._setup = setup
         self._parameters = Parameters(setup.controller)
         self._reader = Reader(setup, self._parameters)
@@ -91,12 +91,12 @@ class Follower:
             raise ProgramError(line.number, f"{line.flow}: loops, branches and subprograms are not followed; {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
-        orders = self._reader.read(line)
+        words = self._reader.read(line)
         if line.optional:
-            return self._optional(orders)
+            return self._optional(words)
         if self._if_skipped is not None:
-            self._check_motion(orders, self._if_skipped)
-        return self._run(orders)
+            self._check_motion(words, self._if_skipped)
+        return self._run(words)
 
     def _idle(self, line: Line) -> Block:
         state = self.state
@@ -121,10 +121,10 @@ class Follower:
         self._began = self._demarcated = True
         return self._idle(line)
 
-    def _optional(self, orders: Orders) -> Block:
+    def _optional(self, words: BlockWords) -> Block:
         """Run a line that the operator may skip: then nothing after it may depend on it."""
         before, motion = self._summary(), self.state.modal.motion
-        block = self._run(orders)
+        block = self._run(words)
         after = self._summary()
         if self.state.modal.motion != motion and self._if_skipped is None:
             self._if_skipped = motion
@@ -136,7 +136,7 @@ class Follower:
         if block.moves and not block.modal.absolute and block.kind != "home":
             changed.append("the place of all G91 moves behind it")
         if changed:
-            raise orders.error(
+            raise words.error(
                 f"an optional line (/) that changes {changed[0]}: what comes after depends on whether the operator "
                 "skips it; decide with --block-delete"
             )
@@ -148,11 +148,11 @@ class Follower:
             block.known = self.state.known = (x, y, z)
         return block
 
-    def _check_motion(self, orders: Orders, otherwise: str) -> None:
+    def _check_motion(self, words: BlockWords, otherwise: str) -> None:
         """Refuse a line that is run by a motion code of an optional line."""
-        told, force = orders.groups.get("motion"), self.state.modal.motion
-        if told is None and force != otherwise and self._motion(orders):
-            raise orders.error(
+        told, force = words.groups.get("motion"), self.state.modal.motion
+        if told is None and force != otherwise and self._motion(words):
+            raise words.error(
                 f"is run by {force} of an optional line (/), or by {otherwise or 'none'} if the operator skips that; "
                 "write its motion code, or decide with --block-delete"
             )
@@ -173,30 +173,30 @@ class Follower:
             "the cycle": (dict(state.sticky), state.level),
         }
 
-    def _run(self, orders: Orders) -> Block:
-        state, values, groups = self.state, orders.values, orders.groups
+    def _run(self, words: BlockWords) -> Block:
+        state, values, groups = self.state, words.values, words.groups
         before = state.modal
-        code = self._motion(orders)
+        code = self._motion(words)
         if state.fanuc:
-            fanuc.check_codes(state, orders, code)
+            fanuc.check_codes(state, words, code)
         if values.keys() - _PLAIN_LETTERS:
-            self._reader.check_letters(orders, code)
-        block = Block(orders.line, before, "none", orders.codes, orders.words, values, state.place)
+            self._reader.check_letters(words, code)
+        block = Block(words.line, before, "none", words.codes, words.words, values, state.place)
         if groups and not (len(groups) == 1 and "motion" in groups):
-            modal.settle(state, orders, block)
+            modal.apply_modal_codes(state, words, block)
         else:
-            modal.check_units(state, orders)
-            modal.speeds(state, orders, before.inch)
+            modal.check_units(state, words)
+            modal.speeds(state, words, before.inch)
         once = groups.get("once")
         if once is not None:
-            self._once(orders, block, once)
+            self._once(words, block, once)
         if state.turned_anew:
-            fanuc.check_place(state, orders, code)
+            fanuc.check_place(state, words, code)
         if code:
-            self._move(orders, block, code)
+            self._move(words, block, code)
         self._after(groups, block, code, before.motion)
         if state.lathe and not all(move.rapid for move in block.moves):
-            raise modal.lathe(orders, f"{state.lathe} before, and no M6")
+            raise modal.lathe(words, f"{state.lathe} before, and no M6")
         stop = groups.get("stop")
         if stop is not None:
             block.ends = self._ended = stop not in STOPS
@@ -227,75 +227,75 @@ class Follower:
         elif code == "G31":  # holds for its line only
             state.moves_by(before)
 
-    def _motion(self, orders: Orders) -> str:
+    def _motion(self, words: BlockWords) -> str:
         """Return the motion code that this line runs; empty if it makes no move of its own."""
-        groups, values = orders.groups, orders.values
+        groups, values = words.groups, words.values
         told = groups.get("motion")
         once = groups.get("once")
         turns = groups.get("rotation") == "G68"
         smoothed = "high speed" in groups and not _AXIS_LETTERS.isdisjoint(values)
         if smoothed and (told or any(values.get(letter) for letter in _AXIS_LETTERS)):  # zeros say which are smoothed
-            raise orders.error("axis words beside a code that smooths the path; put it on a line of its own")
+            raise words.error("axis words beside a code that smooths the path; put it on a line of its own")
         if once is None and not smoothed and not turns and "tool length" not in groups:
             if told == "G80":
-                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(orders)
+                return "" if _AXIS_LETTERS.isdisjoint(values) else self._beside_g80(words)
             if told is not None:
                 return told
         takes = smoothed or turns or once in TAKES_AXES or groups.get("tool length") == "G43.1"
         if once in ("G4", "G92.1") and self.state.fanuc:
             takes = True
         if takes:
-            self._beside(orders, told, "G68" if turns else once or "G43.1")
+            self._beside(words, told, "G68" if turns else once or "G43.1")
             return ""
         if told is not None and told != "G80":
             return told
-        if _AXIS_LETTERS.isdisjoint(values) and not self._turns(orders):
+        if _AXIS_LETTERS.isdisjoint(values) and not self._turns(words):
             return ""
         force = self.state.modal.motion
         if not force or told == "G80":
-            raise orders.error("axis words, and no motion code is in force; write G0, G1 ... before them")
+            raise words.error("axis words, and no motion code is in force; write G0, G1 ... before them")
         return force
 
-    def _beside_g80(self, orders: Orders) -> str:
+    def _beside_g80(self, words: BlockWords) -> str:
         if not self.state.fanuc:
-            raise orders.error("axis words beside G80; write the motion code they are for")
-        return fanuc.motion_beside_g80(self.state, orders)
+            raise words.error("axis words beside G80; write the motion code they are for")
+        return fanuc.motion_beside_g80(self.state, words)
 
-    def _beside(self, orders: Orders, told: str | None, other: str) -> None:
+    def _beside(self, words: BlockWords, told: str | None, other: str) -> None:
         """Take in a motion code beside another one that takes the axis words."""
         if told in ("G0", "G1") and self.state.fanuc and other in ("G28", "G30", "G68"):
             fanuc.put_in_force(self.state, told)
         elif told not in (None, "G80"):
-            raise orders.error(f"{told} beside {other}: both would use the axis words; put one on its own line")
+            raise words.error(f"{told} beside {other}: both would use the axis words; put one on its own line")
 
-    def _turns(self, orders: Orders) -> bool:
+    def _turns(self, words: BlockWords) -> bool:
         """Whether the line is an arc without axis words: a full circle."""
         force = self.state.modal.motion
-        return force in ("G2", "G3") and not orders.values.keys().isdisjoint("IJK") and "once" not in orders.groups
+        return force in ("G2", "G3") and not words.values.keys().isdisjoint("IJK") and "once" not in words.groups
 
-    def _once(self, orders: Orders, block: Block, once: str) -> None:
+    def _once(self, words: BlockWords, block: Block, once: str) -> None:
         """Do the code that holds for this line only; G53 belongs to the motion."""
-        state, values = self.state, orders.values
+        state, values = self.state, words.values
         if once == "G4":
             if "P" in values:
                 if state.fanuc:
-                    fanuc.check_dwell(orders)
+                    fanuc.check_dwell(words)
                 seconds = motion.dwell_seconds(state, values["P"])
             elif state.fanuc and "X" in values:
-                seconds = fanuc.dwell_of_x(state, orders)
+                seconds = fanuc.dwell_of_x(state, words)
             else:
-                raise orders.error("G4 needs P, the time")
+                raise words.error("G4 needs P, the time")
             if seconds < 0.0:
-                raise orders.error("G4 with a negative time")
+                raise words.error("G4 with a negative time")
             block.pause += seconds
         elif once in ("G28", "G30"):
-            motion.home(state, orders, block)
+            motion.home(state, words, block)
         elif once == "G10":
-            offsetcodes.g10(state, orders, block)
+            offsetcodes.g10(state, words, block)
         elif once != "G53":
-            offsetcodes.local(state, orders, block)
+            offsetcodes.local(state, words, block)
 
-    def _move(self, orders: Orders, block: Block, code: str) -> None:
+    def _move(self, words: BlockWords, block: Block, code: str) -> None:
         state = self.state
         again = state.modal.motion == code
         if not again:
@@ -303,21 +303,21 @@ class Follower:
         if code not in CYCLES:
             if state.level is not None:
                 state.level, state.sticky = None, {}
-        elif _AXIS_LETTERS.isdisjoint(orders.values):
-            raise orders.error(f"{code} without axis words; say where")
-        if orders.groups.get("once") == "G53":
-            motion.in_machine(state, orders, block)
+        elif _AXIS_LETTERS.isdisjoint(words.values):
+            raise words.error(f"{code} without axis words; say where")
+        if words.groups.get("once") == "G53":
+            motion.in_machine(state, words, block)
         elif code in ("G0", "G1"):
-            motion.straight(state, orders, block)
+            motion.straight(state, words, block)
         elif code in ("G2", "G3"):
-            motion.arc(state, orders, block)
+            motion.arc(state, words, block)
         elif code in CYCLES:
-            motion.cycle(state, orders, block, again)
-        elif _AXIS_LETTERS.isdisjoint(orders.values):
-            raise orders.error(f"{code} without axis words; say where")
+            motion.cycle(state, words, block, again)
+        elif _AXIS_LETTERS.isdisjoint(words.values):
+            raise words.error(f"{code} without axis words; say where")
         elif code in _PROBES:
-            motion.probe(state, orders, block)
+            motion.probe(state, words, block)
         elif code in _THREADS:
-            motion.in_step(state, orders, block)
+            motion.in_step(state, words, block)
         else:
-            motion.curve(state, orders, block)
+            motion.curve(state, words, block)

@@ -6,9 +6,9 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter import fanuc, offsetcodes
 from thermocomp.nc.interpreter.block import PLANES, Block
 from thermocomp.nc.interpreter.codes import CYCLES, LENGTHS
-from thermocomp.nc.interpreter.offsets import mark
-from thermocomp.nc.interpreter.state import MM, State
-from thermocomp.nc.interpreter.words import Orders
+from thermocomp.nc.interpreter.offsets import mark_axes
+from thermocomp.nc.interpreter.state import MM, InterpreterState
+from thermocomp.nc.interpreter.words import BlockWords
 
 _MODAL_GROUPS: Final = frozenset(
     {"plane", "units", "cutter", "distance", "arc distance", "diameter", "retract", "path", "feed mode"}
@@ -17,137 +17,137 @@ _MODAL_GROUPS: Final = frozenset(
 _NOT_UNDER_CUTTER: Final = frozenset({"tool length", "system", "path", "retract", "tool", "io", "override"})
 
 
-def lengths(state: State, orders: Orders) -> None:
+def lengths(state: InterpreterState, words: BlockWords) -> None:
     """Give lengths without a decimal point the value they have at this control."""
-    if orders.groups.get("once") == "G4":
+    if words.groups.get("once") == "G4":
         return
-    setup, inch, groups = state.setup, state.modal.inch, orders.groups
+    setup, inch, groups = state.setup, state.modal.inch, words.groups
     motion = groups.get("motion", state.modal.motion)
     none = ""  # letters that count here: K repeats a Fanuc's cycle, Q is a number but in cycles, splines and G64
     if "high speed" in groups or not (motion in CYCLES or motion == "G5" or "path" in groups):
         none = "Q"
     elif state.fanuc and motion in CYCLES:
         none = "K"
-    for letter, word in orders.words.items():
+    for letter, word in words.words.items():
         if letter not in LENGTHS or letter in none or word.number is None or "." in word.value or not word.number:
             continue
         if setup.integers == "refuse":
-            raise orders.error(
+            raise words.error(
                 f"{letter}{word.value} has no decimal point: whether it counts units or least increments depends on "
                 "the control; say which with --integers"
             )
         angle = letter == "R" and "rotation" in groups
-        orders.values[letter] = word.number * setup.least / (MM if inch and not angle else 1.0)
+        words.values[letter] = word.number * setup.least / (MM if inch and not angle else 1.0)
 
 
-def check_units(state: State, orders: Orders) -> None:
+def check_units(state: InterpreterState, words: BlockWords) -> None:
     """Refuse lengths while their unit is not known."""
     if not state.unit_told:
-        _unit_needed(state, orders)
+        _unit_needed(state, words)
     if state.setup.integers != "whole":
-        lengths(state, orders)
+        lengths(state, words)
 
 
-def _unit_needed(state: State, orders: Orders) -> None:
-    if orders.groups.get("once") == "G4":
+def _unit_needed(state: InterpreterState, words: BlockWords) -> None:
+    if words.groups.get("once") == "G4":
         return
     for letter in "XYZIJKF":
         inverse = letter == "F" and state.modal.feed_mode == 93
-        if orders.values.get(letter) and not inverse:
-            raise orders.error(
-                f"{letter}{orders.words[letter].value.strip()} before G20 or G21: inches or millimetres? write G20 or "
+        if words.values.get(letter) and not inverse:
+            raise words.error(
+                f"{letter}{words.words[letter].value.strip()} before G20 or G21: inches or millimetres? write G20 or "
                 "G21 on a line before it, or say which unit the control starts with (--units)"
             )
 
 
-def speeds(state: State, orders: Orders, inch: bool) -> None:
+def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
     """F, S and T."""
-    values = orders.values
+    values = words.values
     if "F" in values:
         word = values["F"]
         if word < 0.0:
-            raise orders.error(f"F{word:g} is negative")
+            raise words.error(f"F{word:g} is negative")
         state.feed_word = word
         state.feed = word * MM if inch and state.modal.feed_mode != 93 else word
     if "S" in values:
         if values["S"] < 0.0:
-            raise orders.error(f"S{values['S']:g} is negative; M4 turns the other way")
+            raise words.error(f"S{values['S']:g} is negative; M4 turns the other way")
         state.spindle = values["S"]
     if "T" in values:
-        state.selected = orders.whole("T") or 0
-        if state.fanuc and state.lathe is not None and state.selected > 99 and "tool" not in orders.groups:
-            state.lathe = f"T{orders.words['T'].value.strip()}"
+        state.selected = words.whole("T") or 0
+        if state.fanuc and state.lathe is not None and state.selected > 99 and "tool" not in words.groups:
+            state.lathe = f"T{words.words['T'].value.strip()}"
             if state.lathe[1] == "0":
-                raise lathe(orders, f"{state.lathe} without M6")
+                raise lathe(words, f"{state.lathe} without M6")
 
 
-def lathe(orders: Orders, sign: str) -> ProgramError:
+def lathe(words: BlockWords, sign: str) -> ProgramError:
     """Return the error of a lathe program, and what shows that it is one."""
-    return orders.error(f"{sign}: a lathe program: X is a diameter, G99 is feed per turn there; not supported")
+    return words.error(f"{sign}: a lathe program: X is a diameter, G99 is feed per turn there; not supported")
 
 
-def settle(state: State, orders: Orders, block: Block) -> None:
+def apply_modal_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """Do everything but nonmodal codes and motion, in the order of LinuxCNC."""
-    groups = orders.groups
+    groups = words.groups
     inch = state.modal.inch
     if state.modal.cutter and not state.fanuc:
-        _check_cutter(state, orders)
+        _check_cutter(state, words)
     if "feed mode" in groups:
         mode = int(groups["feed mode"][1:])
         if mode != state.modal.feed_mode or not state.fanuc:
             state.feed = state.feed_word = 0.0
         state.changed(feed_mode=mode)
     if groups.get("scaling") == "G50" and (
-        "S" in orders.values or (not {"X", "Z"}.isdisjoint(orders.values) and "motion" not in groups)
+        "S" in words.values or (not {"X", "Z"}.isdisjoint(words.values) and "motion" not in groups)
     ):
-        raise lathe(orders, "G50 with S, X or Z")
+        raise lathe(words, "G50 with S, X or Z")
     if state.fanuc and "units" in groups:
         inch = groups["units"] == "G20"
     if "units" in groups:
-        _unit_of_feed(state, orders)
+        _unit_of_feed(state, words)
     else:
-        check_units(state, orders)
-    speeds(state, orders, inch)
-    _machine_codes(state, orders, block)
+        check_units(state, words)
+    speeds(state, words, inch)
+    _machine_codes(state, words, block)
     if not _MODAL_GROUPS.isdisjoint(groups):
-        _modal_codes(state, orders)
+        _modal_codes(state, words)
     if "units" in groups and state.setup.integers != "whole":
-        lengths(state, orders)
+        lengths(state, words)
     if "tool length" in groups:
-        offsetcodes.tool_length(state, orders)
+        offsetcodes.tool_length(state, words)
     if "system" in groups:
-        offsetcodes.select_system(state, orders)
+        offsetcodes.select_system(state, words)
     if "rotation" in groups:
-        fanuc.rotate(state, orders)
+        fanuc.rotate(state, words)
 
 
-def _unit_of_feed(state: State, orders: Orders) -> None:
+def _unit_of_feed(state: InterpreterState, words: BlockWords) -> None:
     """LinuxCNC reads F before G20 and G21 of the same line."""
-    code = orders.groups["units"]
-    if not (state.unit_told or state.fanuc or state.modal.feed_mode == 93) and orders.values.get("F"):
-        raise orders.error(
+    code = words.groups["units"]
+    if not (state.unit_told or state.fanuc or state.modal.feed_mode == 93) and words.values.get("F"):
+        raise words.error(
             f"F on the line of {code}: LinuxCNC reads it in the unit in force before; put it on a line after {code}, "
             "or say which unit the control starts with (--units)"
         )
     state.unit_told = True
 
 
-def _check_cutter(state: State, orders: Orders) -> None:
-    groups = orders.groups
+def _check_cutter(state: InterpreterState, words: BlockWords) -> None:
+    groups = words.groups
     for group in _NOT_UNDER_CUTTER & groups.keys():
-        raise orders.error(f"{groups[group]} cannot stand under cutter compensation; G40 has to come before")
+        raise words.error(f"{groups[group]} cannot stand under cutter compensation; G40 has to come before")
     if groups.get("once") in ("G52", "G92", "G92.1", "G92.2", "G92.3", "G10"):
-        raise orders.error(f"{groups['once']} cannot stand under cutter compensation; G40 has to come before")
+        raise words.error(f"{groups['once']} cannot stand under cutter compensation; G40 has to come before")
     if groups.get("cutter", "G40") != "G40":
-        raise orders.error(f"{groups['cutter']} while cutter compensation is on; write G40 before")
+        raise words.error(f"{groups['cutter']} while cutter compensation is on; write G40 before")
     plane = groups.get("plane")
     if plane is not None and int(plane[1:]) != state.modal.plane:
-        raise orders.error(f"{plane} under cutter compensation; write G40 before")
+        raise words.error(f"{plane} under cutter compensation; write G40 before")
 
 
-def _machine_codes(state: State, orders: Orders, block: Block) -> None:
+def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """M codes, but for stops."""
-    groups, values = orders.groups, orders.values
+    groups, values = words.groups, words.values
     tool = groups.get("tool")
     if tool == "M6":
         block.tool_change = state.tool = state.selected
@@ -156,14 +156,14 @@ def _machine_codes(state: State, orders: Orders, block: Block) -> None:
         state.known, state.level_known = (False, False, False), False
         state.lathe = None
     elif tool == "M61":
-        number = orders.whole("Q")
+        number = words.whole("Q")
         if number is None:
-            raise orders.error("M61 needs Q, the number of the tool")
+            raise words.error("M61 needs Q, the number of the tool")
         state.tool = number
     spindle = groups.get("spindle")
     if spindle in ("M3", "M4"):
         if state.spindle is None:
-            raise orders.error(
+            raise words.error(
                 f"{spindle} and no spindle speed was stated: the drift would not be known; write S, or say the speed "
                 "the control starts with"
             )
@@ -174,8 +174,8 @@ def _machine_codes(state: State, orders: Orders, block: Block) -> None:
         block.stops = True  # it waits for an input, nobody knows how long
 
 
-def _modal_codes(state: State, orders: Orders) -> None:
-    groups = orders.groups
+def _modal_codes(state: InterpreterState, words: BlockWords) -> None:
+    groups = words.groups
     fields: dict[str, object] = {}
     if "plane" in groups:
         fields["plane"] = int(groups["plane"][1:])
@@ -187,12 +187,12 @@ def _modal_codes(state: State, orders: Orders) -> None:
     if "cutter" in groups:
         fields["cutter"] = on = groups["cutter"] != "G40"
         if state.modal.cutter and not on:  # the tool stays beside the programmed path
-            state.known = mark(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
+            state.known = mark_axes(state.known, dict.fromkeys(PLANES[state.modal.plane][:2]), to=False)
     if "path" in groups:
         # Fanuc's likes smooth the path in G61.1 and stop in G61
         exact = groups["path"] == "G61" or (groups["path"] == "G61.1" and not state.fanuc)
-        blend = 0.0 if exact else orders.values.get("P", 0.0) * state.scale
-        naive = orders.values.get("Q", 0.0) * state.scale if blend and "Q" in orders.values else blend
+        blend = 0.0 if exact else words.values.get("P", 0.0) * state.scale
+        naive = words.values.get("Q", 0.0) * state.scale if blend and "Q" in words.values else blend
         fields |= {
             "blend": None if exact else blend,
             "naive": naive,

@@ -4,10 +4,10 @@ from thermocomp.nc.interpreter import fanuc
 from thermocomp.nc.interpreter.arcs import CENTRE, ArcError, Flat, centre_of_radius, check_centre
 from thermocomp.nc.interpreter.block import PLANES, Arc, Block, Known, Move
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.interpreter.cycles import KEPT, ROUNDING, Cycle, CycleError, pause
-from thermocomp.nc.interpreter.offsets import mark, put
-from thermocomp.nc.interpreter.state import State
-from thermocomp.nc.interpreter.words import Orders
+from thermocomp.nc.interpreter.cycles import KEPT, ROUNDING, CannedCycle, CycleError, pause
+from thermocomp.nc.interpreter.offsets import mark_axes, replace_coordinates
+from thermocomp.nc.interpreter.state import InterpreterState
+from thermocomp.nc.interpreter.words import BlockWords
 
 #: LinuxCNC refuses these under cutter compensation, which this follower does not compute
 _NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come before"
@@ -16,13 +16,13 @@ _NOT_COMPENSATED = "cannot stand under cutter compensation; G40 has to come befo
 _SAME_LEVEL = 1e-4
 
 
-def straight(state: State, orders: Orders, block: Block) -> None:
+def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G0 and G1."""
-    values = orders.values
-    rotary = state.turn(orders) if "A" in values or "B" in values or "C" in values else 0.0
+    values = words.values
+    rotary = state.turn(words) if "A" in values or "B" in values or "C" in values else 0.0
     if not rotary and not ("X" in values or "Y" in values or "Z" in values or "A" in values):
         return
-    place, known = state.goal(orders)
+    place, known = state.goal(words)
     start = state.machine
     offset = state.offsets.sum
     if offset is None:
@@ -33,206 +33,206 @@ def straight(state: State, orders: Orders, block: Block) -> None:
     if state.modal.motion == "G0":
         block.moves.append(Move(True, start, end, None, 0.0, None, rotary))
     else:
-        block.moves.append(state.cut(orders, start, end, None, rotary))
+        block.moves.append(state.cut(words, start, end, None, rotary))
     state.place, state.machine, state.known = place, end, known
 
 
-def in_machine(state: State, orders: Orders, block: Block) -> None:
+def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G53: the words are machine coordinates."""
     if not state.modal.absolute:
-        raise orders.error("G53 cannot stand in G91; write G90 before")
+        raise words.error("G53 cannot stand in G91; write G90 before")
     if state.modal.cutter:
-        raise orders.error(f"G53 {_NOT_COMPENSATED}")
+        raise words.error(f"G53 {_NOT_COMPENSATED}")
     if state.modal.motion not in ("G0", "G1"):
-        raise orders.error("G53 needs G0 or G1 on its line or in force")
-    rotary = state.turn(orders)
-    values = state.axis_values(orders)
+        raise words.error("G53 needs G0 or G1 on its line or in force")
+    rotary = state.turn(words)
+    values = state.axis_values(words)
     if not values and not rotary:
         return
-    start, end = state.machine, put(state.machine, values)
+    start, end = state.machine, replace_coordinates(state.machine, values)
     block.kind = "machine"
     rapid = state.fanuc or state.modal.motion == "G0"
-    block.moves.append(Move(True, start, end, None, 0.0, None, rotary) if rapid else state.cut(orders, start, end))
+    block.moves.append(Move(True, start, end, None, 0.0, None, rotary) if rapid else state.cut(words, start, end))
     state.machine = end
     state.place = state.offsets.program(end)
     state.known = _doubt(state, values)
 
 
-def _doubt(state: State, axes: dict[int, float]) -> Known:
+def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
     """Return what is still known after machine coordinates of some axes were reached."""
-    known = mark(state.known, axes, to=False)
+    known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known
 
 
-def home(state: State, orders: Orders, block: Block) -> None:
+def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G28 and G30: by way of the point in the words; only the axes in the words go home, all if there are none."""
-    code = orders.groups["once"]
+    code = words.groups["once"]
     if state.modal.cutter:
-        raise orders.error(f"{code} {_NOT_COMPENSATED}")
-    turns = not ROTARY.isdisjoint(orders.values)  # whether it is there already or not
-    rotary = state.turn(orders)
-    named = state.axis_values(orders)
+        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    turns = not ROTARY.isdisjoint(words.values)  # whether it is there already or not
+    rotary = state.turn(words)
+    named = state.axis_values(words)
     if not named and not turns and state.fanuc:
-        raise orders.error(f"{code} without axis words; name the axes that go home, such as {code} Z0")
-    place, _ = state.goal(orders)
+        raise words.error(f"{code} without axis words; name the axes that go home, such as {code} Z0")
+    place, _ = state.goal(words)
     start, between = state.machine, state.offsets.machine(place)
     far = state.setup.home or (0.0, 0.0, 0.0)
     if named or turns:
         target = state.offsets.program(far)
-        place = put(place, {i: target[i] for i in named})
+        place = replace_coordinates(place, {i: target[i] for i in named})
         far = state.offsets.machine(place)
     block.kind = "home"
     block.moves += [Move(True, start, between, rotary=rotary), Move(True, between, far)]
     state.machine = far
     state.place = state.offsets.program(far)
     axes = named or ({} if turns else {0: 0.0, 1: 0.0, 2: 0.0})
-    state.known = mark(state.known, axes, to=False)
+    state.known = mark_axes(state.known, axes, to=False)
 
 
-def arc(state: State, orders: Orders, block: Block) -> None:
+def arc(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G2 and G3."""
-    modal, values, scale = state.modal, orders.values, state.scale
+    modal, values, scale = state.modal, words.values, state.scale
     first, second, _ = PLANES[modal.plane]
     letters = CENTRE[modal.plane]
     clockwise = modal.motion == "G2"
-    turns = orders.whole("P", least=1) or 1
+    turns = words.whole("P", least=1) or 1
     if letters[2] in values:
-        raise orders.error(f"{letters[2]} in an arc of G{modal.plane}; the centre is in {letters[0]} and {letters[1]}")
+        raise words.error(f"{letters[2]} in an arc of G{modal.plane}; the centre is in {letters[0]} and {letters[1]}")
     has_centre = letters[0] in values or letters[1] in values
     if has_centre == ("R" in values):
-        raise orders.error("an arc needs its centre in I J K, or its radius in R, and not both")
+        raise words.error("an arc needs its centre in I J K, or its radius in R, and not both")
     if modal.plane != 17 and state.offsets.rotation:
-        raise orders.error("an arc of G18 or G19 in rotated coordinates is not supported; write it as G1 moves")
-    rotary = state.turn(orders)
+        raise words.error("an arc of G18 or G19 in rotated coordinates is not supported; write it as G1 moves")
+    rotary = state.turn(words)
     start = state.place
-    place, known = state.goal(orders)
+    place, known = state.goal(words)
     begin, end = (start[first], start[second]), (place[first], place[second])
     try:
         if has_centre:
-            centre = _centre(state, orders, begin)
+            centre = _centre(state, words, begin)
             check_centre(begin, end, centre, modal.inch)
         else:
             centre = centre_of_radius(begin, end, values["R"] * scale, clockwise)
     except ArcError as error:
-        raise orders.error(str(error)) from None
-    middle = state.offsets.machine(put(place, {first: centre[0], second: centre[1]}))
+        raise words.error(str(error)) from None
+    middle = state.offsets.machine(replace_coordinates(place, {first: centre[0], second: centre[1]}))
     turned = Arc(modal.plane, (middle[first], middle[second]), clockwise, turns)
     was = state.machine
     state.reach(place, known)
     block.kind = "arc"
-    block.moves.append(state.cut(orders, was, state.machine, turned, rotary))
+    block.moves.append(state.cut(words, was, state.machine, turned, rotary))
 
 
-def _centre(state: State, orders: Orders, begin: Flat) -> Flat:
+def _centre(state: InterpreterState, words: BlockWords, begin: Flat) -> Flat:
     """Return the centre from I J K, in program coordinates of the plane's axes."""
     letters = CENTRE[state.modal.plane]
-    values, scale = orders.values, state.scale
+    values, scale = words.values, state.scale
     a, b = values.get(letters[0]), values.get(letters[1])
     if state.modal.arc_absolute:
         if a is None or b is None:
-            raise orders.error(f"G90.1 needs {letters[0]} and {letters[1]} for every arc")
+            raise words.error(f"G90.1 needs {letters[0]} and {letters[1]} for every arc")
         return (a * scale, b * scale)
     return (begin[0] + (a or 0.0) * scale, begin[1] + (b or 0.0) * scale)
 
 
-def in_step(state: State, orders: Orders, block: Block) -> None:
+def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G33 and G33.1: in step with the spindle; G33.1 comes back to where it started."""
     code = state.modal.motion
-    if "K" not in orders.values:
-        raise orders.error(f"{code} needs K, the way per turn")
-    if "F" in orders.values:
-        raise orders.error(f"F with {code}: its feed is K; remove F")
+    if "K" not in words.values:
+        raise words.error(f"{code} needs K, the way per turn")
+    if "F" in words.values:
+        raise words.error(f"F with {code}: its feed is K; remove F")
     if state.modal.cutter:
-        raise orders.error(f"{code} {_NOT_COMPENSATED}")
-    rotary = state.turn(orders)
+        raise words.error(f"{code} {_NOT_COMPENSATED}")
+    rotary = state.turn(words)
     start, before, was_known = state.machine, state.place, state.known
-    state.reach(*state.goal(orders))
-    pitch = orders.values["K"] * state.scale
+    state.reach(*state.goal(words))
+    pitch = words.values["K"] * state.scale
     block.kind = "line"
-    block.moves.append(state.per_turn(orders, start, state.machine, abs(pitch), rotary=rotary))
+    block.moves.append(state.per_turn(words, start, state.machine, abs(pitch), rotary=rotary))
     if code == "G33.1":
-        back = orders.values.get("I", 1.0)
+        back = words.values.get("I", 1.0)
         if back <= 0.0:
-            raise orders.error(f"G33.1 with I{back:g}: how much faster it comes back has to be above 0")
-        block.moves.append(state.per_turn(orders, state.machine, start, abs(pitch) * back))
+            raise words.error(f"G33.1 with I{back:g}: how much faster it comes back has to be above 0")
+        block.moves.append(state.per_turn(words, state.machine, start, abs(pitch) * back))
         state.reach(before, was_known)
 
 
-def probe(state: State, orders: Orders, block: Block) -> None:
+def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G38 and G31: nobody knows where it stops; the goal is taken for the end."""
     code = state.modal.motion
     if state.modal.cutter:
-        raise orders.error(f"{code} {_NOT_COMPENSATED}")
+        raise words.error(f"{code} {_NOT_COMPENSATED}")
     if state.modal.feed_mode == 95:
-        raise orders.error(f"{code} needs a feed per minute; write G94 and F before")
-    rotary = state.turn(orders)
+        raise words.error(f"{code} needs a feed per minute; write G94 and F before")
+    rotary = state.turn(words)
     start, before = state.machine, state.place
-    place, known = state.goal(orders)
+    place, known = state.goal(words)
     if place == before and not rotary:
-        raise orders.error(f"{code} starts where it ends; check its axis words")
+        raise words.error(f"{code} starts where it ends; check its axis words")
     state.reach(place, known)
     block.kind = "probe"
-    block.moves.append(state.cut(orders, start, state.machine, None, rotary))
-    state.known = mark(known, {i: 0.0 for i in range(3) if place[i] != before[i]}, to=False)
+    block.moves.append(state.cut(words, start, state.machine, None, rotary))
+    state.known = mark_axes(known, {i: 0.0 for i in range(3) if place[i] != before[i]}, to=False)
 
 
-def curve(state: State, orders: Orders, block: Block) -> None:
+def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G5 and G5.1; the move is told as the straight line from start to end."""
-    code, values = state.modal.motion, orders.values
+    code, values = state.modal.motion, words.values
     if state.modal.plane != 17 or {"Z", "A", "B", "C"} & values.keys():
-        raise orders.error(f"{code} is for X and Y in G17 only")
+        raise words.error(f"{code} is for X and Y in G17 only")
     if state.modal.cutter:
-        raise orders.error(f"{code} {_NOT_COMPENSATED}")
+        raise words.error(f"{code} {_NOT_COMPENSATED}")
     if state.modal.feed_mode == 93:
-        raise orders.error(f"{code} in G93 is not supported; write G94 and F before")
+        raise words.error(f"{code} in G93 is not supported; write G94 and F before")
     needed = ("P", "Q") if code == "G5" else ("I", "J")
     if not all(letter in values for letter in needed):
-        raise orders.error(f"{code} needs {needed[0]} and {needed[1]}")
+        raise words.error(f"{code} needs {needed[0]} and {needed[1]}")
     if ("I" in values) != ("J" in values):
-        raise orders.error("G5 needs I and J both, or none of them")
+        raise words.error("G5 needs I and J both, or none of them")
     start = state.machine
-    state.reach(*state.goal(orders))
+    state.reach(*state.goal(words))
     block.kind = "curve"
-    block.moves.append(state.cut(orders, start, state.machine))
+    block.moves.append(state.cut(words, start, state.machine))
 
 
-def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
+def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool) -> None:
     """G73 to G89.
 
     Parameters
     ----------
     state : State
-    orders : Orders
+    words : Orders
     block : Block
         Gets the moves.
     again : bool
         The same cycle was in force before this line.
     """
-    modal, values = state.modal, orders.values
+    modal, values = state.modal, words.values
     code, scale = modal.motion, state.scale
-    _may_drill(state, orders)
+    _may_drill(state, words)
     if state.fanuc:
-        fanuc.check_dwell(orders)
+        fanuc.check_dwell(words)
     across = PLANES[modal.plane][2]
     letter = "XYZ"[across]
-    axes = {"XYZ"[i]: v / scale for i, v in state.axis_values(orders).items()}
+    axes = {"XYZ"[i]: v / scale for i, v in state.axis_values(words).items()}
     named = {c: v for c, v in axes.items() if c != letter}
-    _keep_words(state, orders, again, axes, letter)
+    _keep_words(state, words, again, axes, letter)
     start = state.place
     frame = (modal.plane, modal.inch, modal.diameter)
     if state.level is None:
         state.level, state.level_known, state.level_frame = start[across], state.known[across], frame
     elif state.level_frame != frame:
-        raise orders.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
+        raise words.error(f"{code} after a change of plane or unit within cycles; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
-        _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, orders)
+        _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, words)
     block.kind, block.sticky = "cycle", state.sticky
-    if state.fanuc and not fanuc.drills(state, orders):
+    if state.fanuc and not fanuc.drills(state, words):
         return
-    repeats = orders.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
+    repeats = words.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
     x, y, z = (v / scale for v in start)
-    run = Cycle(
+    run = CannedCycle(
         code,
         modal.plane,
         modal.absolute,
@@ -245,50 +245,50 @@ def cycle(state: State, orders: Orders, block: Block, again: bool) -> None:
         repeats,
         state.fanuc,
     )
-    _turn_for_a_tap(state, orders, block)
+    _turn_for_a_tap(state, words, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
     at = state.machine
     try:
         for rapid, (x, y, z) in run.steps():
             start = (x * scale, y * scale, z * scale)
             end = state.offsets.machine(start)
-            block.moves.append(Move(True, at, end) if rapid else state.cut(orders, at, end))
+            block.moves.append(Move(True, at, end) if rapid else state.cut(words, at, end))
             at = end
     except CycleError as error:
-        raise orders.error(f"{code}: {error}") from None
+        raise words.error(f"{code}: {error}") from None
     known = state.known
     if modal.absolute:
-        known = mark(known, {i: 0.0 for i in range(3) if "XYZ"[i] in named}, to=True)
+        known = mark_axes(known, {i: 0.0 for i in range(3) if "XYZ"[i] in named}, to=True)
     state.place, state.machine = start, at
-    state.known = mark(known, {across: 0.0}, to=_ends_certainly(state))
+    state.known = mark_axes(known, {across: 0.0}, to=_ends_certainly(state))
 
 
-def _keep_words(state: State, orders: Orders, again: bool, axes: dict[str, float], letter: str) -> None:
+def _keep_words(state: InterpreterState, words: BlockWords, again: bool, axes: dict[str, float], letter: str) -> None:
     """Note the words of a cycle that hold for the holes after it as well."""
-    values, code = orders.values, state.modal.motion
+    values, code = words.values, state.modal.motion
     kept = {c: values[c] for c in "RQPIJK" if c in values and (c != "K" or not state.fanuc)}
     depth = {letter: axes[letter]} if letter in axes else {}
     state.sticky = (state.sticky if again else {}) | kept | depth
     missing = [c for c in KEPT[code] + letter if c not in state.sticky and not (state.fanuc and c == "P")]
     if missing:
-        raise orders.error(f"{code} needs {' '.join(missing)} where it begins")
+        raise words.error(f"{code} needs {' '.join(missing)} where it begins")
     if code in ("G73", "G83") and state.sticky["Q"] <= 0.0:
-        raise orders.error(f"Q of {code} has to be above 0")
+        raise words.error(f"Q of {code} has to be above 0")
     if code in ("G74", "G84") and not state.fanuc:
         state.sticky.setdefault("P", state.last_dwell)  # that of the cycle before, in LinuxCNC
     state.last_dwell = state.sticky.get("P", state.last_dwell)
 
 
-def _turn_for_a_tap(state: State, orders: Orders, block: Block) -> None:
+def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """On a Fanuc the tapping cycles start the spindle themselves."""
     code = state.modal.motion
     if state.fanuc and code in ("G74", "G84") and not state.turning:
         if state.spindle is None:
-            raise orders.error(f"{code}, and no spindle speed was stated; write S before")
+            raise words.error(f"{code}, and no spindle speed was stated; write S before")
         block.speed = state.spindle if code == "G84" else -state.spindle
 
 
-def _ends_certainly(state: State) -> bool:
+def _ends_certainly(state: InterpreterState) -> bool:
     """Whether the level at which a cycle ends is known: R by G99, or that at which it began, or both are the same."""
     modal = state.modal
     if modal.retract_stated and modal.retract == 99 and modal.absolute:
@@ -297,33 +297,33 @@ def _ends_certainly(state: State) -> bool:
     return state.level_known and (modal.retract_stated or rises >= 0.0)
 
 
-def _refuse_near_r(start: float, level: float, plane: float, orders: Orders) -> None:
+def _refuse_near_r(start: float, level: float, plane: float, words: BlockWords) -> None:
     if ROUNDING < abs(start - plane) < _SAME_LEVEL < abs(level - plane):
-        raise orders.error(
+        raise words.error(
             "G98 after a hole that ended at almost the same R: whether LinuxCNC goes up before the next hole depends "
             "on rounding; write the same R, or G80 between them"
         )
 
 
-def _may_drill(state: State, orders: Orders) -> None:
+def _may_drill(state: InterpreterState, words: BlockWords) -> None:
     code, modal = state.modal.motion, state.modal
-    if {"A", "B", "C"} & orders.values.keys():
-        raise orders.error(f"{code} with a rotary axis; turn it on a line of its own before")
+    if {"A", "B", "C"} & words.values.keys():
+        raise words.error(f"{code} with a rotary axis; turn it on a line of its own before")
     if modal.feed_mode == 93:
-        raise orders.error(f"{code} cannot stand in G93; write G94 and F before")
+        raise words.error(f"{code} cannot stand in G93; write G94 and F before")
     if modal.cutter:
-        raise orders.error(f"{code} {_NOT_COMPENSATED}")
+        raise words.error(f"{code} {_NOT_COMPENSATED}")
     if state.fanuc:
         return
     turning = state.turning
     if code in ("G74", "G84", "G87") and modal.plane != 17:
-        raise orders.error(f"{code} in G{modal.plane}: LinuxCNC 2.9 confuses the axes there; write G17 before")
+        raise words.error(f"{code} in G{modal.plane}: LinuxCNC 2.9 confuses the axes there; write G17 before")
     if code in ("G74", "G84", "G86", "G87") and not turning:
-        raise orders.error(f"{code} while the spindle stands; start it before")
+        raise words.error(f"{code} while the spindle stands; start it before")
     if (code == "G84" and turning < 0) or (code == "G74" and turning > 0):
-        raise orders.error(f"{code} while the spindle turns the other way; {'M3' if code == 'G84' else 'M4'} before it")
+        raise words.error(f"{code} while the spindle turns the other way; {'M3' if code == 'G84' else 'M4'} before it")
 
 
-def dwell_seconds(state: State, p: float) -> float:
+def dwell_seconds(state: InterpreterState, p: float) -> float:
     """Return the time of a dwell: P counts seconds in LinuxCNC, milliseconds in Fanuc."""
     return p / 1000.0 if state.fanuc else p

@@ -2,22 +2,22 @@
 
 from thermocomp.nc.interpreter.block import Block, Known, Point
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.interpreter.offsets import EXTERNAL, mark
-from thermocomp.nc.interpreter.state import State
-from thermocomp.nc.interpreter.words import Orders
+from thermocomp.nc.interpreter.offsets import EXTERNAL, mark_axes
+from thermocomp.nc.interpreter.state import InterpreterState
+from thermocomp.nc.interpreter.words import BlockWords
 
 _SYSTEMS = {f"G{53 + n}": n for n in range(1, 7)} | {f"G59.{n}": 6 + n for n in range(1, 4)}
 _G59_3 = 9
 _LENGTH_CERTAIN: Known = (True, True, True)
 
 
-def select_system(state: State, orders: Orders) -> None:
+def select_system(state: InterpreterState, words: BlockWords) -> None:
     """G54 to G59.3, and Fanuc's G54.1 P."""
-    code = orders.groups["system"]
+    code = words.groups["system"]
     if code in ("G54.1", "G154"):
-        number = orders.whole("P", least=1)
+        number = words.whole("P", least=1)
         if number is None:
-            raise orders.error(f"{code} needs P, the number of the coordinate system")
+            raise words.error(f"{code} needs P, the number of the coordinate system")
         system = 100 + number
     else:
         system = _SYSTEMS[code]
@@ -25,23 +25,23 @@ def select_system(state: State, orders: Orders) -> None:
     state.placed()
 
 
-def tool_length(state: State, orders: Orders) -> None:
+def tool_length(state: InterpreterState, words: BlockWords) -> None:
     """G43, G43.1, G43.2, G49."""
-    code = orders.groups["tool length"]
+    code = words.groups["tool length"]
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:
-        raise orders.error(
+        raise words.error(
             f"{code} after G20 or G21 under a tool length: LinuxCNC 2.9 mistakes its unit and moves Z by it; write G49 "
             "before the unit changes"
         )
     state.length_inch = None if code == "G49" else state.modal.inch
     if code == "G43.1":
-        offset, certain = _put_words(state, orders), _LENGTH_CERTAIN
-        untold = None if "Z" in orders.values else state.untold_tool
+        offset, certain = _put_words(state, words), _LENGTH_CERTAIN
+        untold = None if "Z" in words.values else state.untold_tool
     elif code == "G49":
         offset, certain, untold = (0.0, 0.0, 0.0), _LENGTH_CERTAIN, None
     else:
-        number = _length_number(state, orders, code)
+        number = _length_number(state, words, code)
         sure = number in state.lengths or (number == 0 and state.fanuc)
         length = state.lengths.get(number, state.doubtful.get(number, 0.0))
         offset, certain = (0.0, 0.0, length), (True, True, sure)
@@ -57,40 +57,40 @@ def tool_length(state: State, orders: Orders) -> None:
     state.placed()
 
 
-def _put_words(state: State, orders: Orders) -> Point:
+def _put_words(state: InterpreterState, words: BlockWords) -> Point:
     """G43.1: the words are the offset; axes without a word keep theirs."""
-    x, y, z = (state.axis_values(orders).get(i, old) for i, old in enumerate(state.offsets.tool))
+    x, y, z = (state.axis_values(words).get(i, old) for i, old in enumerate(state.offsets.tool))
     return (x, y, z)
 
 
-def _length_number(state: State, orders: Orders, code: str) -> int:
-    number = orders.whole("H")
+def _length_number(state: InterpreterState, words: BlockWords, code: str) -> int:
+    number = words.whole("H")
     if state.fanuc:
         if number is None:
             number = state.length_number
         state.length_number = number
         return -1 if number is None else number
     if code == "G43.2" and not number:
-        raise orders.error("G43.2 needs H, the tool whose length is added")
+        raise words.error("G43.2 needs H, the tool whose length is added")
     return number or state.tool  # H0 is the tool in the spindle
 
 
-def local(state: State, orders: Orders, block: Block) -> None:
+def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G92 and G52, and what takes them back."""
-    code = orders.groups["once"]
+    code = words.groups["once"]
     offsets = state.offsets
-    values = state.axis_values(orders)
+    values = state.axis_values(words)
     if code in ("G92", "G52"):
-        if not values and not ROTARY & orders.values.keys():
-            raise orders.error(f"{code} without axis words; name the axes")
+        if not values and not ROTARY & words.values.keys():
+            raise words.error(f"{code} without axis words; name the axes")
         if state.fanuc and any(offsets.shift) and code != state.shifted_by:
-            raise orders.error("G52 and G92 together are not supported; cancel one before the other")
+            raise words.error("G52 and G92 together are not supported; cancel one before the other")
         state.shifted_by = code
         block.kind = "set"
-    for letter in ROTARY & orders.values.keys():
+    for letter in ROTARY & words.values.keys():
         state.rezeroed.add(letter)
         if code == "G92":
-            state.rotary[letter] = orders.values[letter]
+            state.rotary[letter] = words.values[letter]
         state.turned_to()
     if code == "G92":
         offsets.name_place(state.place, values, state.known)
@@ -104,37 +104,37 @@ def local(state: State, orders: Orders, block: Block) -> None:
     state.renamed(still)
 
 
-def g10(state: State, orders: Orders, block: Block) -> None:
+def g10(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G10: origins and tool lengths."""
-    kind = orders.whole("L")
-    number = orders.whole("P")
+    kind = words.whole("L")
+    number = words.whole("P")
     if kind not in (2, 20) and (state.fanuc or kind not in (1, 10, 11)):
-        raise orders.error(f"G10 L{kind if kind is not None else ''} is not supported; L2 and L20 are")
+        raise words.error(f"G10 L{kind if kind is not None else ''} is not supported; L2 and L20 are")
     if number is None:
-        raise orders.error(f"G10 L{kind} needs P, the number of what is set")
+        raise words.error(f"G10 L{kind} needs P, the number of what is set")
     if kind in (2, 20):
-        _origin(state, orders, block, kind, number)
+        _origin(state, words, block, kind, number)
     else:
-        _length(state, orders, block, kind, number)
+        _length(state, words, block, kind, number)
 
 
-def _origin(state: State, orders: Orders, block: Block, kind: int, number: int) -> None:
-    if anew := ROTARY & orders.values.keys():
+def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int, number: int) -> None:
+    if anew := ROTARY & words.values.keys():
         state.rezeroed |= anew
         state.turned_to()
     offsets = state.offsets
-    values = state.axis_values(orders)
+    values = state.axis_values(words)
     if state.fanuc:
         system, rotation = (100 + number if kind == 20 else number or EXTERNAL), None
-        if "R" in orders.values:
-            raise orders.error("R with G10 L2 is not Fanuc's; remove it")
+        if "R" in words.values:
+            raise words.error("R with G10 L2 is not Fanuc's; remove it")
         top = 6 if kind == 2 else 300
     else:
-        system, rotation, top = number or offsets.system, orders.values.get("R"), 9
-        if "I" in orders.values or "J" in orders.values or (rotation is not None and kind == 20):
-            raise orders.error(f"G10 L{kind} takes X Y Z{' and R' if kind == 2 else ''} only")
+        system, rotation, top = number or offsets.system, words.values.get("R"), 9
+        if "I" in words.values or "J" in words.values or (rotation is not None and kind == 20):
+            raise words.error(f"G10 L{kind} takes X Y Z{' and R' if kind == 2 else ''} only")
     if number > top:
-        raise orders.error(f"G10 L{kind} P{number}: there are {top} coordinate systems")
+        raise words.error(f"G10 L{kind} P{number}: there are {top} coordinate systems")
     if kind == 20 and not state.fanuc:
         offsets.name_origin(system, state.machine, values, state.known)
         if system == offsets.system:
@@ -143,17 +143,17 @@ def _origin(state: State, orders: Orders, block: Block, kind: int, number: int) 
         return
     offsets.set_origin(system, values, rotation, add=state.fanuc and not state.modal.absolute)
     if system in (offsets.system, EXTERNAL):
-        state.renamed(mark(_LENGTH_CERTAIN, values, to=False))
+        state.renamed(mark_axes(_LENGTH_CERTAIN, values, to=False))
         state.placed()
         if rotation is not None or (offsets.rotation and (0 in values or 1 in values)):
             state.known = (False, False, state.known[2])
 
 
-def _length(state: State, orders: Orders, block: Block, kind: int, number: int) -> None:
+def _length(state: InterpreterState, words: BlockWords, block: Block, kind: int, number: int) -> None:
     """G10 L1, L10, L11: a tool's length in the table; G43 has to come before it is used."""
-    values = orders.values
+    values = words.values
     if {"X", "Y", "A", "B", "C"} & values.keys():
-        raise orders.error(f"G10 L{kind} with X, Y or a rotary axis is not supported; Z and R are")
+        raise words.error(f"G10 L{kind} with X, Y or a rotary axis is not supported; Z and R are")
     if "Z" not in values:
         return
     length = values["Z"] * state.scale

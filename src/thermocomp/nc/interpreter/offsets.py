@@ -17,18 +17,18 @@ _ALL: Known = (True, True, True)
 EXTERNAL = 0
 
 
-def both(a: Known, b: Known) -> Known:
+def combine_known(a: Known, b: Known) -> Known:
     """Return per axis whether both hold."""
     return (a[0] and b[0], a[1] and b[1], a[2] and b[2])
 
 
-def put(point: Point, values: Mapping[int, float]) -> Point:
+def replace_coordinates(point: Point, values: Mapping[int, float]) -> Point:
     """Return a point with some of its coordinates replaced."""
     x, y, z = (values.get(i, point[i]) for i in range(3))
     return (x, y, z)
 
 
-def mark(known: Known, axes: Mapping[int, object], to: bool) -> Known:
+def mark_axes(known: Known, axes: Mapping[int, object], to: bool) -> Known:
     """Return `known` with some axes set."""
     x, y, z = (to if i in axes else known[i] for i in range(3))
     return (x, y, z)
@@ -85,7 +85,7 @@ class Offsets:
     def certain(self) -> Known:
         """Per axis, whether program coordinates tell machine coordinates."""
         origin = self._certain_origins.get(self.system, _NEVER)
-        return both(origin, both(self._certain_shift, self.certain_tool))
+        return combine_known(origin, combine_known(self._certain_shift, self.certain_tool))
 
     @property
     def origin_told(self) -> bool:
@@ -129,7 +129,7 @@ class Offsets:
         before, turned = self._certain_origins.get(self.system, _NEVER), self.rotation
         self.system = system
         self._update()
-        still = both(before, self._certain_origins.get(system, _NEVER))
+        still = combine_known(before, self._certain_origins.get(system, _NEVER))
         # where the coordinates turn, X and Y depend on each other
         return (False, False, still[2]) if turned != self.rotation else still
 
@@ -153,8 +153,8 @@ class Offsets:
             values = {i: old[i] + v for i, v in values.items()}
         else:
             certain = self._certain_origins.get(system, _NEVER)
-            self._certain_origins[system] = mark(certain, values, to=True)
-        self.origins[system] = put(old, values)
+            self._certain_origins[system] = mark_axes(certain, values, to=True)
+        self.origins[system] = replace_coordinates(old, values)
         if values:
             self._told_origins.add(system)
         if rotation is not None:
@@ -175,16 +175,16 @@ class Offsets:
             Per axis: `point` is certain.
         """
         own = self.system
-        certain = both(known, self.certain)
+        certain = combine_known(known, self.certain)
         self.system = system
         self._update()
-        wanted = put(self.program(point), values)
+        wanted = replace_coordinates(self.program(point), values)
         old = self.origins.get(system, _ZERO)
         reached = self.machine(wanted)
         x, y, z = (old[i] + point[i] - reached[i] for i in range(3))
         self.origins[system] = (x, y, z)
-        stays = mark(self._certain_origins.get(system, _NEVER), values, to=False)
-        told = mark(_NEVER, values, to=True)
+        stays = mark_axes(self._certain_origins.get(system, _NEVER), values, to=False)
+        told = mark_axes(_NEVER, values, to=True)
         self._certain_origins[system] = tuple(  # type: ignore[assignment]
             s or (t and c) for s, t, c in zip(stays, told, certain, strict=True)
         )
@@ -193,15 +193,15 @@ class Offsets:
 
     def name_place(self, place: Point, values: Mapping[int, float], known: Known) -> None:
         """G92: shift the coordinates so that a place in program coordinates gets these ones."""
-        told = both(self._certain_shift, known)
-        self._certain_shift = mark(self._certain_shift, {i: v for i, v in values.items() if not told[i]}, to=False)
-        self._set_shift(put(self.shift, {i: self.shift[i] + place[i] - v for i, v in values.items()}))
+        told = combine_known(self._certain_shift, known)
+        self._certain_shift = mark_axes(self._certain_shift, {i: v for i, v in values.items() if not told[i]}, to=False)
+        self._set_shift(replace_coordinates(self.shift, {i: self.shift[i] + place[i] - v for i, v in values.items()}))
 
     def set_shift(self, values: Mapping[int, float]) -> Known:
         """G52; returns per axis whether a known program coordinate still is."""
         still = tuple(c or i not in values for i, c in enumerate(self._certain_shift))
-        self._certain_shift = mark(self._certain_shift, values, to=True)
-        self._set_shift(put(self.shift, values))
+        self._certain_shift = mark_axes(self._certain_shift, values, to=True)
+        self._set_shift(replace_coordinates(self.shift, values))
         return still  # type: ignore[return-value]
 
     def drop_shift(self, keep: bool) -> Known:
@@ -224,7 +224,7 @@ class Offsets:
 
     def set_tool(self, tool: Point, certain: Known) -> Known:
         """G43 and its like; returns per axis whether a known program coordinate still is."""
-        still = both(self.certain_tool, certain)
+        still = combine_known(self.certain_tool, certain)
         self.tool, self.certain_tool = tool, certain
         self._update()
         return still

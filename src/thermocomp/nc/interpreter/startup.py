@@ -51,7 +51,7 @@ def modal(setup: Setup) -> Modal:
     )
 
 
-def whole(setup: Setup) -> str:
+def complete_codes(setup: Setup) -> str:
     """Return the startup codes for an interpreter, with those that `modal` takes where nothing is stated."""
     words = read_line(setup.startup, 1, setup.controller).words
     path = "" if _of(words, _PATHS) else "G64"

@@ -9,13 +9,13 @@ from thermocomp.nc.interpreter.arcs import length
 from thermocomp.nc.interpreter.block import Arc, Known, Modal, Move, Point, Setup
 from thermocomp.nc.interpreter.codes import CYCLES, ROTARY
 from thermocomp.nc.interpreter.offsets import Offsets
-from thermocomp.nc.interpreter.words import Orders
+from thermocomp.nc.interpreter.words import BlockWords
 
 MM: Final = 25.4  # per inch
 _TRUE: Known = (True, True, True)
 
 
-class State:
+class InterpreterState:
     """Where the tool is, and everything that words and codes have set.
 
     Parameters
@@ -95,17 +95,17 @@ class State:
             untold_tool=self.untold_tool,
         )
 
-    def axis_values(self, orders: Orders) -> dict[int, float]:
+    def axis_values(self, words: BlockWords) -> dict[int, float]:
         """Return the line's X Y Z by axis [mm]; X as a radius."""
-        values, scale = orders.values, self.scale
+        values, scale = words.values, self.scale
         found = {i: values[letter] * scale for i, letter in enumerate("XYZ") if letter in values}
         if self.modal.diameter and 0 in found:
             found[0] /= 2.0
         return found
 
-    def goal(self, orders: Orders) -> tuple[Point, Known]:
+    def goal(self, words: BlockWords) -> tuple[Point, Known]:
         """Return where the axis words lead to in program coordinates [mm], and what is known of it."""
-        values, scale, modal = orders.values, self.scale, self.modal
+        values, scale, modal = words.values, self.scale, self.modal
         x, y, z = self.place
         if modal.absolute:
             a, b, c = self.known
@@ -132,11 +132,11 @@ class State:
         at = self.rotary | dict.fromkeys(self.rezeroed, math.nan)
         self.turned = {letter: angle for letter, angle in at.items() if angle % 360.0}
 
-    def turn(self, orders: Orders) -> float:
+    def turn(self, words: BlockWords) -> float:
         """Move the rotary axes; return how far they go [deg]."""
         way = 0.0
-        for letter in ROTARY & orders.values.keys():
-            value = orders.values[letter]
+        for letter in ROTARY & words.values.keys():
+            value = words.values[letter]
             step = value - self.rotary[letter] if self.modal.absolute else value
             self.rotary[letter] += step
             way = math.hypot(way, step)
@@ -155,12 +155,12 @@ class State:
         a, b, c = self.known
         self.known = (a and still[0], b and still[1], c and still[2])
 
-    def cut(self, orders: Orders, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
+    def cut(self, words: BlockWords, start: Point, end: Point, arc: Arc | None = None, rotary: float = 0.0) -> Move:
         """Return a move in feed.
 
         Parameters
         ----------
-        orders : Orders
+        words : Orders
         start, end : tuple of float
             Machine coordinates [mm].
         arc : Arc or None
@@ -174,25 +174,25 @@ class State:
         """
         mode, feed = self.modal.feed_mode, self.feed
         if mode == 93:
-            if not orders.values.get("F"):
-                raise orders.error("G93 needs F on every line that cuts; add it, or write G94")
+            if not words.values.get("F"):
+                raise words.error("G93 needs F on every line that cuts; add it, or write G94")
             return Move(False, start, end, arc, 0.0, 60.0 / feed, rotary)
         if not feed:
-            raise orders.error("a move in feed, and no F is in force (G93, G94 and G95 forget it in LinuxCNC); write F")
+            raise words.error("a move in feed, and no F is in force (G93, G94 and G95 forget it in LinuxCNC); write F")
         if rotary and start == end and arc is None:
             feed = self.feed_word
         if mode == 94:
             return Move(False, start, end, arc, feed, None, rotary)
-        return self.per_turn(orders, start, end, feed, arc, rotary)
+        return self.per_turn(words, start, end, feed, arc, rotary)
 
     def per_turn(
-        self, orders: Orders, start: Point, end: Point, pitch: float, arc: Arc | None = None, rotary: float = 0.0
+        self, words: BlockWords, start: Point, end: Point, pitch: float, arc: Arc | None = None, rotary: float = 0.0
     ) -> Move:
         """Return a move that goes with the turns of the spindle.
 
         Parameters
         ----------
-        orders : Orders
+        words : Orders
         start, end : tuple of float
             Machine coordinates [mm].
         pitch : float
@@ -203,6 +203,6 @@ class State:
         """
         feed = pitch * abs(self.speed)
         if not feed:
-            raise orders.error("a feed per turn while the spindle stands; start it with S and M3 before")
+            raise words.error("a feed per turn while the spindle stands; start it with S and M3 before")
         way = length(arc, start, end) if arc else math.dist(start, end)
         return Move(False, start, end, arc, feed, (way or rotary) / feed * 60.0, rotary)

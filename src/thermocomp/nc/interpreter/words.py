@@ -1,10 +1,10 @@
-"""What a line orders: its codes by modal group, and the values of its words, checked as far as they stand alone."""
+"""What a line words: its codes by modal group, and the values of its words, checked as far as they stand alone."""
 
 from dataclasses import dataclass
 
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code, find
+from thermocomp.nc.interpreter.codes import FREE, REFUSED_LETTERS, USED_BY, Code, find_code
 from thermocomp.nc.parser.expressions import Parameters, evaluate
 from thermocomp.nc.parser.line import Line, Word
 
@@ -13,8 +13,8 @@ _MOST_M = 4
 
 
 @dataclass(slots=True)
-class Orders:
-    """A line's orders.
+class BlockWords:
+    """A line's words.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Orders:
 
 
 class Reader:
-    """Makes orders of lines.
+    """Makes words of lines.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Reader:
         self._harmless = {f"M{number}" for number in setup.harmless}
         self._codes: dict[tuple[str, float], Code] = {}
 
-    def read(self, line: Line) -> Orders:
+    def read(self, line: Line) -> BlockWords:
         """Read a line; words are evaluated before its assignments take effect, as LinuxCNC does.
 
         Raises
@@ -95,27 +95,25 @@ class Reader:
             else:
                 words[letter] = word
                 values[letter] = number
-        orders = Orders(line, codes, groups, words, values)
+        found = BlockWords(line, codes, groups, words, values)
         if len(codes) > _MOST_M:
-            self._count(orders)
+            self._count(found)
         if line.assignments:
             self._assign(line)
-        return orders
+        return found
 
-    def check_letters(self, orders: Orders, motion: str) -> None:
+    def check_letters(self, words: BlockWords, motion: str) -> None:
         """Refuse letters that no code of the line uses; `motion` is the motion that it makes."""
-        for letter in orders.values.keys() - FREE:
+        for letter in words.values.keys() - FREE:
             if letter in REFUSED_LETTERS:
-                raise orders.error(f"{letter}: {REFUSED_LETTERS[letter]}")
+                raise words.error(f"{letter}: {REFUSED_LETTERS[letter]}")
             users = self._used_by.get(letter, frozenset())
-            if letter in "PQ" and not self._harmless.isdisjoint(orders.codes):
+            if letter in "PQ" and not self._harmless.isdisjoint(words.codes):
                 continue
-            if letter == "P" and "G54" in orders.codes and self._controller == "fanuc":
-                raise orders.error(
-                    f"G54 with P: write G54.1 P{orders.values['P']:g} for an additional coordinate system"
-                )
-            if motion not in users and users.isdisjoint(orders.codes):
-                raise orders.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
+            if letter == "P" and "G54" in words.codes and self._controller == "fanuc":
+                raise words.error(f"G54 with P: write G54.1 P{words.values['P']:g} for an additional coordinate system")
+            if motion not in users and users.isdisjoint(words.codes):
+                raise words.error(f"the line has {letter}, and no code that uses it; remove it, or add the code")
 
     def _evaluate(self, line: Line, word: Word) -> float:
         try:
@@ -124,7 +122,7 @@ class Reader:
             raise ProgramError(line.number, f"the value of {word.letter}: {error}") from None
 
     def _find(self, line: Line, letter: str, number: float) -> Code:
-        code = find(letter, number, self._controller)
+        code = find_code(letter, number, self._controller)
         name = f"{letter}{number:g}"
         if code is None and name in self._harmless:
             code = Code(name, name, "moves nothing")
@@ -151,9 +149,9 @@ class Reader:
             line.number, f"{other} and {code.name} on one line exclude each other; put them on two lines"
         )
 
-    def _count(self, orders: Orders) -> None:
-        if self._controller == "linuxcnc" and sum(name[0] == "M" for name in orders.codes) > _MOST_M:
-            raise orders.error(f"more than {_MOST_M} M codes on one line; put them on two lines")
+    def _count(self, words: BlockWords) -> None:
+        if self._controller == "linuxcnc" and sum(name[0] == "M" for name in words.codes) > _MOST_M:
+            raise words.error(f"more than {_MOST_M} M codes on one line; put them on two lines")
 
     def _assign(self, line: Line) -> None:
         try:

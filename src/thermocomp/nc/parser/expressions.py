@@ -15,7 +15,7 @@ from typing import Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.parser.line import Assignment
-from thermocomp.nc.parser.systemparameters import machine_meaning, what_is
+from thermocomp.nc.parser.systemparameters import explain_unset, machine_meaning
 
 #: brackets inside brackets inside ...; a control's own limit is about 5 (Fanuc)
 DEEPEST = 60
@@ -177,7 +177,7 @@ class Parameters:
         key = _key(key)
         if key in self._values:
             return self._values[key]
-        raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or what_is(key, self.controller)}")
+        raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or explain_unset(key, self.controller)}")
 
     def assign(self, assignments: Iterable[Assignment]) -> None:
         """Carry out the assignments of one line; all values are those before the line, as in LinuxCNC.

@@ -92,7 +92,7 @@ def machine_meaning(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "
     return "" if key < 1000 else "system variable of the control"
 
 
-def what_is(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
+def explain_unset(key: int | str, controller: Literal["linuxcnc", "fanuc"] = "linuxcnc") -> str:
     """Return why a parameter that is not set is unknown, such as 'present position, which only the machine knows'."""
     if meaning := machine_meaning(key, controller):
         return f"{meaning}, which only the machine knows"

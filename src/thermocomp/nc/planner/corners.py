@@ -138,7 +138,7 @@ class Corners:
             dot = max(-1.0, min(1.0, u[0] * w[0] + u[1] * w[1] + u[2] * w[2]))
         overlap = (tolerance, math.sqrt((1.0 - dot) / 2.0))
         # a later corner may take half of each
-        first, second = together(overlap, before, before.kept(), after, after.kept(), 0.5)
+        first, second = find_overlap_speeds(overlap, before, before.kept(), after, after.kept(), 0.5)
         if math.sqrt((1.0 + dot) / 2.0) * (first + second) / 4.0 < otherwise:
             return False
         before.halved = after.halved = True
@@ -146,7 +146,7 @@ class Corners:
         return True
 
 
-def together(
+def find_overlap_speeds(
     overlap: tuple[float, float], before: Segment, a: float, after: Segment, b: float, share: float
 ) -> tuple[float, float]:
     """Return below which speeds one move brakes while the next one speeds up [mm/s].

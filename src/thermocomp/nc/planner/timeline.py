@@ -9,7 +9,7 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Machine
 from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point
-from thermocomp.nc.planner.corners import Corners, together
+from thermocomp.nc.planner.corners import Corners, find_overlap_speeds
 from thermocomp.nc.planner.segment import Segment, Segments, Vector
 
 #: of an axis whose machine file does not tell: a machining centre of medium size [mm/min, mm/s2]
@@ -51,7 +51,7 @@ HALTS = frozenset(
 
 
 @dataclass(frozen=True)
-class Kinematics:
+class MotionLimits:
     """How fast a machine and its controller are.
 
     Parameters
@@ -104,7 +104,7 @@ class Kinematics:
                 raise SettingError(f"{getattr(self, key)}: must not be negative", (key,))
 
     @classmethod
-    def of(cls, machine: Machine, **others: float) -> "Kinematics":
+    def of(cls, machine: Machine, **others: float) -> "MotionLimits":
         """Return those of a machine file.
 
         Parameters
@@ -131,7 +131,7 @@ class Timed(NamedTuple):
     end: float  #: [s]
 
 
-def timed(blocks: Iterable[Block], kinematics: Kinematics) -> Iterator[Timed]:
+def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[Timed]:
     """Tell when each block begins and ends.
 
     A corner that is cut counts to the block after it, as it does at LinuxCNC, and of lines that become one under
@@ -166,7 +166,7 @@ def timed(blocks: Iterable[Block], kinematics: Kinematics) -> Iterator[Timed]:
 class _Plan:
     """What lies ahead of the controller, and what it has done."""
 
-    def __init__(self, kinematics: Kinematics) -> None:
+    def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics
         x, y, z = kinematics.rapid
         speeds = (x / 60.0, y / 60.0, z / 60.0)
@@ -320,7 +320,7 @@ class _Plan:
                 if segment.overlap is not None:
                     # the block changes when both are equally fast
                     following, b = ahead[k + 1]
-                    below = min(p, together(segment.overlap, segment, a, following, b, 1.0)[0])
+                    below = min(p, find_overlap_speeds(segment.overlap, segment, a, following, b, 1.0)[0])
                     self.shared = below / (a + b)
                     now -= below / a - self.shared
                 elif not w:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import PLANES, Block, Move, Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import Change
@@ -26,7 +26,7 @@ class Check:
 
     def __init__(self, setup: Setup) -> None:
         self._texts: deque[str] = deque()
-        self._blocks = follow(read_lines(self._given(), setup.controller), setup)
+        self._blocks = follow_program(read_lines(self._given(), setup.controller), setup)
 
     def _given(self) -> Iterator[str]:
         while self._texts:

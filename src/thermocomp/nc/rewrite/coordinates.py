@@ -20,9 +20,9 @@ from thermocomp.nc.interpreter.block import PLANES, Block
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR, Contact
 from thermocomp.nc.rewrite.frame import Frame, Vector
-from thermocomp.nc.rewrite.method import AXES, STILL, Method
+from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
 from thermocomp.nc.rewrite.path import length
-from thermocomp.nc.rewrite.text import number, shifted, written
+from thermocomp.nc.rewrite.text import format_number, format_shifted, shift_words
 
 #: motions that take a word they did not have
 PLAIN = ("G0", "G1")
@@ -31,7 +31,7 @@ SLOWER, LATER = 0.015, 0.004
 
 
 @dataclass
-class Coordinates(Method):
+class Coordinates(CorrectionMethod):
     """Adds the correction to the words.
 
     Parameters
@@ -121,7 +121,7 @@ class Coordinates(Method):
                 if letter in block.words:
                     shifts[letter] = old[i] / 2 if modal.diameter and i == 0 else old[i]
         self._take(block, frame, old, new)
-        return shifted(block, shifts, added, frame.digits)
+        return shift_words(block, shifts, added, frame.digits)
 
     def _add(
         self,
@@ -171,7 +171,7 @@ class Coordinates(Method):
         self._take(block, frame, old, new)
         if block.modal.absolute:
             self._levels(block, axis, frame, goal[axis], shifts, added)
-        return shifted(block, shifts, added, frame.digits)
+        return shift_words(block, shifts, added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
         """Raise `ProgramError` if levels that were shifted as places go on as distances in G91."""
@@ -196,7 +196,7 @@ class Coordinates(Method):
             shifts |= {AXES[i]: old[i] for i in self.named(block) if i != axis}
             self.carried, self.inner = carried, None
             self.fixed[axis], self.doubtful[axis] = before
-        return shifted(block, shifts, added, frame.digits)
+        return shift_words(block, shifts, added, frame.digits)
 
     def _levels(
         self, block: Block, axis: int, frame: Frame, goal: float, shifts: dict[str, float], added: dict[str, float]
@@ -245,7 +245,7 @@ class Coordinates(Method):
     def _homewards(self, block: Block, frame: Frame, old: Vector) -> str:
         shifts = {AXES[i]: old[i] for i in self.named(block)} if block.modal.absolute else {}
         self.leave(block)
-        return shifted(block, shifts, {}, frame.digits)
+        return shift_words(block, shifts, {}, frame.digits)
 
     def _named_anew(self, block: Block) -> str:
         for i in self.named(block):
@@ -257,7 +257,7 @@ class Coordinates(Method):
                 )
         frame = self.frame(block)
         old = frame.words(self.carried)
-        return shifted(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
+        return shift_words(block, {AXES[i]: old[i] for i in self.named(block)}, {}, frame.digits)
 
     # -- what may change ---------------------------------------------------------------------------------------------
 
@@ -346,7 +346,7 @@ def _same_pecks(block: Block, depth: str, shift: float, digits: int) -> float:
         for letter in ("R", depth):
             value, word = block.sticky[letter], block.words.get(letter)
             plain = word is not None and word.number is not None
-            text = written(word, value, by, digits) if word and plain else number(value + by, digits)
+            text = format_shifted(word, value, by, digits) if word and plain else format_number(value + by, digits)
             levels.append(float(text) if by else value)
         plane, bottom = levels
         count, plane = 0, plane - feed

@@ -15,7 +15,7 @@ from thermocomp.nc.rewrite.frame import Vector
 Field = Callable[[Point], Vector]
 
 
-class Drifting(Protocol):
+class DriftSource(Protocol):
     """What a machine's drift is asked for."""
 
     @property
@@ -56,7 +56,7 @@ class Demand:
     _field: Field | None = field(default=None, init=False)
     _next: float = field(default=0.0, init=False)
 
-    def at(self, time: float, drift: Drifting, point: Point) -> Vector:
+    def at(self, time: float, drift: DriftSource, point: Point) -> Vector:
         """Return the correction in force at a time [s] and place [mm, machine coordinates].
 
         Parameters
@@ -89,7 +89,8 @@ class Demand:
         if not renewed and all(abs(d + f) <= near for d, f in zip(deviation, force, strict=True)):
             return force
         x, y, z = (  # a nan is never near, and no correction opposes it
-            f if not renewed and abs(w - f) <= near else w for w, f in zip(opposed(deviation), force, strict=True)
+            f if not renewed and abs(w - f) <= near else w
+            for w, f in zip(oppose_deviation(deviation), force, strict=True)
         )
         if max(abs(x), abs(y), abs(z)) > self.most:
             raise InputError(
@@ -100,7 +101,7 @@ class Demand:
         return self._force
 
 
-def opposed(deviation: Vector) -> Vector:
+def oppose_deviation(deviation: Vector) -> Vector:
     """Return the corrections that cancel a deviation [um]."""
     x, y, z = (Correction.opposing(Deviation(d)).offset for d in deviation)
     return x, y, z

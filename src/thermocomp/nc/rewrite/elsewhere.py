@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from thermocomp.nc.interpreter.block import Point
-from thermocomp.nc.rewrite.demand import Drifting
+from thermocomp.nc.rewrite.demand import DriftSource
 
 #: how far away it is asked [mm]
 AWAY = 100.0
@@ -27,7 +27,7 @@ class Elsewhere:
     _time: float = field(default=-math.inf, init=False)
     _place: Point = field(default=(math.inf,) * 3, init=False)
 
-    def take(self, time: float, point: Point, drift: Drifting) -> None:
+    def take(self, time: float, point: Point, drift: DriftSource) -> None:
         """Take in where a cut is [mm, machine coordinates], and when [s]; most of them tell nothing new."""
         if time - self._time < OFTEN and math.dist(point, self._place) < DENSE:
             return

@@ -21,12 +21,12 @@ _NUMBER = re.compile(r"\s*[O:]\s*\d+\b", re.IGNORECASE)
 _TOLD = str.maketrans("()%;", "[]_,")
 
 
-def blank(ending: str, lines: int = LINES) -> tuple[str, ...]:
+def make_blank(ending: str, lines: int = LINES) -> tuple[str, ...]:
     """Return a header that says nothing yet."""
     return tuple(f"({MARK} {k}){ending}" for k in range(lines))
 
 
-def filled(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool = False) -> tuple[str, ...]:
+def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool = False) -> tuple[str, ...]:
     """Return the header.
 
     Parameters
@@ -46,16 +46,16 @@ def filled(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool
     """
     said = ["REVISED FOR THERMAL DRIFT: DO NOT REVISE AGAIN", *facts]
     said += ["-"] * (lines - len(said))
-    texts = (plain(text)[:ROOM] for text in said[:lines])
+    texts = (clean_comment(text)[:ROOM] for text in said[:lines])
     return tuple(f"({MARK} {text.upper() if upper else text}){ending}" for text in texts)
 
 
-def plain(text: str) -> str:
+def clean_comment(text: str) -> str:
     """Return a text that may stand in any comment: printable ASCII with nothing in it that ends one."""
     return "".join(c if " " <= c <= "~" else "_" for c in text.translate(_TOLD))
 
 
-def wrapped(text: str, lines: int) -> list[str]:
+def wrap_text(text: str, lines: int) -> list[str]:
     """Return a text in so many lines of a header; dots stand for what does not fit."""
     return textwrap.wrap(text, ROOM, max_lines=lines, placeholder=" ...")
 

@@ -36,7 +36,7 @@ class Spindle:
         return block.speed
 
 
-def refuse(block: Block, setup: Setup, *, by_position: bool) -> None:
+def refuse_unknown(block: Block, setup: Setup, *, by_position: bool) -> None:
     """Refuse a block in which the drift would not be known.
 
     Parameters

@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Block, Known, Modal
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.rewrite.frame import Frame, Vector
-from thermocomp.nc.rewrite.text import LONGEST, Digits, parted
+from thermocomp.nc.rewrite.text import LONGEST, Digits, part_comments
 
 AXES = "XYZ"
 ALL: Known = (True, True, True)
@@ -28,7 +28,7 @@ class Change(NamedTuple):
 
 
 @dataclass
-class Method(ABC):
+class CorrectionMethod(ABC):
     """A way of getting a correction into a program.
 
     Parameters
@@ -85,7 +85,7 @@ class Method(ABC):
         if block.stops:  # the operator may move any axis now
             self.doubt_all()
         if len(texts[-1]) > LONGEST and texts[-1] != block.line.text:
-            texts = (*texts[:-1], *parted(texts[-1]))
+            texts = (*texts[:-1], *part_comments(texts[-1]))
         placed = self.before == ALL or all(self.before[i] for i in self.named(block))
         self.before = block.known
         other = None

@@ -12,15 +12,15 @@ from thermocomp.nc.interpreter.block import PLANES, Block
 from thermocomp.nc.interpreter.codes import CYCLES
 from thermocomp.nc.rewrite.contact import CLEAR
 from thermocomp.nc.rewrite.frame import Frame, Vector
-from thermocomp.nc.rewrite.method import AXES, STILL, Method
-from thermocomp.nc.rewrite.text import number
+from thermocomp.nc.rewrite.method import AXES, STILL, CorrectionMethod
+from thermocomp.nc.rewrite.text import format_number
 
 #: codes that use what G52 uses
 SAME_STORE = ("G52", "G92", "G92.1", "G92.2", "G92.3")
 
 
 @dataclass
-class Offset(Method):
+class Offset(CorrectionMethod):
     """Shifts the work coordinate system at safe points.
 
     Parameters
@@ -132,7 +132,9 @@ class Offset(Method):
         # the first one is written even if it is zero: an aborted run may have left another one in force
         self._begun, self._shift = True, frame.shift(words)
         text = "G90 G52" + "".join(
-            f" {letter}{number(w, frame.digits)}" for letter, w, on in zip(AXES, words, self.axes, strict=True) if on
+            f" {letter}{format_number(w, frame.digits)}"
+            for letter, w, on in zip(AXES, words, self.axes, strict=True)
+            if on
         )
         return (text + ending(block.line.text),)
 

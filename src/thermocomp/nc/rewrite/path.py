@@ -13,7 +13,7 @@ def length(move: Move) -> float:
     return arcs.length(move.arc, move.start, move.end)
 
 
-def at(move: Move, share: float) -> Point:
+def find_point(move: Move, share: float) -> Point:
     """Return where the tool is when it has gone a share of a move [mm, machine coordinates]."""
     point = [a + share * (b - a) for a, b in zip(move.start, move.end, strict=True)]
     arc = move.arc

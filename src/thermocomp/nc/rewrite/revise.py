@@ -15,19 +15,19 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.nc.interpreter.block import Block, Point, Setup
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.line import Line
 from thermocomp.nc.parser.recognise import recognise
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.planner.timeline import Kinematics, timed
+from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
 from thermocomp.nc.rewrite import header, known
 from thermocomp.nc.rewrite.check import Check
-from thermocomp.nc.rewrite.demand import Cut, Demand, Drifting, Left
+from thermocomp.nc.rewrite.demand import Cut, Demand, DriftSource, Left
 from thermocomp.nc.rewrite.elsewhere import Elsewhere
 from thermocomp.nc.rewrite.frame import Vector
-from thermocomp.nc.rewrite.method import Change, Method
+from thermocomp.nc.rewrite.method import Change, CorrectionMethod
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import at, length
+from thermocomp.nc.rewrite.path import find_point, length
 from thermocomp.nc.rewrite.split import Sample, axes_to_split, may_split, pieces, shares
 
 #: lines by which the control is recognised that a program is for
@@ -101,9 +101,9 @@ class Revision:
     """
 
     setup: Setup
-    kinematics: Kinematics
-    drift: Drifting
-    method: Method
+    kinematics: MotionLimits
+    drift: DriftSource
+    method: CorrectionMethod
     demand: Demand
     header_lines: int = header.LINES
     split: bool = True
@@ -143,9 +143,9 @@ class Revision:
         method, steered = copy.deepcopy(self.method), known.Spindle(self.setup)
         nothing: Vector = (0.0, 0.0, 0.0)
         modal, seen = None, set[tuple[str, ...]]()
-        for block in follow(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
+        for block in follow_program(self._guarded(read_lines(_recognised(texts), self.setup.controller)), self.setup):
             steered.speed(block)
-            known.refuse(block, self.setup, by_position=self.drift.by_position)
+            known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
             # lines with the words and in the state of one before tell a method that corrects nothing nothing new
             words = tuple(block.words)
             plain = block.kind == "line" and _PLAIN.issuperset(block.codes) and not block.line.optional
@@ -187,12 +187,12 @@ class Revision:
         deviation = self.drift.deviation(point)
         headed = ended = False
         carried = self.method.carried
-        for block, start, end in timed(follow(lines, self.setup), self.kinematics):
+        for block, start, end in time_blocks(follow_program(lines, self.setup), self.kinematics):
             line = block.line
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
                 headed = True
-            known.refuse(block, self.setup, by_position=self.drift.by_position)
+            known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
             speed = steered.speed(block)
             if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
@@ -256,7 +256,7 @@ class Revision:
 
     def _header(self, text: str, deviation: Vector, carried: Vector) -> Revised:
         return Revised(
-            0, "", header.blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
+            0, "", header.make_blank(ending(text), self.header_lines), None, 0.0, 0.0, deviation, carried, carried
         )
 
     def _told(self, revised: Revised) -> Revised:
@@ -338,7 +338,7 @@ class Revision:
             if dt > 0:
                 self.drift.advance(dt / count, speed)
             if k < count:
-                place = point if move is None else at(move, k / count)
+                place = point if move is None else find_point(move, k / count)
                 time = self.seconds + dt * k / count
                 demand = self._demanded(block.line.number, time, place) if asked else None
                 samples.append(Sample(k / count, self.drift.deviation(place), demand))

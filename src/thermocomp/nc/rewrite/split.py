@@ -12,8 +12,8 @@ from thermocomp.nc.parser.tokens import Controller, read_line
 from thermocomp.nc.rewrite.frame import Vector
 from thermocomp.nc.rewrite.method import AXES
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.path import at
-from thermocomp.nc.rewrite.text import number
+from thermocomp.nc.rewrite.path import find_point
+from thermocomp.nc.rewrite.text import format_number
 
 #: decimals of places inside a cut: they lie beside the path by a thousandth of what a correction is rounded to
 DIGITS: Final = 6
@@ -145,7 +145,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
     words, drop = _words(block), "R" if move.arc else ""
     for k, share in enumerate(parts):
         last = k == len(parts) - 1
-        end = move.end if last else at(move, share)
+        end = move.end if last else find_point(move, share)
         goal = block.end if last else _place(block, end, share, shift)
         values = {AXES[i]: goal[i] / unit for i in words}
         if move.arc is not None:
@@ -194,7 +194,7 @@ def _centre(move: Move, place: Point, shift: Sequence[float], absolute: bool, un
 
 
 def _bare(values: dict[str, float]) -> str:
-    return " ".join(f"{letter}{number(value, DIGITS)}" for letter, value in values.items())
+    return " ".join(f"{letter}{format_number(value, DIGITS)}" for letter, value in values.items())
 
 
 def _written(block: Block, values: dict[str, float], drop: str) -> str:
@@ -207,5 +207,5 @@ def _written(block: Block, values: dict[str, float], drop: str) -> str:
         if word.letter in drop:
             text = text[: word.start] + text[word.end :]
         elif word.letter in values:
-            text = text[: word.start + 1] + number(values[word.letter], DIGITS) + text[word.end :]
+            text = text[: word.start + 1] + format_number(values[word.letter], DIGITS) + text[word.end :]
     return text

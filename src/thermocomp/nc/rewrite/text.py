@@ -38,7 +38,7 @@ class Digits:
 DIGITS = {"linuxcnc": Digits(), "fanuc": Digits(3, 4)}
 
 
-def number(value: float, digits: int) -> str:
+def format_number(value: float, digits: int) -> str:
     """Return a number with a decimal point always, and without zeros that say nothing."""
     text = f"{value:.{digits}f}".rstrip("0")
     if text.endswith("."):
@@ -46,7 +46,7 @@ def number(value: float, digits: int) -> str:
     return text.removeprefix("-") if text.strip("-0.") == "" else text
 
 
-def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: int) -> str:
+def shift_words(block: Block, shifts: Shifts, added: Mapping[str, float], digits: int) -> str:
     """Return the text of a block's line with shifted words.
 
     Parameters
@@ -66,17 +66,19 @@ def shifted(block: Block, shifts: Shifts, added: Mapping[str, float], digits: in
     line = block.line
     text = line.text
     if added:
-        insert = "".join(f" {letter}{number(value, digits)}" for letter, value in added.items())
+        insert = "".join(f" {letter}{format_number(value, digits)}" for letter, value in added.items())
         behind = _end(line)
         text = text[:behind] + insert + text[behind:]
     changed = [(block.words[letter], shift) for letter, shift in shifts.items() if shift]
     changed.sort(key=_start, reverse=True)
     for word, shift in changed:
-        text = text[: word.start + 1] + written(word, block.values[word.letter], shift, digits) + text[word.end :]
+        text = (
+            text[: word.start + 1] + format_shifted(word, block.values[word.letter], shift, digits) + text[word.end :]
+        )
     return text
 
 
-def parted(text: str) -> tuple[str, ...]:
+def part_comments(text: str) -> tuple[str, ...]:
     """Return a line, the comments of one that is too long on a line before it, where controls show them anyway."""
     comments = _COMMENTS.findall(text)
     if len(text) <= LONGEST or not comments:
@@ -95,7 +97,7 @@ def _end(line: Line) -> int:
     return max(word.end for word in line.words)
 
 
-def written(word: Word, value: float, shift: float, digits: int) -> str:
+def format_shifted(word: Word, value: float, shift: float, digits: int) -> str:
     """Return the text of a shifted value.
 
     Parameters
@@ -107,7 +109,7 @@ def written(word: Word, value: float, shift: float, digits: int) -> str:
         Decimals at least; a word that has more keeps them.
     """
     if word.number is None:
-        return f"[{word.value.strip()}{'+' if shift > 0 else ''}{number(shift, digits)}]"
+        return f"[{word.value.strip()}{'+' if shift > 0 else ''}{format_number(shift, digits)}]"
     point = word.value.find(".")
     decimals = 0 if point < 0 else sum(map(str.isdigit, word.value[point:]))
-    return number(value + shift, max(digits, decimals))
+    return format_number(value + shift, max(digits, decimals))

@@ -18,8 +18,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.jobstate import JobState
 from thermocomp.nc.interpreter.block import Point
 from thermocomp.nc.thermal.inputs import FloatArray, Inputs, Wiring
-from thermocomp.nc.thermal.start import Start, left
-from thermocomp.nc.thermal.stations import AXES, Station, checked
+from thermocomp.nc.thermal.start import ThermalStart, hand_over_state
+from thermocomp.nc.thermal.stations import AXES, Station, check_stations
 
 #: a speed that lasts no longer counts with its share of the mean; what follows a speed at once does so after this [s]
 SOON = 0.5
@@ -74,7 +74,7 @@ class Drift:
     def __init__(
         self,
         stations: Sequence[Station],
-        start: Start,
+        start: ThermalStart,
         others: Inputs | None = None,
         *,
         zero: Literal["start", "cold", "last"] = "start",
@@ -84,7 +84,7 @@ class Drift:
             raise InputError(f"drift: step {step} s must be positive and finite")
         if zero == "last" and start.zeros is None:
             raise InputError("drift: it cannot count from the zero of the last job: no state of one is carried over")
-        if checked(stations) != list(stations) or len(start.states) != len(stations):
+        if check_stations(stations) != list(stations) or len(start.states) != len(stations):
             raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
         self.stations = tuple(stations)
         self.step = step
@@ -304,7 +304,7 @@ class Drift:
         """Return what the next job can start from; the models are stepped up to now."""
         if self._pending:
             self._flush()
-        return left(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
+        return hand_over_state(self.stations, self._states, self._zeros, self._doubts, zero_known=self._zero_known)
 
 
 class _Ladder:

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.core.model import ErrorModel, Input
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True)
-class Signal:
+class InputSignal:
     """A value over the time of the program: linear between its points, held before the first and after the last.
 
     Parameters
@@ -57,7 +57,7 @@ class Signal:
             raise InputError("forecast: the times must rise")
 
     @classmethod
-    def constant(cls, value: float) -> "Signal":
+    def constant(cls, value: float) -> "InputSignal":
         """Return the signal that always has this value."""
         return cls((0.0,), (value,))
 
@@ -84,7 +84,7 @@ class Signal:
 
 
 #: input name to its value over the program
-Inputs = Mapping[str, Signal]
+Inputs = Mapping[str, InputSignal]
 
 
 class Wiring:
@@ -128,7 +128,7 @@ class Wiring:
         return values
 
 
-def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, Signal]:
+def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, InputSignal]:
     """Read what the user says is constant.
 
     Parameters
@@ -148,29 +148,29 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, S
         No model has such an input, it is the spindle speed, it is there twice, or the value has no unit of it.
     """
     inputs = {i.name: i for m in models for i in m.inputs}
-    found: dict[str, Signal] = {}
+    found: dict[str, InputSignal] = {}
     for text in texts:
         said, _, value = (part.strip() for part in text.partition("="))
         fitting = [n for n in inputs if said in (n, n.rpartition("_")[0])]
         if len(fitting) != 1:
-            raise unknown("input", said, [n for n, i in inputs.items() if i.quantity != SPEED])
+            raise explain_unknown("input", said, [n for n, i in inputs.items() if i.quantity != SPEED])
         channel = inputs[fitting[0]]
         if channel.quantity == SPEED:
             raise InputError(f"constant {text!r}: the spindle speed comes from the program")
         if channel.name in found:
             raise InputError(f"constant {text!r}: {channel.name} was given before")
-        number = measured(value, channel.quantity)
+        number = read_with_unit(value, channel.quantity)
         if number is None:
             raise InputError(f"constant {text!r}: write a value with its unit, such as {_written(channel, said)}")
-        found[channel.name] = Signal.constant(number)
+        found[channel.name] = InputSignal.constant(number)
     return found
 
 
-def _signal(model: ErrorModel, channel: Input, others: Inputs) -> Signal:
+def _signal(model: ErrorModel, channel: Input, others: Inputs) -> InputSignal:
     if channel.name in others:
         return others[channel.name]
     if channel.name not in model.sensors:
-        return Signal.constant(channel.reference)
+        return InputSignal.constant(channel.reference)
     kind = channel.quantity.replace("_", " ")
     raise InputError(
         f"model of {model.target} wants {channel.name}, a {kind}: it is not driven by the speed alone; give "

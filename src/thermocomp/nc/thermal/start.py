@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from thermocomp.core.autoregressive import Ticking
-from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.core.jobstate import JobState, StationState
 from thermocomp.core.model import ErrorModel, State
-from thermocomp.core.units import measured as with_unit
+from thermocomp.core.units import read_with_unit as with_unit
 from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
 from thermocomp.nc.thermal.stations import Station
 
@@ -25,7 +25,7 @@ _CLOSE = 1e-9
 _LONG = 2 * 86400.0
 
 
-class Start(NamedTuple):
+class ThermalStart(NamedTuple):
     """State of the models when the program starts, or so long before it as the spindle stands still."""
 
     states: tuple[State, ...]  #: per station
@@ -37,7 +37,7 @@ class Start(NamedTuple):
     assumed: tuple[str, ...] = ()  #: what was made of one measurement for several stations
 
 
-def cold(stations: Sequence[Station], others: Inputs) -> Start:
+def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
     """Return the state of a machine at rest: the spindle has not turned for long.
 
     Parameters
@@ -55,10 +55,10 @@ def cold(stations: Sequence[Station], others: Inputs) -> Start:
     InputError
         A model wants an input that nobody gives.
     """
-    return Start(tuple(_resting(s.model, Wiring(s.model, others), 0.0) for s in stations), known=True)
+    return ThermalStart(tuple(_resting(s.model, Wiring(s.model, others), 0.0) for s in stations), known=True)
 
 
-def carried(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> Start:
+def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> ThermalStart:
     """Return the state that the last job has left, and a pause in which the spindle stood still.
 
     Parameters
@@ -86,7 +86,7 @@ def carried(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> 
             f"{', '.join(map(str, stations))}: use the models of the last job, or start cold or measured"
         )
     mine = [by_name[str(s)] for s in stations]
-    return Start(
+    return ThermalStart(
         tuple(_restored(station.model, state) for station, state in zip(stations, mine, strict=True)),
         known=False,
         pause=pause,
@@ -96,7 +96,7 @@ def carried(stations: Sequence[Station], left: JobState, pause: float = 0.0) -> 
     )
 
 
-def measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> Start:
+def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float], others: Inputs) -> ThermalStart:
     """Return a state in which the models say what has been measured, the spindle standing still.
 
     An autoregressive model is told its past. For another one that remembers, the machine is taken to have settled at
@@ -127,7 +127,7 @@ def measured(stations: Sequence[Station], deviations: Mapping[str, float], other
     told = {str(s): next((n for n in _names(s) if n in deviations), "") for s in stations}
     for name in deviations:
         if name not in by_axis and name not in told.values():
-            raise unknown("measured axis or target", name, known)
+            raise explain_unknown("measured axis or target", name, known)
     states, assumed = dict[str, State](), []
     for axis, mine in by_axis.items():
         named = [s for s in mine if told[str(s)]]
@@ -152,7 +152,7 @@ def measured(stations: Sequence[Station], deviations: Mapping[str, float], other
                     f"{axis} was measured once: all its models begin as {speed:.0f} 1/min, held for long, leaves "
                     f"them: there {what} is {deviation:g} um"
                 )
-    return Start(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
+    return ThermalStart(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
 
 
 def deviations(texts: Sequence[str]) -> dict[str, float]:
@@ -186,7 +186,7 @@ def deviations(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def left(
+def hand_over_state(
     stations: Sequence[Station],
     states: Sequence[State],
     zeros: Sequence[float],

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from thermocomp.core.exceptions import InputError, unknown
+from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.units import measured
+from thermocomp.core.units import read_with_unit
 
 AXES = "XYZ"
 _NUMBER = r"-?\d+(?:\.\d+)?"
@@ -89,15 +89,15 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
         target, says, place = (part.strip() for part in text.partition("="))
         model = known.get(target) or known.get(f"{target}_um")
         if model is None:
-            raise unknown("model of", target, targets)
+            raise explain_unknown("model of", target, targets)
         if model.target in named:
             raise InputError(f"{text!r}: {model.target} was given before; a model stands for one axis at one place")
         named.add(model.target)
         found.append(_stated(text, place, model) if says else _by_name(model, targets))
-    return checked(found)
+    return check_stations(found)
 
 
-def checked(found: Sequence[Station]) -> list[Station]:
+def check_stations(found: Sequence[Station]) -> list[Station]:
     """Return stations in their order, by axis and position.
 
     Raises
@@ -146,7 +146,7 @@ def _stated(text: str, place: str, model: ErrorModel) -> Station:
     axis, along, at = match.groups()
     if along is None:
         return Station(axis.upper(), model)
-    position = measured(at, "position")
+    position = read_with_unit(at, "position")
     if position is None:
         raise InputError(f"{text!r}: the position {at} has no unit; write {at} mm")
     return Station(axis.upper(), model, along.upper(), position)

@@ -15,14 +15,14 @@ from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.datasets import virtual
 from thermocomp.models.position import PositionFit
 from thermocomp.papers.chen1996.setup import TENFOLD
-from thermocomp.papers.chen1996.volume import Learned
+from thermocomp.papers.chen1996.volume import LearnedVolume
 from thermocomp.papers.common import Errors, rms
 from thermocomp.papers.pictures import single
-from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
+from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
 from thermocomp.simulation.axes import AXES, TEST_POSITION, TRAVEL
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.experiments import SimulatedTest, simulate
-from thermocomp.simulation.geometry import cold
+from thermocomp.simulation.geometry import find_cold_component
 from thermocomp.simulation.probes import NEARER, swing
 from thermocomp.simulation.volume import VolumetricTruth
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
@@ -60,7 +60,7 @@ class Volume:
         Largest difference between the error of first order, from the true components, and the true error [um].
     """
 
-    learned: Learned
+    learned: LearnedVolume
     errors: Mapping[str, FloatArray]
     causes: Mapping[str, FloatArray]
     by_component: Mapping[str, float]
@@ -101,7 +101,7 @@ class _Points(NamedTuple):
     begin: FloatArray
 
 
-def judge(learned: Learned, seed: int) -> Volume:
+def judge(learned: LearnedVolume, seed: int) -> Volume:
     """Compensate experiment ``volumetric-new`` at random points of the volume and in random rows of its tests.
 
     Parameters
@@ -115,7 +115,7 @@ def judge(learned: Learned, seed: int) -> Volume:
     Volume
     """
     rng = np.random.default_rng(seed)
-    tests = list(simulate(virtual.find("volumetric-new"), seed=seed, whole=True))
+    tests = list(simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True))
     share = -(-POINTS // len(tests))
     parts = [_points(learned, test, min(share, POINTS - share * k), rng) for k, test in enumerate(tests)]
     p = _Points(*map(np.vstack, zip(*parts, strict=True)))
@@ -146,9 +146,9 @@ def judge(learned: Learned, seed: int) -> Volume:
     return Volume(learned, errors, causes, by_component, float(np.abs(effect(true) - errors[WITHOUT]).max()))
 
 
-def _points(learned: Learned, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
+def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> _Points:
     model = VolumetricModel(learned.machine)
-    recording = virtual.recording(test)
+    recording = virtual.make_recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
     rows = rng.integers(0, len(recording), n)
     points = rng.uniform(size=(n, 3)) * [TRAVEL[a] for a in AXES]
@@ -281,7 +281,7 @@ def numbers(found: Volume) -> dict[str, float]:
 # -- tables and figures ----------------------------------------------------------------------------------------------
 
 
-def tables(found: Volume) -> list[Table]:
+def tables(found: Volume) -> list[StudyTable]:
     """Return the error before and after, and what each component was made of and leaves."""
     rows = []
     for name, size in found.sizes.items():
@@ -299,8 +299,8 @@ def tables(found: Volume) -> list[Table]:
         made = ["", "", ""] if fit is None else [f"{fit.profile.order[0]}", f"{fit.enough}", f"{fit.thermal_rms:.2f}"]
         parts.append([c.code, c.description, how, *made, f"{found.by_component[c.code]:.2f}"])
     return [
-        Table(f"Length of the error at {POINTS} random points and thermal states [um]", header, rows),
-        Table(
+        StudyTable(f"Length of the error at {POINTS} random points and thermal states [um]", header, rows),
+        StudyTable(
             "The 32 components: degree of the cold profile, m, thermal part [um, urad RMS], and what its own error "
             "does to the tool point [um RMS]",
             ("", "", "", "degree", "m", "thermal", "left"),
@@ -312,7 +312,7 @@ def tables(found: Volume) -> list[Table]:
 def figures(found: Volume) -> list[Figure]:
     """Return how large the error is in what share of the points."""
     share = 100.0 * np.arange(1, POINTS + 1) / POINTS
-    lines = [Curve(name, np.sort(size), share) for name, size in found.sizes.items()]
+    lines = [PlotCurve(name, np.sort(size), share) for name, size in found.sizes.items()]
     text = f"The volumetric error at {POINTS} random points and thermal states, before and after."
     axes = "length of the error vector [um]", "points with a smaller one [%]"
     return [single("chen1996-volume", text, axes, lines)]
@@ -323,4 +323,4 @@ def _off(fit: PositionFit) -> float:
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None
-    return rms(fit.model.profile.at(points) - cold("EYX", points))
+    return rms(fit.model.profile.at(points) - find_cold_component("EYX", points))

@@ -29,7 +29,7 @@ SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class LearnedNet:
     """A net, from one start.
 
     Parameters
@@ -52,7 +52,7 @@ class Trained:
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
+class LearnedDrift:
     """All that was learned from the 810 sets.
 
     Parameters
@@ -74,11 +74,11 @@ class Learned:
     regressions: Mapping[str, SecondOrderRegression]
     models: Mapping[str, ErrorModel]
     wide: Mapping[str, ErrorModel]
-    nets: Sequence[Trained]
-    others: Mapping[str, Sequence[Trained]]
+    nets: Sequence[LearnedNet]
+    others: Mapping[str, Sequence[LearnedNet]]
 
     @cached_property
-    def typical(self) -> Trained:
+    def typical(self) -> LearnedNet:
         """The net with the median error after training: the one that is drawn."""
         return sorted(self.nets, key=lambda t: t.mean)[len(self.nets) // 2]
 
@@ -119,10 +119,10 @@ class Learned:
     @property
     def ranges(self) -> dict[str, float]:
         """From the lowest to the highest drift [um]."""
-        return {t: float(np.ptp(common.measured(self.samples, t))) for t in DRIFTS}
+        return {t: float(np.ptp(common.take_measured(self.samples, t))) for t in DRIFTS}
 
 
-def learn(seed: int, told: Callable[[float], None]) -> Learned:
+def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
     """Run the five tests and fit what the paper fits.
 
     Parameters
@@ -141,33 +141,33 @@ def learn(seed: int, told: Callable[[float], None]) -> Learned:
     regressions = {
         t: SecondOrderRegression(differences=setup.DIFFERENCES, subset=group) for t, group in setup.SUBGROUPS.items()
     }
-    models = {t: common.fitted(r, heat, [t])[t] for t, r in regressions.items()}
-    wide = {t: common.fitted(SecondOrderRegression(), heat, [t])[t] for t in DRIFTS}
+    models = {t: common.fit_and_freeze(r, heat, [t])[t] for t, r in regressions.items()}
+    wide = {t: common.fit_and_freeze(SecondOrderRegression(), heat, [t])[t] for t in DRIFTS}
     kinds: dict[str, tuple[SigmoidNet, int]] = {"": (SigmoidNet(hidden=HIDDEN), STARTS)}
     kinds |= {f"9-{h}-3": (SigmoidNet(hidden=h), SWEEP_STARTS) for h in SWEEP}
     kinds["common scaling"] = SigmoidNet(hidden=HIDDEN, scaling="common"), SWEEP_STARTS
     kinds["batch update"] = SigmoidNet(hidden=HIDDEN, update="batch"), SWEEP_STARTS
     jobs = [(kind, start) for kind, (_, n) in kinds.items() for start in range(n)]
-    trained: Iterator[Trained] = Parallel(n_jobs=-1, prefer="threads", return_as="generator")(
+    trained: Iterator[LearnedNet] = Parallel(n_jobs=-1, prefer="threads", return_as="generator")(
         delayed(_train)(SigmoidNet(**{**kinds[kind][0].get_params(), "seed": start}), heat) for kind, start in jobs
     )
-    by_kind: dict[str, list[Trained]] = {}
+    by_kind: dict[str, list[LearnedNet]] = {}
     for done, ((kind, _), net) in enumerate(zip(jobs, trained, strict=True), start=1):
         by_kind.setdefault(kind, []).append(net)
         told(done / len(jobs))
-    return Learned(samples, regressions, models, wide, by_kind.pop(""), by_kind)
+    return LearnedDrift(samples, regressions, models, wide, by_kind.pop(""), by_kind)
 
 
-def _train(net: SigmoidNet, heat: Samples) -> Trained:
-    models = common.fitted(net, heat, tuple(DRIFTS))
+def _train(net: SigmoidNet, heat: Samples) -> LearnedNet:
+    models = common.fit_and_freeze(net, heat, tuple(DRIFTS))
     residual = heat.deviations - net.predict(heat.frame())
     mae = dict(zip(DRIFTS, np.abs(residual).mean(axis=0).tolist(), strict=True))
-    return Trained(net, models, mae)
+    return LearnedNet(net, models, mae)
 
 
 # -- claims --------------------------------------------------------------------------------------------------------
 
-claims = Claims[Learned]()
+claims = Claims[LearnedDrift]()
 
 
 def _listed(values: Mapping[str, float], form: str = "") -> str:
@@ -175,12 +175,12 @@ def _listed(values: Mapping[str, float], form: str = "") -> str:
 
 
 @claims.add("C-14", "810 sets of five tests, each 6 h of warm-up and 10 h of cool-down", "810")
-def _sets(found: Learned) -> str:
+def _sets(found: LearnedDrift) -> str:
     return f"{len(found.samples)} of {len(found.samples.test_names)} tests"
 
 
 @claims.add("C-11", "The nine temperatures have strong correlations with the drifts")
-def _correlated(found: Learned) -> str:
+def _correlated(found: LearnedDrift) -> str:
     weakest, *_, strongest = sorted(((max(r), t) for t, r in screening(found).items()), key=lambda best: best[0])
     return f"|r| with the drift it goes with best: {weakest[0]:.2f} ({weakest[1]}) to {strongest[0]:.2f}"
 
@@ -190,7 +190,7 @@ def _correlated(found: Learned) -> str:
     "The second-order models of the subgroups of Table 2 have 20, 35 and 20 coefficients",
     _listed(CANDIDATES),
 )
-def _coefficients(found: Learned) -> str:
+def _coefficients(found: LearnedDrift) -> str:
     return _listed(found.candidates)
 
 
@@ -199,7 +199,7 @@ def _coefficients(found: Learned) -> str:
     "Stepwise regression reduces the coefficients in every direction to half or fewer",
     f"{_listed(TERMS)} are left",
 )
-def _halved(found: Learned) -> Ours:
+def _halved(found: LearnedDrift) -> Ours:
     many = [t for t in DRIFTS if found.terms[t] > found.candidates[t] / 2]
     return Ours(
         f"{_listed(found.terms)} are left",
@@ -210,7 +210,7 @@ def _halved(found: Learned) -> Ours:
 
 
 @claims.add("C-16 C-17", "Terms that have entered are removed again later", f"{REMOVALS} times in y")
-def _removed(found: Learned) -> Ours:
+def _removed(found: LearnedDrift) -> Ours:
     removals = {t: sum(s.action == "remove" for s in r.log_) for t, r in found.regressions.items()}
     return Ours(
         f"{_listed(removals)} times in x, y, z",
@@ -224,7 +224,7 @@ def _removed(found: Learned) -> Ours:
     f"The regressions fit the drifts closely (R2 >= {CLOSELY}, without constant, about zero: E-C10)",
     f"R2 {R2_X} in x",
 )
-def _closely(found: Learned) -> Ours:
+def _closely(found: LearnedDrift) -> Ours:
     r2 = {t: r.r_squared_ for t, r in found.regressions.items()}
     loose = [t for t in DRIFTS if round(r2[t], 3) < CLOSELY]
     return Ours(
@@ -237,12 +237,12 @@ def _closely(found: Learned) -> Ours:
 
 
 @claims.add("C-18 C-19", "Standard error of estimate in x", f"{SEE_X:.1f} um")
-def _standard_error(found: Learned) -> str:
+def _standard_error(found: LearnedDrift) -> str:
     return f"{found.regressions['x'].standard_error_:.2f} um; the drift in x ranges over {found.ranges['x']:.0f} um"
 
 
 @claims.add("E-C12", "The rows of a drift are no independent observations: of 810, the residuals count as (ours)")
-def _independent(found: Learned) -> str:
+def _independent(found: LearnedDrift) -> str:
     return f"{_listed(found.independent, '.0f')} in x, y, z"
 
 
@@ -252,7 +252,7 @@ def _independent(found: Learned) -> str:
     "training makes)",
     "9-20-3",
 )
-def _nodes(found: Learned) -> Ours:
+def _nodes(found: LearnedDrift) -> Ours:
     at_20 = np.array([n.mean for n in found.nets])
     mean, spread = at_20.mean(), at_20.std(ddof=1)
     above = {h: np.mean([n.mean for n in found.others[f"9-{h}-3"]]) for h in SWEEP if h > HIDDEN}
@@ -264,7 +264,7 @@ def _nodes(found: Learned) -> Ours:
     )
 
 
-def _rejected(found: Learned, kind: str) -> Ours:
+def _rejected(found: LearnedDrift, kind: str) -> Ours:
     """Judge what the paper rejected: its mean error after training must be above that of the chosen net."""
     chosen, other = (float(np.mean([n.mean for n in nets])) for nets in (found.nets, found.others[kind]))
     return Ours(
@@ -275,12 +275,12 @@ def _rejected(found: Learned, kind: str) -> Ours:
 
 
 @claims.add("C-28", "Scaling each channel by its own range is better than a common factor")
-def _scaling(found: Learned) -> Ours:
+def _scaling(found: LearnedDrift) -> Ours:
     return _rejected(found, "common scaling")
 
 
 @claims.add("C-30", "Pattern update ends with smaller errors than batch update")
-def _update(found: Learned) -> Ours:
+def _update(found: LearnedDrift) -> Ours:
     return _rejected(found, "batch update")
 
 
@@ -290,7 +290,7 @@ def _update(found: Learned) -> Ours:
     "other in every direction)",
     f"net {_listed(MAE_NET, '.1f')}, regression {_listed(MAE_MRA, '.1f')} um",
 )
-def _close(found: Learned) -> Ours:
+def _close(found: LearnedDrift) -> Ours:
     wide = {t: float(np.abs(common.residual(m, found.samples)).mean()) for t, m in found.wide.items()}
     ratios = {t: found.net[t] / found.mra[t] for t in DRIFTS}
     apart = {t: r for t, r in ratios.items() if not 1 / COMPETITIVE <= r <= COMPETITIVE}
@@ -307,11 +307,11 @@ def _close(found: Learned) -> Ours:
 @claims.add(
     "C-31", f"A net depends on its start (ours): smallest and largest mean absolute error of {STARTS} trainings"
 )
-def _starts(found: Learned) -> str:
+def _starts(found: LearnedDrift) -> str:
     return "; ".join(f"{t} {found.mae_net(t).min():.2f}-{found.mae_net(t).max():.2f}" for t in DRIFTS) + " um"
 
 
-def screening(found: Learned) -> dict[str, tuple[float, ...]]:
+def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
     """Return the correlation of each of the nine temperatures with x, y, z, without its sign (C-11)."""
     change = found.samples.change()
     return {
@@ -320,7 +320,7 @@ def screening(found: Learned) -> dict[str, tuple[float, ...]]:
     }
 
 
-def numbers(found: Learned) -> dict[str, float]:
+def numbers(found: LearnedDrift) -> dict[str, float]:
     """Return the figures that a page can assert; of the nets the median."""
     made = {"rows": float(len(found.samples)), "parameters_net": float(found.typical.net.n_parameters_)}
     for t, r in found.regressions.items():

@@ -20,8 +20,8 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996 import setup
 from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES, recordings, with_differences
 from thermocomp.papers.common import rms
-from thermocomp.papers.study import Claims, FloatArray, Ours, Table
-from thermocomp.recording.cycles import whole as whole_test
+from thermocomp.papers.study import Claims, FloatArray, Ours, StudyTable
+from thermocomp.recording.cycles import make_single_cycle as whole_test
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
 
@@ -363,7 +363,7 @@ def numbers(found: Law) -> dict[str, float]:
     return made | {f"law_elsewhere_{name.lower()}": e for name, e in found.elsewhere.items()}
 
 
-def tables(found: Law) -> list[Table]:
+def tables(found: Law) -> list[StudyTable]:
     """Return how often the law came back, and its coefficients."""
     rates = [
         [d.name, f"{d.laser:g}", f"{d.sensor:g}", *(f"{v:.1%}" for v in (r.whole, r.missing, r.wrong))]
@@ -377,12 +377,12 @@ def tables(found: Law) -> list[Table]:
         for (t, true), mean, spread in zip(EQ8.items(), drawn.mean(axis=0), drawn.std(axis=0), strict=True)
     ]
     return [
-        Table(
+        StudyTable(
             "A planted law sought: share of the draws",
             ("51 profiles", "laser [um]", "sensor [degC]", "whole", "a term missing", "a wrong one"),
             rates,
         ),
-        Table(
+        StudyTable(
             "Coefficients of the planted law [um/m per degC]",
             ("term", "planted", "found, first draw", "standard error", "mean of draws", "spread of draws"),
             coefficients,

@@ -6,7 +6,7 @@ import numpy as np
 
 from thermocomp.core.machine import Channel
 from thermocomp.datasets.virtual import record
-from thermocomp.papers.common import derived, renamed, stacked
+from thermocomp.papers.common import add_derived_channel, rename_channels, stacked
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 
@@ -71,9 +71,9 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
         given = {c.name for c in recording.channels}
         known = {new: old for new, old in {**SENSORS, **DRIFTS, **SPEED}.items() if old in given}
         rest = {c.name: c.name for c in recording.channels if c.name not in known.values()}
-        named = renamed(recording, {old: new for new, old in known.items()} | rest)
+        named = rename_channels(recording, {old: new for new, old in known.items()} | rest)
         mean = dict.fromkeys(COLUMN, 1 / len(COLUMN))
-        found.append(derived(named, Channel("T5", "temperature", "degC", "column, average"), mean))
+        found.append(add_derived_channel(named, Channel("T5", "temperature", "degC", "column, average"), mean))
     return found
 
 
@@ -92,7 +92,7 @@ def with_differences(recording: Recording) -> Recording:
     for plus, minus in DIFFERENCES:
         if f"{plus}-{minus}" in SLOPE_VARIABLES:
             channel = Channel(f"{plus}-{minus}", "temperature", "degC")
-            recording = derived(recording, channel, {plus: 1.0, minus: -1.0})
+            recording = add_derived_channel(recording, channel, {plus: 1.0, minus: -1.0})
     return recording
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers import common, pictures
-from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, Learned, Trained, screening
+from thermocomp.papers.chen1996.drift import MAE_MRA, MAE_NET, R2_X, SEE_X, TERMS, LearnedDrift, LearnedNet, screening
 from thermocomp.papers.chen1996.setup import DRIFTS, SENSORS, SUBGROUPS
-from thermocomp.papers.study import Curve, Figure, Table
+from thermocomp.papers.study import Figure, PlotCurve, StudyTable
 
 #: Eq. 5 (C-18)
 EQ5 = {
@@ -22,7 +22,7 @@ EQ5 = {
 }
 
 
-def tables(found: Learned) -> list[Table]:
+def tables(found: LearnedDrift) -> list[StudyTable]:
     """Return Tables 1 and 2, the fits, Eq. 5 beside ours, the logs of Fig. 2 and the sweep."""
     first = [
         [name, SENSORS.get(name, "mean of T6 to T9"), *(f"{r:.2f}" for r in row)]
@@ -44,22 +44,24 @@ def tables(found: Learned) -> list[Table]:
     sweep = {**found.others, "9-20-3": found.nets}
     counts = [[kind, *_sweep_row(nets)] for kind, nets in sweep.items()]
     return [
-        Table("Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first),
+        StudyTable(
+            "Table 1: temperatures, and their correlation with the drifts", ("", "channel", "x", "y", "z"), first
+        ),
         common.table("Table 2 and the fits, the paper's numbers in brackets", DRIFTS, fits),
         beside("Drift in x: coefficients [um/degC, um/degC2]", "Eq. 5", ours, EQ5),
         *(_log(found.regressions[t], t) for t in ("x", "y")),
-        Table(
+        StudyTable(
             "Nets: mean absolute error after training, mean over the starts", ("", "starts", *DRIFTS, "mean"), counts
         ),
     ]
 
 
-def _sweep_row(nets: Sequence[Trained]) -> list[str]:
+def _sweep_row(nets: Sequence[LearnedNet]) -> list[str]:
     mae = [float(np.mean([n.mae[t] for n in nets])) for t in DRIFTS]
     return [f"{len(nets)}", *(f"{m:.2f}" for m in mae), f"{np.mean(mae):.2f}"]
 
 
-def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> Table:
+def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[str, float]) -> StudyTable:
     """Lay out coefficients by their terms, ours beside the paper's.
 
     Parameters
@@ -75,26 +77,26 @@ def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[s
     Table
     """
     rows = [[t, *(f"{c[t]:.3f}" if t in c else "" for c in (ours, paper))] for t in {**ours, **paper}]
-    return Table(f"{what} here and in {equation}", ("term", "here", equation), rows)
+    return StudyTable(f"{what} here and in {equation}", ("term", "here", equation), rows)
 
 
-def _log(regression: SecondOrderRegression, target: str) -> Table:
+def _log(regression: SecondOrderRegression, target: str) -> StudyTable:
     rows = [
         [f"{s.number}", s.action.upper(), s.term, f"{s.r:.3f}", f"{s.r_squared:.3f}", f"{s.f:.1f}"]
         for s in regression.log_
     ]
     note = "; the steps printed in the paper are those of its y (E-C1)" if target == "y" else ""
-    return Table(f"Fig. 2: steps in {target}{note}", ("STEP", "", "term", "R", "RSQUARE", "F"), rows)
+    return StudyTable(f"Fig. 2: steps in {target}{note}", ("STEP", "", "term", "R", "RSQUARE", "F"), rows)
 
 
-def figures(found: Learned) -> list[Figure]:
+def figures(found: LearnedDrift) -> list[Figure]:
     """Return Figs. 3 to 5 and 10 to 12: what was measured, and the fits."""
     samples, drawn = found.samples, []
     for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
         for number, (target, model) in enumerate(models.items(), start=first):
             curves = [
-                Curve("measured", *pictures.end_to_end(samples, common.measured(samples, target)), "points"),
-                Curve(kind, *pictures.end_to_end(samples, common.predicted(model, samples))),
+                PlotCurve("measured", *pictures.end_to_end(samples, common.take_measured(samples, target)), "points"),
+                PlotCurve(kind, *pictures.end_to_end(samples, common.predict_deviation(model, samples))),
             ]
             axes = "time, five tests one after the other [h]", f"{target} [um]"
             text = f"drift in {target} over the five tests, and the fit by the {kind}."
@@ -102,7 +104,7 @@ def figures(found: Learned) -> list[Figure]:
     return drawn
 
 
-def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[Curve]) -> Figure:
+def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[PlotCurve]) -> Figure:
     """Return a figure with one panel, like the paper's figure of that number.
 
     Parameters

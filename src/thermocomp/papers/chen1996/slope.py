@@ -19,7 +19,7 @@ from thermocomp.papers.chen1996.setup import CLOSELY, EQ6, EQ8, SLOPE_VARIABLES,
 from thermocomp.papers.chen1996.show import beside, figure
 from thermocomp.papers.common import PAPERS_SUPPORT, Errors, rms
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Table
+from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, PlotCurve, StudyTable
 from thermocomp.recording.profiles import Profiles
 
 #: sets, unscreened and screened coefficients (C-23)
@@ -34,7 +34,7 @@ NONE, MRA, NET, DYNAMIC, MEASURED = "no compensation", "MRA", "net", "dynamic (o
 
 
 @dataclass(frozen=True, eq=False)
-class Positioning:
+class LearnedPositioning:
     """What was learned from the profiles of one test, and those of another day.
 
     Parameters
@@ -84,7 +84,7 @@ class Positioning:
         """Return the slope that a model tells from the readings of a day, shape (n_states,) [um/m]."""
         model = fit.model.slopes[0]
         samples, _ = slope_samples([day], PositionOptions(inputs=[i.name for i in model.inputs]))
-        return common.predicted(model, samples)
+        return common.predict_deviation(model, samples)
 
     def left(self, fit: PositionFit) -> float:
         """Return the RMS of what a model leaves of the slope on the other day [um/m]."""
@@ -101,7 +101,7 @@ class Positioning:
         return self.slope(self.learned)
 
 
-def learn(seed: int, other_seed: int) -> Positioning:
+def learn(seed: int, other_seed: int) -> LearnedPositioning:
     """Run the test on two days and fit what the paper fits to the first.
 
     Parameters
@@ -132,7 +132,7 @@ def learn(seed: int, other_seed: int) -> Positioning:
         learned, PositionOptions(order=EQ6.degree(), inputs=(*setup.TEMPERATURES, *setup.SPEED), method="dynamic")
     )
     fits = {MRA: regression, NET: nets[typical], DYNAMIC: ours}
-    return Positioning(learned, other, from_recording(first, "EAY"), fits, nets, linear, law.seek(seed))
+    return LearnedPositioning(learned, other, from_recording(first, "EAY"), fits, nets, linear, law.seek(seed))
 
 
 def _net(fit: PositionFit) -> Any:
@@ -142,7 +142,7 @@ def _net(fit: PositionFit) -> Any:
 # -- claims --------------------------------------------------------------------------------------------------------
 
 
-claims = Claims[Positioning]()
+claims = Claims[LearnedPositioning]()
 
 
 @claims.add(
@@ -151,7 +151,7 @@ claims = Claims[Positioning]()
     "only what the noise of the laser does)",
     "-18.5 .. 8.5 um",
 )
-def _cold(found: Positioning) -> str:
+def _cold(found: LearnedPositioning) -> str:
     geometric = found.geometric(found.learned)
     apart = np.abs(geometric - EQ6(found.learned.position)).max()
     return f"{geometric.min():.1f} .. {geometric.max():.1f} um, within {apart:.2f} um of Eq. 6"
@@ -161,7 +161,7 @@ def _cold(found: Positioning) -> str:
     "C-04 C-05 C-07",
     f"Only the slope of the profile varies: a straight line leaves at most {STRAIGHT:.0%} of its thermal part",
 )
-def _straight(found: Positioning) -> Ours:
+def _straight(found: LearnedPositioning) -> Ours:
     left = residuals(found, found.learned)
     bent = rms(left[MEASURED]) / rms(left[NONE])
     return Ours(
@@ -172,12 +172,12 @@ def _straight(found: Positioning) -> Ours:
 
 
 @claims.add("C-23", f"{SETS} sets of slopes, {CANDIDATES} unscreened coefficients", f"{SETS}, {CANDIDATES}")
-def _sets(found: Positioning) -> str:
+def _sets(found: LearnedPositioning) -> str:
     return f"{len(found.learned)}, {len(found.regression.candidates_)}"
 
 
 @claims.add("C-23 C-24", "Stepwise regression needs neither higher-order nor product terms", f"{', '.join(EQ8)}")
-def _terms(found: Positioning) -> Ours:
+def _terms(found: LearnedPositioning) -> Ours:
     terms = found.regression.terms_
     second = [t for t in terms if "*" in t]
     return Ours(
@@ -193,7 +193,7 @@ def _terms(found: Positioning) -> Ours:
     f"The regression fits the slopes closely in warm-up and cool-down (R2 >= {CLOSELY})",
     "Fig. 7",
 )
-def _closely(found: Positioning) -> Ours:
+def _closely(found: LearnedPositioning) -> Ours:
     return Ours(
         f"R2 {found.regression.r_squared_:.3f}",
         round(found.regression.r_squared_, 3) >= CLOSELY,
@@ -203,7 +203,7 @@ def _closely(found: Positioning) -> Ours:
 
 
 @claims.add("C-27 C-36", f"The 5-8-1 net can also fit the slopes (R2 >= {CLOSELY})", "Fig. 13")
-def _net_closely(found: Positioning) -> Ours:
+def _net_closely(found: LearnedPositioning) -> Ours:
     r2 = float(np.median(found.net_r2))
     return Ours(
         f"R2 {r2:.3f} ({found.net_r2.min():.3f}-{found.net_r2.max():.3f})",
@@ -213,13 +213,13 @@ def _net_closely(found: Positioning) -> Ours:
 
 
 @claims.add("C-27", "The net has more weights than there are sets (ours: it warns)")
-def _weights(found: Positioning) -> str:
+def _weights(found: LearnedPositioning) -> str:
     net = _net(found.nets[0])
     return f"{net.n_parameters_} for {net.n_patterns_}; {net.caution_ or 'no warning'}"
 
 
 @claims.add("C-24", "Slope on another day that was not learned: RMS left (ours)")
-def _elsewhere(found: Positioning) -> str:
+def _elsewhere(found: LearnedPositioning) -> str:
     left = ", ".join(f"{m} {e:.2f}" for m, e in found.elsewhere.items())
     return f"{rms(found.slope(found.other)):.2f} um/m; {left} um/m"
 
@@ -233,8 +233,8 @@ claims.include(law.claims, lambda found: found.law)
     "travel on another day",
     f"{LATERAL[0]} -> {LATERAL[1]} um, {LATERAL[0] / LATERAL[1]:.1f} times",
 )
-def _lateral(found: Positioning) -> Ours:
-    left = lateral(found)
+def _lateral(found: LearnedPositioning) -> Ours:
+    left = largest_length_error(found)
     best = left[NONE] / min(left[MRA], left[NET])
     after = ", ".join(f"{m} {left[m]:.1f}" for m in found.fits)
     return Ours(
@@ -245,32 +245,32 @@ def _lateral(found: Positioning) -> Ours:
     )
 
 
-def residuals(found: Positioning, day: Profiles) -> dict[str, FloatArray]:
+def residuals(found: LearnedPositioning, day: Profiles) -> dict[str, FloatArray]:
     """Return what each method leaves of the profiles of a day, cold profile taken off, (n_states, n_points) [um]."""
     thermal, k1 = day.values - found.geometric(day), found.slope(day)
     slopes = {m: found.predicted(fit, day) for m, fit in found.fits.items()} | {MEASURED: k1}
     return {NONE: thermal} | {m: thermal - 1e-3 * np.outer(slope, day.position) for m, slope in slopes.items()}
 
 
-def lateral(found: Positioning) -> dict[str, float]:
+def largest_length_error(found: LearnedPositioning) -> dict[str, float]:
     """Return the largest error of a length of the whole travel on the other day, per method [um]."""
     return {m: float(np.abs(e[:, -1] - e[:, 0]).max()) for m, e in residuals(found, found.other).items()}
 
 
-def numbers(found: Positioning) -> dict[str, float]:
+def numbers(found: LearnedPositioning) -> dict[str, float]:
     """Return the figures that a page can assert."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic", MEASURED: "measured"}
     r = found.regression
     made = {"slope_sets": float(r.n_rows_), "slope_candidates": float(len(r.candidates_)), "slope_r2_mra": r.r_squared_}
     made |= {"slope_terms": float(len(r.terms_)), "slope_r2_net": float(np.median(found.net_r2))}
-    made |= {f"lateral_{short[m]}_um": e for m, e in lateral(found).items()}
+    made |= {f"lateral_{short[m]}_um": e for m, e in largest_length_error(found).items()}
     return made | law.numbers(found.law)
 
 
 # -- tables and figures --------------------------------------------------------------------------------------------
 
 
-def tables(found: Positioning) -> list[Table]:
+def tables(found: LearnedPositioning) -> list[StudyTable]:
     """Return Eq. 6 and Eq. 8 beside ours, the planted law, and the error without and with compensation."""
     learned = found.learned
     ours = dict(zip(found.regression.terms_, found.regression.coef_.tolist(), strict=True))
@@ -285,14 +285,14 @@ def tables(found: Positioning) -> list[Table]:
         errors[what, NONE] = day.values
         errors |= {(what, "cold profile alone" if m == NONE else m): e for m, e in residuals(found, day).items()}
     return [
-        Table("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
+        StudyTable("Cold profile [mm, y in mm] here and in Eq. 6", ("term", "here", "Eq. 6"), eq6),
         beside("Slope of Y: coefficients [um/m per degC, degC2]", "Eq. 8", ours, EQ8),
         common.errors_table("Positioning of Y, all profiles: error without and with compensation", errors),
         *law.tables(found.law),
     ]
 
 
-def figures(found: Positioning) -> list[Figure]:
+def figures(found: LearnedPositioning) -> list[Figure]:
     """Return Figs. 1, 6, 7 and 13."""
     learned, k1 = found.learned, found.k1
     hours = learned.states.time / 3600.0
@@ -303,7 +303,7 @@ def figures(found: Positioning) -> list[Figure]:
         (1, found.pitch, "pitch of Y (the paper shows its yaw)", "pitch of Y [urad]"),
         (6, learned, "positioning errors of Y", "positioning error of Y [um]"),
     ):
-        profiles = [Curve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
+        profiles = [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
         drawn.append(figure(number, f"{text} in several thermal states.", ("position of Y [mm]", label), profiles))
     for number, method in ((7, MRA), (13, NET)):
         slopes = {"measured": k1, method: found.predicted(found.fits[method], learned)}

@@ -10,12 +10,12 @@ import numpy as np
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.papers import common
-from thermocomp.papers.chen1996.drift import Learned
+from thermocomp.papers.chen1996.drift import LearnedDrift
 from thermocomp.papers.chen1996.setup import COMPETITIVE, DRIFTS, TENFOLD, WELL, drift_samples, recordings
 from thermocomp.papers.chen1996.show import figure
 from thermocomp.papers.common import Errors, trained
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, Table
+from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, StudyTable
 from thermocomp.recording.samples import Samples
 
 #: C-33, E-C9: level of the noise [degC], and how often it is drawn
@@ -43,7 +43,7 @@ class Unseen:
     """
 
     tests: Sequence[Samples]
-    learned: Learned
+    learned: LearnedDrift
     dynamic: Mapping[str, ErrorModel]
 
     @property
@@ -56,7 +56,7 @@ class Unseen:
         """Per test, drift and method, no compensation among them [um]."""
         return [
             {
-                t: {NONE: common.measured(test, t)}
+                t: {NONE: common.take_measured(test, t)}
                 | {m: common.residual(models[t], test) for m, models in self.models.items()}
                 for t in DRIFTS
             }
@@ -92,7 +92,7 @@ def rms(model: ErrorModel, samples: Samples) -> float:
     return Errors.of(common.residual(model, samples)).rms
 
 
-def observe(learned: Learned, seed: int) -> Unseen:
+def observe(learned: LearnedDrift, seed: int) -> Unseen:
     """Run the two tests and train our own method.
 
     Parameters
@@ -314,7 +314,7 @@ def numbers(found: Unseen) -> dict[str, float]:
 # -- tables and figures --------------------------------------------------------------------------------------------
 
 
-def tables(found: Unseen) -> list[Table]:
+def tables(found: Unseen) -> list[StudyTable]:
     """Return what is left of x, y and z in each new test, and how many independent rows that is."""
     residuals = {
         (f"{t}, {name}", method): e
@@ -324,7 +324,7 @@ def tables(found: Unseen) -> list[Table]:
     }
     errors = common.errors_table("New tests: error without and with compensation", residuals)
     rows = [[*row, f"{effective_sample_size(e):.0f}"] for row, e in zip(errors.rows, residuals.values(), strict=True)]
-    return [Table(errors.caption, (*errors.header, "independent rows"), rows)]
+    return [StudyTable(errors.caption, (*errors.header, "independent rows"), rows)]
 
 
 def figures(found: Unseen) -> list[Figure]:
@@ -340,7 +340,7 @@ def figures(found: Unseen) -> list[Figure]:
 
 
 def _figure(found: Unseen, number: int, target: str, samples: Samples, text: str) -> Figure:
-    drift = {"measured": common.measured(samples, target)}
-    drift |= {m: common.predicted(models[target], samples) for m, models in found.models.items()}
+    drift = {"measured": common.take_measured(samples, target)}
+    drift |= {m: common.predict_deviation(models[target], samples) for m, models in found.models.items()}
     lines = curves(samples.time / 3600.0, drift, dashed=[DYNAMIC], points=["measured"])
     return figure(number, text, ("time [h]", f"{target} [um]"), lines)

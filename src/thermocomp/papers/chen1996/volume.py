@@ -28,7 +28,7 @@ COLD = (0, 1)
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
+class LearnedVolume:
     """A machine that was measured, and what its components were learned from.
 
     Parameters
@@ -47,7 +47,7 @@ class Learned:
     flat: PositionFit
 
 
-def learn(seed: int) -> Learned:
+def learn(seed: int) -> LearnedVolume:
     """Measure the machine in experiment ``volumetric`` and learn its components.
 
     Parameters
@@ -69,7 +69,7 @@ def learn(seed: int) -> Learned:
     sources: dict[str, Source] = {code: fit.model for code, fit in fits.items()}
     for code in ("C0Y", "B0Z", "A0Z"):
         sources[code] = float(np.mean([test.table[f"{code}_urad"].iloc[list(COLD)].mean() for test in rounds]))
-    return Learned(_machine(sources | _spindle(tests, inputs)), fits, found[-1])
+    return LearnedVolume(_machine(sources | _spindle(tests, inputs)), fits, found[-1])
 
 
 def every(test: Recording, step: int) -> Recording:

@@ -20,7 +20,7 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.selection.grouping import Groups, Interval, intervals
-from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predicted, renamed, stacked, trained
+from thermocomp.papers.common import PAPERS_SUPPORT, every, frozen, predict_deviation, rename_channels, stacked, trained
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
@@ -73,7 +73,7 @@ class Fit:
 def samples_of(tests: Sequence[Recording]) -> Samples:
     """Return tests with the paper's names, temperatures as they are."""
     names = {f"t_{p}_C": n for p, n in zip(HWANG_PLACES, NAMES, strict=True)} | {TARGET: TARGET}
-    return stacked([renamed(r, names) for r in tests], [TARGET], NAMES, rezero=False)
+    return stacked([rename_channels(r, names) for r in tests], [TARGET], NAMES, rezero=False)
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
@@ -166,13 +166,13 @@ class Computed:
 
     def fitted(self, name: str) -> FloatArray:
         """Return what a model says of the rows it was fitted to [um]."""
-        return predicted(self.fits[name].model, self.fit)
+        return predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
     def residuals(self) -> dict[str, FloatArray]:
         """What each model leaves of the new tests [um]."""
         z = self.new.deviations[:, 0]
-        left = {name: z - predicted(f.model, self.new) for name, f in self.fits.items()}
+        left = {name: z - predict_deviation(f.model, self.new) for name, f in self.fits.items()}
         return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
 
 
@@ -227,7 +227,7 @@ def _dynamic(tests: Sequence[Recording]) -> FloatArray:
     """Return what `dynamic` leaves of the new tests, learned from the first; it counts from the start of a test."""
     inputs = [*(f"t_{p}_C" for p in HWANG_PLACES), "spindle_rpm"]
     learned, new = (stacked(r, [TARGET], inputs) for r in (tests[:1], tests[1:]))
-    return new.deviations[:, 0] - predicted(trained("dynamic", learned), new)
+    return new.deviations[:, 0] - predict_deviation(trained("dynamic", learned), new)
 
 
 def named(columns: Sequence[int]) -> str:

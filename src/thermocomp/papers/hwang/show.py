@@ -11,10 +11,10 @@ from thermocomp.papers.common import errors_table, rms, table
 from thermocomp.papers.hwang import setup
 from thermocomp.papers.hwang.setup import JUDGED, LINEAR, OPTIMAL, PLAIN, QUADRATIC, Computed, named
 from thermocomp.papers.pictures import curves, single
-from thermocomp.papers.study import Figure, Panel, Table
+from thermocomp.papers.study import Figure, Panel, StudyTable
 
 
-def tables(c: Computed) -> tuple[Table, ...]:
+def tables(c: Computed) -> tuple[StudyTable, ...]:
     """Return the tables."""
     swept: dict[str, Callable[[tuple[Interval, CorrelationGrouping]], str]] = {
         "threshold": lambda s: f"{s[0].low:.4f} to {s[0].high:.4f}{' (taken)' if s[0] is c.interval else ''}",
@@ -47,8 +47,8 @@ def tables(c: Computed) -> tuple[Table, ...]:
     columns = ("model", "eigenvalues [degC2]", "sum of 1/eigenvalue [1/degC2]", "condition number")
     return (
         table("Every threshold there is (E-H1)", c.swept, swept),
-        Table("Eigenvalues of X'X (Table 3)", columns, eigenvalues),
-        Table(
+        StudyTable("Eigenvalues of X'X (Table 3)", columns, eigenvalues),
+        StudyTable(
             "R2 under random sensor error, 100 draws (Fig. 6)",
             ("error [degC]", *(f"{m}, {v}" for m in shaken for v in ("mean", "std"))),
             noise,

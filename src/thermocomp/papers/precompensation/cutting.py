@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import find, record
-from thermocomp.models.methods import method
-from thermocomp.papers.common import fitted
+from thermocomp.datasets.virtual import find_experiment, record
+from thermocomp.models.methods import find_method
+from thermocomp.papers.common import fit_and_freeze
 from thermocomp.papers.precompensation import program
 from thermocomp.papers.precompensation.setup import CUTS, LEAST, MILLING, NET, NONE, POSITIONS, SPEED
 from thermocomp.papers.study import FloatArray, Progress
@@ -173,7 +173,10 @@ def house_models(learn: Samples) -> dict[str, list[ErrorModel]]:
     """
     timed: dict[str, Any] = {"dt": learn.dt(), "cycle": learn.cycle}
     targets = [c.name for c in learn.targets]
-    return {name: [fitted(method(name).build([SPEED]), learn, [t], **timed)[t] for t in targets] for name in HOUSE}
+    return {
+        name: [fit_and_freeze(find_method(name).build([SPEED]), learn, [t], **timed)[t] for t in targets]
+        for name in HOUSE
+    }
 
 
 def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Progress) -> Milled:
@@ -194,27 +197,27 @@ def compute(models: Mapping[str, Sequence[ErrorModel]], seed: int, progress: Pro
     drifts: dict[str, list[Recording]] = {}
     for what in (COLD, WARM, WARMER, COLDER):
         progress(0.2 * len(drifts) / 4, f"cutting tests, {what}")
-        drifts[what] = [record(true(what), seed=seed + n)[0] for n in range(CUTS)]
-    programs = [program.written(test) for test in drifts[COLD]]
+        drifts[what] = [record(make_true_test(what), seed=seed + n)[0] for n in range(CUTS)]
+    programs = [program.write_program(test) for test in drifts[COLD]]
     turns = [_turns(lines, test) for lines, test in zip(programs, drifts[COLD], strict=True)]
     milled = Milled(turning=float(np.mean(turns)), lines=len(programs[0]))
     _mill(milled, programs, drifts, NONE, "", list(CASES))
     for number, (name, its) in enumerate(models.items()):
         progress(0.2 + 0.8 * number / len(models), f"programs revised with: {name}")
         for way in program.WAYS if name == NET else program.WAYS[:-1]:
-            revised = [program.revised(lines, its, way) for lines in programs]
+            revised = [program.revise_program(lines, its, way) for lines in programs]
             cases = [c for c, (_, warm) in CASES.items() if not warm]
             _mill(milled, revised, drifts, name, way, cases if way == program.EVERY and name in TRIED else [RIGHT])
         if name in TRIED:
             start = program.warmed(its, BEFORE, BEFORE_SPEED)
-            revised = [program.revised(lines, its, program.EVERY, start) for lines in programs]
+            revised = [program.revise_program(lines, its, program.EVERY, start) for lines in programs]
             _mill(milled, revised, drifts, name, program.EVERY, [c for c, (_, warm) in CASES.items() if warm])
     return milled
 
 
-def true(what: str) -> Experiment:
+def make_true_test(what: str) -> Experiment:
     """Return the cutting test as it truly is: no noise, and the machine or the room in one of four states."""
-    experiment = find("precompensation-cut")
+    experiment = find_experiment("precompensation-cut")
     (plan,) = experiment.tests
     plan = replace(plan, sampling=OFTEN, perfect=True, places=())
     if what == WARM:

@@ -7,7 +7,7 @@ from thermocomp.papers.precompensation import cutting
 from thermocomp.papers.precompensation.cutting import CARRIED, COOLS, FALSE, RIGHT, UNKNOWN, WARMS, Milled, Surfaces
 from thermocomp.papers.precompensation.program import EVERY, NEEDED, SAFE, TOLERANCE, WAYS
 from thermocomp.papers.precompensation.setup import LEAST, NET, NONE, PAPERS_DEPTHS, SHARE
-from thermocomp.papers.study import Claims, Curve, Figure, FloatArray, Ours, Panel, Style, Table
+from thermocomp.papers.study import Claims, Figure, FloatArray, Ours, Panel, PlotCurve, StudyTable, Style
 
 claims = Claims[Milled]()
 
@@ -86,11 +86,11 @@ def _room(m: Milled) -> Ours:
     )
 
 
-def tables(m: Milled) -> tuple[Table, ...]:
+def tables(m: Milled) -> tuple[StudyTable, ...]:
     """Return depth differences by model and way of revising, by test, and by what was true."""
     shown = [(NONE, ""), *((NET, way) for way in WAYS), (LEAST, EVERY)]
     return (
-        Table(
+        StudyTable(
             f"Depth difference with NC programs, {_over(m)}; in brackets the greatest [um]",
             ("model", *WAYS),
             [
@@ -98,7 +98,7 @@ def tables(m: Milled) -> tuple[Table, ...]:
                 *([name, *(_cell(m, name, way) for way in WAYS)] for name in _models(m)),
             ],
         ),
-        Table(
+        StudyTable(
             "Depth difference with NC programs, mean over the positions [um]",
             ("", *(f"{name.partition(',')[0]}{way and f', {way}'}" for name, way in shown)),
             [
@@ -106,7 +106,7 @@ def tables(m: Milled) -> tuple[Table, ...]:
                 for n in range(len(m.without(RIGHT).depth))
             ],
         ),
-        Table(
+        StudyTable(
             f"Depth difference with NC programs revised {EVERY}, {_over(m)}; in brackets the greatest [um]",
             ("machine and room", NONE, *cutting.TRIED),
             [
@@ -121,7 +121,7 @@ def figures(m: Milled) -> tuple[Figure, ...]:
     """Return the surfaces of one test, and the depth differences of all."""
     tests = np.arange(1.0, len(m.without(RIGHT).depth) + 1)
     # goes on to the right, where the legend then hides nothing
-    zero = Curve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
+    zero = PlotCurve("", np.array([1.0, 1.5 * len(tests)]), np.zeros(2), "dashed")
     ways: tuple[tuple[str, str, Style], ...] = (
         ("", "not revised", "line"),
         (EVERY, EVERY, "dashed"),
@@ -137,7 +137,7 @@ def figures(m: Milled) -> tuple[Figure, ...]:
                     title,
                     "time [min]",
                     "actual minus drawing [um]",
-                    [Curve(label, *_surfaces(m, way, number), style) for way, label, style in ways],
+                    [PlotCurve(label, *_surfaces(m, way, number), style) for way, label, style in ways],
                 )
                 for number, title in ((1, "milled cold"), (2, "milled after the hour"))
             ],

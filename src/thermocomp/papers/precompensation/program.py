@@ -11,17 +11,17 @@ import numpy as np
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.nc.interpreter.block import Block, Setup
-from thermocomp.nc.interpreter.interpret import follow
+from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.planner.timeline import Kinematics, Timed, timed
+from thermocomp.nc.planner.timeline import MotionLimits, Timed, time_blocks
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
-from thermocomp.nc.rewrite.method import Method
+from thermocomp.nc.rewrite.method import CorrectionMethod
 from thermocomp.nc.rewrite.offset import Offset
 from thermocomp.nc.rewrite.revise import Revision
 from thermocomp.nc.rewrite.text import DIGITS
 from thermocomp.nc.thermal.drift import Drift
-from thermocomp.nc.thermal.start import Start, carried, cold
+from thermocomp.nc.thermal.start import ThermalStart, begin_cold, carry_over
 from thermocomp.nc.thermal.stations import Station
 from thermocomp.papers.precompensation.setup import INTERVAL, MILLING, POSITIONS, SPEED
 from thermocomp.papers.study import FloatArray
@@ -32,7 +32,7 @@ MINUTE = 60.0
 TOOL = 120.0
 #: what stands at the controller
 SETUP = Setup(offsets={1: (0.0, 0.0, -TOOL)}, tools={1: TOOL})
-KINEMATICS = Kinematics()
+KINEMATICS = MotionLimits()
 #: the tool is up, above the highest face [mm]
 UP = 650.0
 #: a face is so many passes of X, from left to right and back [mm], so far apart [mm], at this feed [mm/min]
@@ -59,7 +59,7 @@ WAYS = (EVERY, NEEDED, SAFE)
 # -- written -----------------------------------------------------------------------------------------------------------
 
 
-def written(test: Recording) -> list[str]:
+def write_program(test: Recording) -> list[str]:
     """Write the NC program that a cutting test has been run with.
 
     Parameters
@@ -169,15 +169,17 @@ def stations(models: Sequence[ErrorModel]) -> list[Station]:
     return [Station("Z", m, "Z", float(p)) for m, p in zip(models, POSITIONS, strict=True)]
 
 
-def warmed(models: Sequence[ErrorModel], seconds: float, speed: float) -> Start:
+def warmed(models: Sequence[ErrorModel], seconds: float, speed: float) -> ThermalStart:
     """Return the start state that is carried over from a job before: it began cold, and had one speed [1/min]."""
     there = stations(models)
-    before = Drift(there, cold(there, {}))
+    before = Drift(there, begin_cold(there, {}))
     before.advance(seconds, speed)
-    return carried(there, before.state())
+    return carry_over(there, before.state())
 
 
-def revised(lines: Iterable[str], models: Sequence[ErrorModel], way: str, start: Start | None = None) -> list[str]:
+def revise_program(
+    lines: Iterable[str], models: Sequence[ErrorModel], way: str, start: ThermalStart | None = None
+) -> list[str]:
     """Revise a program by the drift that it will cause.
 
     Parameters
@@ -197,9 +199,9 @@ def revised(lines: Iterable[str], models: Sequence[ErrorModel], way: str, start:
         Lines.
     """
     there = stations(models)
-    drift = Drift(there, start or cold(there, {}))
+    drift = Drift(there, start or begin_cold(there, {}))
     digits = DIGITS[SETUP.controller]
-    method: Method = Coordinates(digits, STEP)
+    method: CorrectionMethod = Coordinates(digits, STEP)
     if way == SAFE:
         method = Offset(digits, STEP, safe_z=UP, axes=(False, False, True))
     demand = Demand(TOLERANCE, INTERVAL if way == EVERY else None)
@@ -248,7 +250,7 @@ class Face:
 
 def run(lines: Iterable[str]) -> Iterator[Timed]:
     """Read a program as the machine runs it."""
-    return timed(follow(read_lines(lines, SETUP.controller), SETUP), KINEMATICS)
+    return time_blocks(follow_program(read_lines(lines, SETUP.controller), SETUP), KINEMATICS)
 
 
 def faces(lines: Iterable[str]) -> list[Face]:

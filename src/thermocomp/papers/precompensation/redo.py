@@ -13,7 +13,7 @@ from thermocomp.papers.common import Errors, errors_table, rms
 from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
 from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, PAPERS_DEPTHS, POSITIONS, Computed
-from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table
+from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, StudyTable
 
 TITLE = "Pre-compensation of thermal errors by revising the NC program"
 #: "describes thermal errors well", criterion: share of the drift's variance that is described at every position
@@ -187,7 +187,7 @@ def _room(c: Computed) -> Ours:
 # -- tables, figures, numbers ------------------------------------------------------------------------------------------
 
 
-def _tables(c: Computed) -> tuple[Table, ...]:
+def _tables(c: Computed) -> tuple[StudyTable, ...]:
     order = range(setup.GREATEST + 1)
     table = {(o.k, o.m): o for o in c.orders[0]}
     fpe = [[f"k = {k}", *(_fpe(table.get((k, m))) for m in order)] for k in order]
@@ -198,18 +198,18 @@ def _tables(c: Computed) -> tuple[Table, ...]:
     cuts = [[f"test {n}", *(f"{v:+.1f}" for v in (*k.without, *k.scheduled))] for n, k in enumerate(c.cuts, start=1)]
     first = f"at z = {POSITIONS[0]} mm"
     return (
-        Table(
+        StudyTable(
             f"Final prediction error [um2] {first}, steps of 10 min; in brackets: the free run does not decay",
             ("", *(f"m = {m}" for m in order)),
             fpe,
         ),
         errors_table("Free run in the verification: what is left", left),
-        Table(
+        StudyTable(
             f"Orders by the step of time, {first}",
             ("step [min]", "k, m by FPE", "free-run RMS [um]", "with k = 1, m = 0 [um]"),
             clocks,
         ),
-        Table(
+        StudyTable(
             "Depth difference of the second surface to the first [um]",
             ("", *(f"{p} mm{what}" for what in ("", ", corrected") for p in POSITIONS)),
             cuts,

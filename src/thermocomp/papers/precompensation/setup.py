@@ -9,11 +9,11 @@ import numpy as np
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
-from thermocomp.datasets.virtual import find, record
+from thermocomp.datasets.virtual import find_experiment, record
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.selection.orders import Order
-from thermocomp.papers.common import Errors, described, fitted, predicted, rms, stacked
+from thermocomp.papers.common import Errors, described, fit_and_freeze, predict_deviation, rms, stacked
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
@@ -43,7 +43,7 @@ NET, LEAST, CHOSEN = "net, k = 1, m = 0", "least squares, k = 1, m = 0", "least 
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class CuttingTest:
     """A cutting test: how much deeper the second surface is than the first [um], per position of Z.
 
     Parameters
@@ -113,7 +113,7 @@ class Computed:
     hidden: list[int]
     one_step: float
     clocks: dict[float, tuple[tuple[int, int], float, float]]
-    cuts: list[Cut]
+    cuts: list[CuttingTest]
     warm: Warm
     room: float
     workshop: float
@@ -132,7 +132,7 @@ class Computed:
     @cached_property
     def schedule(self) -> FloatArray:
         """What is added to the programmed Z in the verification, by the nets, (n_rows, n_positions) [um]."""
-        return scheduled(self.judge.time, self.free_run[NET])
+        return schedule_corrections(self.judge.time, self.free_run[NET])
 
     @property
     def by_fpe(self) -> list[Order]:
@@ -185,7 +185,7 @@ def compute(seed: int, progress: Progress) -> Computed:
         k, m = PAPERS_ORDERS
         net = NetARX(inputs=(SPEED,), time="routed", interval=INTERVAL, k=k, m=m, random_state=seed)
         for name, estimator in ((CHOSEN, chosen), (LEAST, paper), (NET, net)):
-            models[name].append(fitted(estimator, learn, [target], **timed)[target])
+            models[name].append(fit_and_freeze(estimator, learn, [target], **timed)[target])
         tables.append(chosen.orders_)
         hidden.append(net.hidden_)
         ahead = paper.one_step(judge.frame(), judge.deviations[:, number], dt=judge.dt())
@@ -197,7 +197,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     progress(0.9, "a warm machine, and another room")
     still = record("etve", seed=seed)[0]
     room = Errors.of(still.table["z_um"].to_numpy(dtype=np.float64)).peak_to_peak
-    workshop = samples_of(record(in_a_workshop(find("precompensation")), seed=seed)[-1])
+    workshop = samples_of(record(in_a_workshop(find_experiment("precompensation")), seed=seed)[-1])
     left = workshop.deviations - at_positions(models[NET], workshop)
     warm = warm_start(judge, models[NET][0])
     return Computed(
@@ -227,10 +227,10 @@ def in_a_workshop(experiment: Experiment) -> Experiment:
 
 def at_positions(models: Sequence[ErrorModel], samples: Samples) -> FloatArray:
     """Return what the model of each position predicts in free run, (n_rows, n_positions) [um]."""
-    return np.column_stack([predicted(m, samples) for m in models])
+    return np.column_stack([predict_deviation(m, samples) for m in models])
 
 
-def scheduled(time: FloatArray, predictions: FloatArray) -> FloatArray:
+def schedule_corrections(time: FloatArray, predictions: FloatArray) -> FloatArray:
     """Return what is added to the programmed Z: computed every ten minutes, and kept until the next time (P-06).
 
     Parameters
@@ -250,7 +250,7 @@ def scheduled(time: FloatArray, predictions: FloatArray) -> FloatArray:
     return np.asarray(opposed(predictions[begins]), dtype=np.float64)
 
 
-def cut(recording: Recording, models: Sequence[ErrorModel]) -> Cut:
+def cut(recording: Recording, models: Sequence[ErrorModel]) -> CuttingTest:
     """Mill a surface with the cold machine and another after an hour, without and with a corrected program (P-07)."""
     samples = samples_of(recording)
     running = np.flatnonzero(samples.values[:, 0] > 0)
@@ -258,8 +258,8 @@ def cut(recording: Recording, models: Sequence[ErrorModel]) -> Cut:
     first = (minutes >= minutes[running[0]]) & (minutes < minutes[running[0]] + MILLING)
     last = (minutes > minutes[running[-1]] - MILLING) & (minutes <= minutes[running[-1]])
     z = samples.deviations
-    corrected = z + scheduled(samples.time, at_positions(models, samples))
-    return Cut(*(values[last].mean(axis=0) - values[first].mean(axis=0) for values in (z, corrected)))
+    corrected = z + schedule_corrections(samples.time, at_positions(models, samples))
+    return CuttingTest(*(values[last].mean(axis=0) - values[first].mean(axis=0) for values in (z, corrected)))
 
 
 def warm_start(judge: Samples, model: ErrorModel) -> Warm:
@@ -268,7 +268,7 @@ def warm_start(judge: Samples, model: ErrorModel) -> Warm:
     job = judge.take(late)
     job = replace(job, time=job.time - job.time[0])
     drift = job.deviations[:, 0] - job.deviations[0, 0]
-    carried, cold = predicted(model, judge)[late], predicted(model, job)
+    carried, cold = predict_deviation(model, judge)[late], predict_deviation(model, job)
     return Warm(job.time / 3600, drift, drift - (cold - cold[0]), drift - (carried - carried[0]))
 
 
@@ -284,5 +284,7 @@ def _clock(
 ) -> tuple[tuple[int, int], float, float]:
     target, z = learn.targets[0].name, judge.deviations[:, 0]
     chosen, paper = _by_fpe_and_papers(interval)
-    left, least = (rms(z - predicted(fitted(e, learn, [target], **timed)[target], judge)) for e in (chosen, paper))
+    left, least = (
+        rms(z - predict_deviation(fit_and_freeze(e, learn, [target], **timed)[target], judge)) for e in (chosen, paper)
+    )
     return (chosen.k_, chosen.m_), left, least

@@ -14,7 +14,7 @@ from thermocomp.papers.common import Errors, errors_table, rms, table
 from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.stepwise2017 import setup
 from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL, PURSUIT, STEPWISE, Computed, Thinned
-from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, Table
+from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Study, StudyTable
 
 TITLE = "Open Mech. Eng. J. 11 (2017): Temperature measurement point optimization by stepwise regression"
 #: temperatures of the paper's Fig. 2, by their number
@@ -181,7 +181,7 @@ def _absolute(c: Computed) -> str:
 # -- tables, figures, numbers ------------------------------------------------------------------------------------------
 
 
-def _tables(c: Computed) -> tuple[Table, ...]:
+def _tables(c: Computed) -> tuple[StudyTable, ...]:
     steps: dict[str, Callable[[Step], str]] = {
         "step": lambda s: str(s.number),
         "temperature": lambda s: f"{'+' if s.action == 'enter' else '-'} {_place(s.term)}",

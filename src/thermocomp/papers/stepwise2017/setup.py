@@ -12,7 +12,17 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.numerics.stepwise import r_squared_of_f
 from thermocomp.models.partial_f import PartialF
-from thermocomp.papers.common import PAPERS_SUPPORT, Errors, every, fitted, frozen, predicted, rms, stacked, trained
+from thermocomp.papers.common import (
+    PAPERS_SUPPORT,
+    Errors,
+    every,
+    fit_and_freeze,
+    frozen,
+    predict_deviation,
+    rms,
+    stacked,
+    trained,
+)
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recording.samples import Samples
 
@@ -136,7 +146,7 @@ def compute(seed: int, progress: Progress) -> Computed:
     warm, now = learn.only(heat), judge.only(heat)
     progress(0.1, "stepwise regression")
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
-    models = fitted(selection, warm, [TARGET])
+    models = fit_and_freeze(selection, warm, [TARGET])
     found = {STEPWISE: models[TARGET]}
     for k, (name, method) in enumerate(METHODS.items()):
         progress(0.2 + 0.1 * k, name)
@@ -149,14 +159,14 @@ def compute(seed: int, progress: Progress) -> Computed:
     progress(0.95, "fewer rows")
     thinned = tuple(_thinned(warm, now, step) for step in THINNED)
     raw, new = (stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
-    absolute = fitted(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
+    absolute = fit_and_freeze(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
     return Computed(
         learn,
         judge,
         selection,
         {name: found[name] for name in METHODS},
         thinned,
-        rms(measured - predicted(absolute, new)),
+        rms(measured - predict_deviation(absolute, new)),
         shaken,
     )
 
@@ -195,9 +205,9 @@ def sliced_inverse(samples: Samples) -> ErrorModel:
 def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
     some = warm.take(np.arange(0, len(warm), step))
     selection = PartialF(f_enter=F_ENTER, f_delete=F_DELETE)
-    model = fitted(selection, some, [TARGET])[TARGET]
+    model = fit_and_freeze(selection, some, [TARGET])[TARGET]
     residual = some.deviations[:, 0] - selection.predict(some.frame())
-    error = online.deviations[:, 0] - predicted(model, online)
+    error = online.deviations[:, 0] - predict_deviation(model, online)
     return Thinned(
         len(some),
         effective_sample_size(residual),
@@ -209,4 +219,4 @@ def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
 
 def _left(models: dict[str, ErrorModel], samples: Samples) -> dict[str, FloatArray]:
     x = samples.deviations[:, 0]
-    return {NONE: x} | {name: x - predicted(model, samples) for name, model in models.items()}
+    return {NONE: x} | {name: x - predict_deviation(model, samples) for name, model in models.items()}

@@ -15,7 +15,7 @@ from thermocomp.models.selection.maximal_correlation import (
     maximal_correlations,
     subsets_up_to,
 )
-from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, Table
+from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, StudyTable
 
 #: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129
@@ -132,7 +132,7 @@ def _choice(small: Equivalents) -> tuple[int, ...]:
     return max(equals, key=lambda s: total[s])
 
 
-def called(places: Sequence[int]) -> str:
+def name_set(places: Sequence[int]) -> str:
     """Write a set as the paper does: ``{T1, T2, T8}``."""
     return "{" + ", ".join(f"T{j + 1}" for j in places) + "}"
 
@@ -184,7 +184,7 @@ def _counted(equivalent: Sequence[int], common: int) -> str:
     "W-11 E-W6",
     "Several sets are as good as the best, and some are for all displacements",
     f"{', '.join(str(n) for n in PAPER_EQUIVALENT)} sets for S1, S2, S3; {len(PAPER_COMMON)} common: "
-    + " ".join(map(called, PAPER_COMMON)),
+    + " ".join(map(name_set, PAPER_COMMON)),
 )
 def _several(s: Selection) -> Ours:
     common = s.small.common
@@ -192,7 +192,7 @@ def _several(s: Selection) -> Ours:
         _counted(e.equivalent.sum(axis=1).tolist(), len(e.common)) for e in (s.small, s.holm, s.converged)
     )
     return Ours(
-        f"{small}: {' '.join(map(called, common[:6])) + (' ...' if len(common) > 6 else '') or 'none'}",
+        f"{small}: {' '.join(map(name_set, common[:6])) + (' ...' if len(common) > 6 else '') or 'none'}",
         len(common) > 0,
         note=f"Level 0.05, which the paper does not state, without correction for the number of sets; by Holm's rule "
         f"{holm}; with sweeps to the limit instead of the paper's rule {converged}.",
@@ -209,32 +209,32 @@ def _shared(s: Selection) -> Ours:
     elif not pair:
         why = "No temperature is in all of the common sets."
     elif not worse:
-        why = f"{called(pair)} by itself is as good as the best for all displacements."
+        why = f"{name_set(pair)} by itself is as good as the best for all displacements."
     else:
         p_values = ", ".join(f"{p:.2g}" for p in small.p_values[:, small.subsets.index(pair)])
-        why = f"{called(pair)} by itself is told from the best: p = {p_values} for the displacements in turn."
-    return Ours(called(pair) if pair else "none", worse, note=why)
+        why = f"{name_set(pair)} by itself is told from the best: p = {p_values} for the displacements in turn."
+    return Ours(name_set(pair) if pair else "none", worse, note=why)
 
 
 # -- tables --------------------------------------------------------------------------------------------------------
 
 
-def _tables(s: Selection) -> tuple[Table, ...]:
+def _tables(s: Selection) -> tuple[StudyTable, ...]:
     targets = [f"S{d + 1}" for d in range(len(s.psi.psi))]
     special = {"the paper's": PAPERS_OWN, "chosen": s.chosen}
     listed = [r for k, r in enumerate(s.small.table()) if k < 12 or r.subset in special.values()]
     return (
-        Table(
+        StudyTable(
             "Appendix B: mean Psi of the best set of each size",
             ("temperatures", *targets),
             [[str(k), *(f"{v:.4f}" for v in best)] for k, best in s.by_size.items()],
         ),
-        Table(
+        StudyTable(
             "Appendix B: sets of at most three, first those as good as the best for most displacements",
             ("set", *(f"mean Psi {t}" for t in targets), "smallest p", "as good for", ""),
             [
                 [
-                    called(r.subset),
+                    name_set(r.subset),
                     *(f"{v / len(s.psi.tests):.4f}" for v in r.summed),
                     f"{min(r.p_values):.2g}",
                     " ".join(targets[d] for d in r.equivalent),

@@ -10,7 +10,7 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
 from thermocomp.papers.common import rms
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import BoolArray, Claims, Figure, Ours, Panel, Part, Progress, Table
+from thermocomp.papers.study import BoolArray, Claims, Figure, Ours, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
     MLR_NAME,
@@ -97,7 +97,7 @@ def spindle(seed: int, progress: Progress) -> Part:
     s = Spindle(recordings, found, peaked)
     tables = (
         found.table("Finite-element spindle: the displacement at the tip in the test series"),
-        Table(
+        StudyTable(
             "ACE in the test series with k neighbours",
             ("k", "RMS [um]", "RMS difference from k = 2 [um]"),
             [[str(k), f"{error:.3f}", f"{difference:.3f}"] for k, (error, difference) in s.sweep.items()],

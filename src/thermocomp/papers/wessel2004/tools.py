@@ -11,8 +11,8 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.ace import ACE
 from thermocomp.papers.common import rms
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, Table
-from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, called
+from thermocomp.papers.study import Claims, Figure, Ours, Panel, Part, Progress, StudyTable
+from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
     MLR_NAME,
@@ -91,8 +91,10 @@ def resting_tool(seed: int, progress: Progress, selection: Selection) -> Part:
     progress(0.5, "every set of temperatures on the test")
     r = Resting(paper, own, selection, _by_set(recordings, selection.small.subsets))
     tables = (
-        paper.table(f"Resting tool: {paper.target} in the independent test with the paper's set {called(PAPERS_OWN)}"),
-        own.table(f"The same with our own set {called(selection.chosen)}"),
+        paper.table(
+            f"Resting tool: {paper.target} in the independent test with the paper's set {name_set(PAPERS_OWN)}"
+        ),
+        own.table(f"The same with our own set {name_set(selection.chosen)}"),
         _sets_table(r),
     )
     numbers = own.numbers("tool") | {"tool_best_set_ace_rms_um": min(r.by_set.values())}
@@ -135,7 +137,7 @@ def _better(found: Trial, temperatures: Sequence[int]) -> Ours:
     mlr, ace = found.rms(MLR_NAME), found.rms(ACE_NAME)
     beside = [f"{m} {found.rms(m):.2f} um" for m in found.estimates if m not in (ACE_NAME, MLR_NAME)]
     return Ours(
-        f"MLR {mlr:.2f} um, ACE {ace:.2f} um: {mlr / ace:.2f}x, with {called(temperatures)}",
+        f"MLR {mlr:.2f} um, ACE {ace:.2f} um: {mlr / ace:.2f}x, with {name_set(temperatures)}",
         ace < mlr,
         note=f"{found.reasons()} Without compensation {rms(found.measured):.2f} um; {', '.join(beside)}.",
     )
@@ -204,7 +206,7 @@ def _by_psi(r: Resting) -> Ours:
     rank = float(spearmanr(small.summed[0], [-r.by_set[s] for s in small.subsets]).statistic)
     return Ours(
         f"the chosen set is number {r.order.index(chosen) + 1} of {len(r.order)} by RMS in the test, "
-        f"{r.by_set[chosen]:.2f} um; the best, {called(best)}, has {r.by_set[best]:.2f} um",
+        f"{r.by_set[chosen]:.2f} um; the best, {name_set(best)}, has {r.by_set[best]:.2f} um",
         note="ACE with at most 300 sweeps. Rank correlation of the summed Psi with a small RMS in the test: "
         f"{rank:.2f}.",
     )
@@ -281,17 +283,17 @@ def _by_set(recordings: list[Recording], sets: Sequence[tuple[int, ...]]) -> dic
     return found
 
 
-def _sets_table(r: Resting) -> Table:
+def _sets_table(r: Resting) -> StudyTable:
     small, chosen = r.selection.small, r.selection.chosen
     psi = dict(zip(small.subsets, small.summed[0] / len(r.selection.psi.tests), strict=True))
     names = {PAPERS_OWN: "the paper's", chosen: "chosen by Appendix B"}
     if chosen == PAPERS_OWN:
         names[chosen] = "the paper's, and chosen by Appendix B"
-    return Table(
+    return StudyTable(
         "Resting tool: ACE (at most 300 sweeps) with other sets, by their RMS in the independent test (in hindsight)",
         ("place", "set", "RMS S1 [um]", "mean Psi S1 in the data sets", ""),
         [
-            [str(k), called(s), f"{r.by_set[s]:.2f}", f"{psi[s]:.4f}", names.get(s, "")]
+            [str(k), name_set(s), f"{r.by_set[s]:.2f}", f"{psi[s]:.4f}", names.get(s, "")]
             for k, s in enumerate(r.order, start=1)
             if k <= 5 or k == len(r.order) or s in names
         ],
@@ -316,7 +318,7 @@ def _tool_figures(recordings: list[Recording], r: Resting) -> tuple[Figure, ...]
     return (
         Figure(
             "wessel2004-fig5",
-            f"Fig. 5: the resting tool, training. Temperatures {called(chosen)}.",
+            f"Fig. 5: the resting tool, training. Temperatures {name_set(chosen)}.",
             recorded(recordings[:1], chosen),
         ),
         Figure("wessel2004-fig6", "Fig. 6: the resting tool, independent test.", recorded(recordings[-1:], chosen)),

@@ -14,9 +14,9 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common
-from thermocomp.papers.common import errors_table, every, fitted, predicted, rms
+from thermocomp.papers.common import errors_table, every, fit_and_freeze, predict_deviation, rms
 from thermocomp.papers.pictures import curves
-from thermocomp.papers.study import BoolArray, FloatArray, Panel, Table
+from thermocomp.papers.study import BoolArray, FloatArray, Panel, StudyTable
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 
@@ -110,7 +110,7 @@ class Trial:
         short = {"ace": ACE_NAME, "mlr": MLR_NAME, "ace_monotone": "ace-monotone", "dynamic": "dynamic"}
         return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
-    def table(self, caption: str) -> Table:
+    def table(self, caption: str) -> StudyTable:
         """Lay out the errors of all methods in the unseen test.
 
         Parameters
@@ -219,13 +219,13 @@ def trial(
     learned, unseen = (stacked(r, displacement, temperatures) for r in parts)
     target = learned.targets[0].name
     ace = ACE(max_sweeps=SWEEPS)
-    model = fitted(ace, learned, [target], support=Support(margin=0.0))[target]
+    model = fit_and_freeze(ace, learned, [target], support=Support(margin=0.0))[target]
     estimate, flagged = replay(model, unseen, every(unseen))
-    estimates, fits = {ACE_NAME: estimate}, {ACE_NAME: predicted(model, learned)}
+    estimates, fits = {ACE_NAME: estimate}, {ACE_NAME: predict_deviation(model, learned)}
 
     def also(name: str, estimator: ThermalRegressor, samples: Sequence[Samples], **fit: Any) -> None:
-        found = fitted(estimator, samples[0], [target], **fit)[target]
-        fits[name], estimates[name] = (predicted(found, s) for s in samples)
+        found = fit_and_freeze(estimator, samples[0], [target], **fit)[target]
+        fits[name], estimates[name] = (predict_deviation(found, s) for s in samples)
 
     also(MLR_NAME, LeastSquares(), (learned, unseen))
     if beside:

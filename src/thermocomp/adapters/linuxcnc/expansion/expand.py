@@ -10,10 +10,10 @@ from pathlib import Path
 
 from thermocomp.adapters.linuxcnc.expansion.origins import DEPENDS, G10
 from thermocomp.adapters.linuxcnc.expansion.plain import Writer
-from thermocomp.adapters.linuxcnc.expansion.proof import compare, kept
+from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.adapters.linuxcnc.expansion.words import Side
 from thermocomp.adapters.linuxcnc.rs274 import Canonical, read
-from thermocomp.adapters.linuxcnc.stored import Stored, drawn
+from thermocomp.adapters.linuxcnc.stored import Stored, draw_controller
 from thermocomp.core.exceptions import InputError, ProgramError
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
@@ -74,7 +74,7 @@ class _Around:
 
     def controller(self, seed: int) -> Stored:
         """Return a controller that has nothing else in common with that of another seed."""
-        stored = drawn(seed, self.startup or "")
+        stored = draw_controller(seed, self.startup or "")
         return replace(stored, diameters={**stored.diameters, **self.diameters})
 
 
@@ -151,7 +151,7 @@ def expand(
                     closing(around.run(part, stored, left=left[1])) as done,
                 ):
                     acts = compare(asked, done)
-                kept(*left)
+                compare_parameters(*left)
             except ProgramError as error:
                 raise ProgramError(error.line, f"it cannot be expanded: {error.reason}") from error
         part.rename(out)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 
-from thermocomp.adapters.linuxcnc.expansion.words import Side, Words, number, same
+from thermocomp.adapters.linuxcnc.expansion.words import Side, Words, agree, format_number
 from thermocomp.adapters.linuxcnc.rs274 import AXES, Canonical, Place
 from thermocomp.core.exceptions import ProgramError
 
@@ -37,26 +37,26 @@ def chosen_system(
     changed: set[int] = set()
     turned = False
     for side, call, angle in zip(sides, (a, b), angles or (None, None), strict=True):
-        changed.update(i for i in range(9) if not same(call.values[1 + i], side.origins[index][i]))
+        changed.update(i for i in range(9) if not agree(call.values[1 + i], side.origins[index][i]))
         side.take("g5x", call.values)
         side.origins[index] = call.values[1:]
         if angle is not None:
-            turned = turned or not same(angle, side.rotations[index])
+            turned = turned or not agree(angle, side.rotations[index])
             side.take("rotation", (angle,))
             side.rotations[index] = angle
     first, second = sides
     fixed, here = [], []
     for i in sorted(changed):
-        if same(a.values[1 + i], b.values[1 + i]):
+        if agree(a.values[1 + i], b.values[1 + i]):
             fixed.append(words.axis(i, a.values[1 + i]))
-        elif same(first.program[i], second.program[i]):
+        elif agree(first.program[i], second.program[i]):
             here.append(words.axis(i, first.program[i]))
         else:
             raise refuse(f"the origin of {AXES[i]} {DEPENDS}")
     if turned:
-        if not same(first.frame.rotation, second.frame.rotation):
+        if not agree(first.frame.rotation, second.frame.rotation):
             raise refuse(f"the rotation of the work coordinate system {DEPENDS}")
-        fixed.append(f"R{number(first.frame.rotation)}")
+        fixed.append(f"R{format_number(first.frame.rotation)}")
     result = [("g10", f"G10 {way} P{index} {' '.join(some)}") for way, some in (("L2", fixed), ("L20", here)) if some]
     if index != chosen or not result:
         result.append(("g5x", SYSTEMS[index]))
@@ -107,11 +107,11 @@ def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], 
         return "G92.2" if re.search(r"G0*92\.2", re.sub(r"\s", "", source).upper()) else "G92.1"
     named, fixed = [], []
     for i in range(9):
-        if same(now[0][i], old[0][i]) and same(now[1][i], old[1][i]):
+        if agree(now[0][i], old[0][i]) and agree(now[1][i], old[1][i]):
             continue
-        if same(first.program[i], second.program[i]):
+        if agree(first.program[i], second.program[i]):
             named.append(words.axis(i, first.program[i]))
-        elif same(now[0][i], now[1][i]):
+        elif agree(now[0][i], now[1][i]):
             fixed.append(words.axis(i, now[0][i]))
         else:
             raise refuse(f"the shift of {AXES[i]} by G92 {DEPENDS}")
@@ -128,10 +128,10 @@ def tool_length(sides: Sides, words: Words, refuse: Refuse) -> str:
     if not any(first[:2] + first[3:] + second[:2] + second[3:]):
         one, two = (side.stored for side in sides)
         for tool, length in one.lengths.items():
-            if same(length, first[2]) and same(two.lengths[tool], second[2]):
+            if agree(length, first[2]) and agree(two.lengths[tool], second[2]):
                 return f"G43 H{tool}"
-        if same(one.lengths[one.spindle], first[2]) and same(two.lengths[two.spindle], second[2]):
+        if agree(one.lengths[one.spindle], first[2]) and agree(two.lengths[two.spindle], second[2]):
             return "G43"  # of the tool that was in the spindle at the start, whatever its number
-    if all(same(x, y) for x, y in zip(first, second, strict=True)) and not any(first[3:]):
+    if all(agree(x, y) for x, y in zip(first, second, strict=True)) and not any(first[3:]):
         return f"G43.1 {' '.join(words.axis(i, first[i]) for i in range(3))}"
     raise refuse(f"the tool length in force {DEPENDS}")

@@ -8,7 +8,7 @@ else depends on what is stored in the controller, and is refused.
 from collections.abc import Callable, Iterator
 
 from thermocomp.adapters.linuxcnc.expansion.origins import DEPENDS, G10, chosen_system, plain_g10, shift, tool_length
-from thermocomp.adapters.linuxcnc.expansion.words import STILL, Side, Words, number, same
+from thermocomp.adapters.linuxcnc.expansion.words import STILL, Side, Words, agree, format_number
 from thermocomp.adapters.linuxcnc.rs274 import AXES, PLANE_AXES, Canonical, Stored
 from thermocomp.core.exceptions import ProgramError
 
@@ -157,7 +157,7 @@ class Writer:
     def unshifted(self, a: Canonical, b: Canonical) -> bool:
         """Tell whether G92 stays."""
         old = (*self.sides[0].frame.shift, *self.sides[1].frame.shift)
-        return all(same(x, y) for x, y in zip((*a.values, *b.values), old, strict=True))
+        return all(agree(x, y) for x, y in zip((*a.values, *b.values), old, strict=True))
 
     def single(self, a: Canonical, b: Canonical) -> Iterator[tuple[str, str]]:
         """Yield (kind, text) of a pair of calls."""
@@ -183,9 +183,9 @@ class Writer:
             text = a.text.replace("(", "[").replace(")", "]")
             yield kind, f"(MSG,{text})" if kind == "message" else f"({text})"
         elif kind == "feedrate":
-            self.feed = a.values[1] if same(a.values[1], b.values[1]) else None
-        elif not all(same(x, y) for x, y in zip(a.values, b.values, strict=True)):
-            raise self.refuse(f"{kind} {' '.join(map(number, a.values))} {DEPENDS}", a.file)
+            self.feed = a.values[1] if agree(a.values[1], b.values[1]) else None
+        elif not all(agree(x, y) for x, y in zip(a.values, b.values, strict=True)):
+            raise self.refuse(f"{kind} {' '.join(map(format_number, a.values))} {DEPENDS}", a.file)
         else:
             yield from self.state(a)
 
@@ -201,16 +201,16 @@ class Writer:
             self.written_feed = None
             yield kind, "G95" if values[1] else "G94"
         elif kind == "speed":
-            yield kind, f"S{number(values[1])}"
+            yield kind, f"S{format_number(values[1])}"
         elif kind == "sync":
             self.pitch, self.pieces = values[1], 0
         elif kind == "unsync":
             self.pitch = 0.0
         elif kind == "user":  # -1: no word
-            words = (f" {letter}{number(v)}" for letter, v in zip("PQ", values[1:], strict=True) if v != -1)
-            yield kind, f"M{number(values[0])}{''.join(words)}"
+            words = (f" {letter}{format_number(v)}" for letter, v in zip("PQ", values[1:], strict=True) if v != -1)
+            yield kind, f"M{format_number(values[0])}{''.join(words)}"
         elif kind in PLAIN:
-            yield kind, PLAIN[kind].format(*map(number, values))
+            yield kind, PLAIN[kind].format(*map(format_number, values))
         elif kind not in {"rotation", "naive"}:
             raise self.refuse(f"{kind} is not known", call.file)
 
@@ -227,7 +227,7 @@ class Writer:
         pa, pb = a.program, b.program
         if a.kind == "rapid" and all(self.still(i, pa[i], pb[i]) for i in range(9)):
             return  # G28 goes by way of where it stands
-        known = [same(x, y) for x, y in zip(pa, pb, strict=True)]
+        known = [agree(x, y) for x, y in zip(pa, pb, strict=True)]
         if all(k or self.still(i, pa[i], pb[i]) for i, k in enumerate(known)):
             if a.arc and b.arc:
                 yield from self.arc(a, b, known)
@@ -245,11 +245,11 @@ class Writer:
         """Return G33.1; it comes back to where it began."""
         words = ""
         for i, (first, second) in enumerate(zip(a.values[:3], b.values[:3], strict=True)):
-            if same(first, second):
+            if agree(first, second):
                 words += " " + self.words.axis(i, first)
             elif not self.still(i, first, second):
                 raise self.refuse(f"where it taps {DEPENDS}")
-        scale = "" if a.values[3] == 1 else f" I{number(a.values[3])}"
+        scale = "" if a.values[3] == 1 else f" I{format_number(a.values[3])}"
         self.pieces += 1
         return f"G33.1{words} K{self.words.length(self.pitch)}{scale}"
 
@@ -273,7 +273,7 @@ class Writer:
         ma, mb = a.machine, b.machine
         first, second = self.sides
         moved = [i for i in range(9) if abs(ma[i] - first.machine[i]) > STILL or abs(mb[i] - second.machine[i]) > STILL]
-        if all(same(ma[i], mb[i]) for i in moved) and not self.pitch:
+        if all(agree(ma[i], mb[i]) for i in moved) and not self.pitch:
             words = " ".join(self.words.axis(i, ma[i]) for i in moved)
             yield f"G53 {self.code(a)} {words}{self.feed_word(a)}"
             return
@@ -281,11 +281,11 @@ class Writer:
             ("G28", (first.stored.home28, second.stored.home28)),
             ("G30", (first.stored.home30, second.stored.home30)),
         ):
-            there = [same(ma[i], homes[0][i]) and same(mb[i], homes[1][i]) for i in range(9)]
+            there = [agree(ma[i], homes[0][i]) and agree(mb[i], homes[1][i]) for i in range(9)]
             if a.kind == "rapid" and all(there[i] for i in moved):
                 if all(there):
                     yield code
-                elif all(same(first.program[i], second.program[i]) for i in moved):
+                elif all(agree(first.program[i], second.program[i]) for i in moved):
                     yield f"{code} {' '.join(self.words.axis(i, first.program[i]) for i in moved)}"
                 else:  # by way of here, wherever that is
                     yield f"G91 {code} {' '.join(AXES[i] + '0' for i in moved)}"
@@ -305,7 +305,7 @@ class Writer:
         centre = ""
         for axis, letter in zip((i, j), CENTRES[a.arc.plane], strict=True):
             starts = [side.program[axis] for side in self.sides]
-            if not (known[axis] and same(*starts) and same(a.arc.centre[axis], b.arc.centre[axis])):
+            if not (known[axis] and agree(*starts) and agree(a.arc.centre[axis], b.arc.centre[axis])):
                 raise self.refuse(f"where this arc starts or ends {DEPENDS}")
             # from the start as it is written, so that the roundings do not add up
             centre += f" {letter}{self.words.length(a.arc.centre[axis] - self.words.rounded(starts[0]))}"
@@ -320,7 +320,7 @@ class Writer:
         """Return G5 or G5.1: from the start, points that draw the curve, and the end."""
         order, points = int(a.values[0]), [a.values[k : k + 3] for k in range(1, len(a.values), 3)]
         start = self.sides[0].program[:2], self.sides[1].program[:2]
-        agreed = all(same(x, y) for x, y in zip((*a.values, *start[0]), (*b.values, *start[1]), strict=True))
+        agreed = all(agree(x, y) for x, y in zip((*a.values, *start[0]), (*b.values, *start[1]), strict=True))
         if not agreed:
             raise self.refuse(f"where this curve goes {DEPENDS}")
         if order not in {3, 4} or len(points) != order or any(p[2] != 1 for p in points):
@@ -343,7 +343,7 @@ class Writer:
         if self.feed == self.written_feed:
             return ""
         self.written_feed = self.feed
-        return f" F{number(self.feed)}"
+        return f" F{format_number(self.feed)}"
 
     def path(self, values: tuple[float, ...], naive: float) -> str:
         """Return G61, G61.1 or G64."""
@@ -356,4 +356,6 @@ class Writer:
         limit = call.values[1]
         if limit and speed is None:
             raise self.refuse("G96 without S")
-        return (f"G96 D{number(limit)}" if limit else "G97") + ("" if speed is None else f" S{number(speed)}")
+        return (f"G96 D{format_number(limit)}" if limit else "G97") + (
+            "" if speed is None else f" S{format_number(speed)}"
+        )

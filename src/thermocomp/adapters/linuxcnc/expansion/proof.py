@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import NamedTuple
 
-from thermocomp.adapters.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Canonical, Frame, Place
+from thermocomp.adapters.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Canonical, Place, ProgramFrame
 from thermocomp.core.exceptions import ProgramError
 
 TOLERANCE = 1e-6  #: [mm]
@@ -57,7 +57,7 @@ def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
         They differ: line of the program, and how.
     """
     count, line = 0, 1
-    for first, second in zip_longest(acts(asked), acts(done)):
+    for first, second in zip_longest(trace_acts(asked), trace_acts(done)):
         line = first.line if first else line
         if first is None or second is None or not _equal(first, second):
             words = [act.told() if act else "nothing" for act in (first, second)]
@@ -68,16 +68,16 @@ def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
     return count
 
 
-def kept(asked: dict[int, float], done: dict[int, float]) -> None:
+def compare_parameters(asked: dict[int, float], done: dict[int, float]) -> None:
     """Compare the parameters that two programs leave in the controller; raise `ProgramError` if they differ."""
     for number in KEPT:
         if abs(asked.get(number, 0.0) - done.get(number, 0.0)) > TOLERANCE:
             raise ProgramError(1, f"the plain lines would leave another parameter #{number} in the controller")
 
 
-def acts(calls: Iterator[Canonical]) -> Iterator[Act]:
+def trace_acts(calls: Iterator[Canonical]) -> Iterator[Act]:
     """Yield what the machine does from the first line on, without moves that go nowhere."""
-    frame, here, feed = Frame(), ORIGIN, (0.0, 0.0)
+    frame, here, feed = ProgramFrame(), ORIGIN, (0.0, 0.0)
     states: dict[str, tuple[str, str, tuple[float, ...]]] = {}
     state: tuple[tuple[str, str, tuple[float, ...]], ...] = ()
     for call in calls:
@@ -103,7 +103,7 @@ def acts(calls: Iterator[Canonical]) -> Iterator[Act]:
             yield Act(call.line, kind, call.values, state, call.text)
 
 
-def _way(call: Canonical, frame: Frame, here: Place) -> tuple[Place, tuple[float, ...]]:
+def _way(call: Canonical, frame: ProgramFrame, here: Place) -> tuple[Place, tuple[float, ...]]:
     """Return where a move ends and all that tells its way, in machine coordinates."""
     if call.arc is not None:
         arc = call.arc

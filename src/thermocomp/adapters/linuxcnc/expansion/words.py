@@ -1,17 +1,17 @@
 """Words of a plain program, and the two runs they are drawn from."""
 
-from thermocomp.adapters.linuxcnc.rs274 import AXES, ORIGIN, Canonical, Frame, Place, Stored
+from thermocomp.adapters.linuxcnc.rs274 import AXES, ORIGIN, Canonical, Place, ProgramFrame, Stored
 
 EQUAL = 1e-7  #: [mm] two runs agree
 STILL = 1e-8  #: [mm] an axis does not move
 
 
-def same(first: float, second: float) -> bool:
+def agree(first: float, second: float) -> bool:
     """Tell whether two runs agree."""
     return abs(first - second) < EQUAL
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Write a number without an exponent and without empty decimals."""
     text = f"{value:.8f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
@@ -39,11 +39,11 @@ class Words:
 
     def length(self, value: float) -> str:
         """Write a length [mm]."""
-        return number(self.in_unit(value))
+        return format_number(self.in_unit(value))
 
     def axis(self, axis: int, value: float) -> str:
         """Write the word of an axis, 0 to 8 [mm, deg]."""
-        return AXES[axis] + (number(round(value, 7)) if 3 <= axis < 6 else self.length(value))
+        return AXES[axis] + (format_number(round(value, 7)) if 3 <= axis < 6 else self.length(value))
 
 
 class Side:
@@ -60,7 +60,7 @@ class Side:
 
     def __init__(self, stored: Stored) -> None:
         self.stored = stored
-        self.frame = Frame()
+        self.frame = ProgramFrame()
         self.program = self.machine = ORIGIN
         self.origins: dict[int, tuple[float, ...]] = {i: tuple(stored.origins[i]) for i in stored.origins}
         self.rotations = {i: stored.rotations.get(i, 0.0) for i in stored.origins}

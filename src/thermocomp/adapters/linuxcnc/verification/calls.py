@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.adapters.linuxcnc.rs274 import ORIGIN, PLANE_AXES, Frame
-from thermocomp.adapters.linuxcnc.rs274process import Block, Run
+from thermocomp.adapters.linuxcnc.rs274 import ORIGIN, PLANE_AXES, ProgramFrame
+from thermocomp.adapters.linuxcnc.rs274process import CallBlock, InterpreterRun
 from thermocomp.adapters.linuxcnc.verification.ledger import Floats, Integers
 from thermocomp.core.exceptions import Unprovable
 
@@ -90,11 +90,14 @@ class Side:
     """
 
     def __init__(
-        self, run: Run, original: Callable[[Integers], Integers], drop: Callable[[Integers], "np.ndarray[Any, Any]"]
+        self,
+        run: InterpreterRun,
+        original: Callable[[Integers], Integers],
+        drop: Callable[[Integers], "np.ndarray[Any, Any]"],
     ) -> None:
         self.run, self.original, self.drop = run, original, drop
         self.curves: list[Floats] = []
-        self._frame = Frame()
+        self._frame = ProgramFrame()
         self._here = np.array(ORIGIN)
         self._states = {"feed": np.zeros(2), "feedmode": np.zeros(2), "sync": np.zeros(2), "speed": np.zeros(2)}
 
@@ -123,7 +126,7 @@ class Side:
         """Return the name of a kind."""
         return next(name for name, code in self.run.codes.items() if code == kind)
 
-    def _calls(self, block: Block) -> Calls:
+    def _calls(self, block: CallBlock) -> Calls:
         records = block.records
         kind, raw = records["kind"].astype(int), records["line"].astype(int)
         values = np.ascontiguousarray(records["values"])
@@ -152,7 +155,7 @@ class Side:
 
     # -- where -------------------------------------------------------------------------------------------------------
 
-    def _ends(self, block: Block, kind: Integers, values: Floats) -> tuple[Floats, "np.ndarray[Any, Any]"]:
+    def _ends(self, block: CallBlock, kind: Integers, values: Floats) -> tuple[Floats, "np.ndarray[Any, Any]"]:
         """Return where moves end; the frame changes between some of them."""
         end = np.zeros((len(kind), 9))
         moving = self.is_kind(kind, *STRAIGHT)
@@ -170,7 +173,7 @@ class Side:
                     self._bend(block, i, kind, values, end)
         return end, moving | bent
 
-    def _bend(self, block: Block, i: int, kind: Integers, values: Floats, end: Floats) -> None:
+    def _bend(self, block: CallBlock, i: int, kind: Integers, values: Floats, end: Floats) -> None:
         """Put in what is told by points: a tap, a curve."""
         earlier = np.flatnonzero(self.is_kind(kind[:i], *MOVES))
         here = end[earlier[-1]] if len(earlier) else self._here

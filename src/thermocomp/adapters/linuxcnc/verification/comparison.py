@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from thermocomp.adapters.linuxcnc.rs274 import PLANE_AXES
-from thermocomp.adapters.linuxcnc.rs274process import Run
+from thermocomp.adapters.linuxcnc.rs274process import InterpreterRun
 from thermocomp.adapters.linuxcnc.verification.calls import MOVES, STILL, Calls, Side
 from thermocomp.adapters.linuxcnc.verification.ledger import Floats, Integers, Ledger, Shifts
 from thermocomp.core.exceptions import ProgramError
@@ -46,7 +46,9 @@ class Lines(NamedTuple):
     divided: bool = True  #: a line that has become several may have divided its move
 
 
-def compare(first: Run, second: Run, ledger: Ledger, origin: Lines, progress: Callable[[int], object]) -> Found:
+def compare(
+    first: InterpreterRun, second: InterpreterRun, ledger: Ledger, origin: Lines, progress: Callable[[int], object]
+) -> Found:
     """Run the next job of both programs, side by side, and compare what they do.
 
     Parameters

@@ -5,8 +5,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from thermocomp.adapters.linuxcnc.rs274process import Job
-from thermocomp.adapters.linuxcnc.stored import SYSTEMS, Stored, drawn
+from thermocomp.adapters.linuxcnc.rs274process import InterpreterJob
+from thermocomp.adapters.linuxcnc.stored import SYSTEMS, Stored, draw_controller
 from thermocomp.nc.interpreter import startup
 from thermocomp.nc.interpreter.block import Setup, system_name
 
@@ -34,30 +34,30 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
 )
 
 
-class State(NamedTuple):
+class ControllerState(NamedTuple):
     """A controller before the program starts."""
 
     stored: Stored
     inch: bool
     block_delete: bool
 
-    def job(self, program: Job) -> Job:
+    def job(self, program: InterpreterJob) -> InterpreterJob:
         """Return the run of a program in it."""
         return replace(program, stored=self.stored, inch=self.inch, block_delete=self.block_delete)
 
 
-def stated(setup: Setup) -> Stored:
+def build_stored(setup: Setup) -> Stored:
     """Return what stands at the controller, as far as it is stated; all else is 0."""
     return Stored(
         origins={system: origin for system, origin in setup.offsets.items() if system in SYSTEMS},
         lengths=setup.tools,
         home28=setup.home or (),
         rotations=setup.rotations,
-        startup=startup.whole(setup),
+        startup=startup.complete_codes(setup),
     )
 
 
-def free(setup: Setup) -> tuple[str, ...]:
+def list_unstated(setup: Setup) -> tuple[str, ...]:
     """Return what is not stated, and so is drawn."""
     held = {
         "rotation": all(system in setup.rotations for system in SYSTEMS),
@@ -70,7 +70,7 @@ def free(setup: Setup) -> tuple[str, ...]:
     return tuple(name for name in REMEDIES if not held.get(name, False))
 
 
-def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> State:
+def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> ControllerState:
     """Return a state.
 
     Parameters
@@ -83,9 +83,9 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> State:
         What is drawn in it, see `REMEDIES`; all else is 0, but the machine never starts at a place that the program
         could mean.
     """
-    base = replace(stated(setup), start=drawn(ELSEWHERE).start)
+    base = replace(build_stored(setup), start=draw_controller(ELSEWHERE).start)
     one, two, four = number & 1, number >> 1 & 1, number >> 2 & 1
-    other = drawn(number)
+    other = draw_controller(number)
     changes: dict[str, object] = {}
     if "rotation" in what and two:
         changes["rotations"] = {**other.rotations, **setup.rotations}
@@ -116,10 +116,10 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> State:
         }
     inch = bool(setup.inch) or ("unit" in what and bool(one ^ two))
     skips = setup.skip_optional or ("optional lines" in what and bool(one ^ two ^ four))
-    return State(replace(base, **changes), inch, skips)  # type: ignore[arg-type]
+    return ControllerState(replace(base, **changes), inch, skips)  # type: ignore[arg-type]
 
 
-def held(setup: Setup) -> tuple[str, ...]:
+def describe_setup(setup: Setup) -> tuple[str, ...]:
     """Return what is stated, in words."""
     said = [] if setup.inch is None else ["inch" if setup.inch else "mm"]
     said += [f"{system_name(system)} at {_point(origin)}" for system, origin in sorted(setup.offsets.items())]

@@ -193,7 +193,7 @@ class Translator:
         side = next((code for code in ("G41", "G42") if code in codes), None)
         if side is None:
             return []
-        return [f"{side}.1 D{number(DIAMETER / (25.4 if block.modal.inch else 1.0))}"]
+        return [f"{side}.1 D{format_number(DIAMETER / (25.4 if block.modal.inch else 1.0))}"]
 
     def _lengths(self, block: Block, codes: set[str]) -> list[str]:
         if "G49" in codes:
@@ -220,8 +220,8 @@ class Translator:
         told = []
         state = self._follower.state
         if "F" in block.values or ({"G94", "G95"} & codes and state.feed_word):
-            told.append(f"F{number(state.feed_word)}")
-        told += [f"{letter}{number(block.values[letter])}" for letter in "ST" if letter in block.values]
+            told.append(f"F{format_number(state.feed_word)}")
+        told += [f"{letter}{format_number(block.values[letter])}" for letter in "ST" if letter in block.values]
         self._turning = state.turning
         return told
 
@@ -239,7 +239,7 @@ class Translator:
             self._local = (x, y, z)
         if once == "G53":  # always a rapid
             return f"G0 G53 {words}" if block.moves else ""
-        return {"G4": f"G4 P{number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
+        return {"G4": f"G4 P{format_number(block.pause)}", "G92.1": once}.get(once, f"{once} {words}")
 
     def _move(self, block: Block, codes: set[str]) -> tuple[list[str], str, list[str]]:
         """Return lines before, words on the line, and lines after it. Each move says its own motion code."""
@@ -279,8 +279,8 @@ class Translator:
             x += a * math.cos(angle) + b * math.sin(angle) - a
             y += b * math.cos(angle) - a * math.sin(angle) - b
         # under a G52 LinuxCNC loses its place where a rotation changes
-        turn = f"G10 L2 P0 R{number(math.degrees(angle))}"
-        return ["G52 X0 Y0", turn, f"G52 X{number(x / scale)} Y{number(y / scale)}"]
+        turn = f"G10 L2 P0 R{format_number(math.degrees(angle))}"
+        return ["G52 X0 Y0", turn, f"G52 X{format_number(x / scale)} Y{format_number(y / scale)}"]
 
     # -- cycles ------------------------------------------------------------------------------------------------------
 
@@ -307,7 +307,7 @@ class Translator:
         level, plane = state.level or 0.0, block.sticky["R"] * scale
         if modal.absolute and modal.retract == 98 and abs(block.start[across] - plane) < 1e-3 < level - plane:
             # from R a Fanuc goes to the next hole at R; LinuxCNC goes up before, or does not, as numbers are rounded
-            up = f"G0 {letter}{number(level / scale)}"
+            up = f"G0 {letter}{format_number(level / scale)}"
             return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
 
@@ -326,14 +326,14 @@ class Translator:
         return [names[wanted]], [names[turning]]
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Return a number as LinuxCNC reads it."""
     text = f"{value:.9f}".rstrip("0").rstrip(".")
     return "0" if text.strip("-0.") == "" else text
 
 
 def _words(values: dict[str, float], letters: str) -> str:
-    return " ".join(f"{letter}{number(values[letter])}" for letter in letters if letter in values)
+    return " ".join(f"{letter}{format_number(values[letter])}" for letter in letters if letter in values)
 
 
 def _cannot(block: Block, why: str) -> UntranslatableError:

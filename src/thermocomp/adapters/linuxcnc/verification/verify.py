@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from thermocomp.adapters.linuxcnc import rs274
-from thermocomp.adapters.linuxcnc.rs274process import Job, Run
+from thermocomp.adapters.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 from thermocomp.adapters.linuxcnc.verification import states
 from thermocomp.adapters.linuxcnc.verification.comparison import Found, Lines, RefusedError, compare
 from thermocomp.adapters.linuxcnc.verification.ledger import Integers, Ledger, Shift
@@ -60,8 +60,8 @@ class _Proving(NamedTuple):
         """Compare them in states, one after the other."""
         jobs = [states.state(self.setup, number, drawn) for number, drawn in wanted]
         with (
-            Run(*[state.job(Job(self.original)) for state in jobs]) as first,
-            Run(*[state.job(Job(self.revised)) for state in jobs]) as second,
+            InterpreterRun(*[state.job(InterpreterJob(self.original)) for state in jobs]) as first,
+            InterpreterRun(*[state.job(InterpreterJob(self.revised)) for state in jobs]) as second,
         ):
             for number, _ in wanted:
 
@@ -126,7 +126,7 @@ def prove(
     Unprovable
         The interpreter refuses the original, or it is not installed; what a Fanuc does LinuxCNC does otherwise.
     """
-    if (reason := rs274.installed()) is not None:
+    if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
     if setup.controller == "linuxcnc":
         return _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
@@ -179,7 +179,7 @@ class _Translated(NamedTuple):
 def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
     """Run both programs in all states."""
     setup = proving.setup
-    drawn = set(states.free(setup))
+    drawn = set(states.list_unstated(setup))
     found: list[Found] = []
     wanted = [(number, set(drawn)) for number in range(states.STATES)]
     while len(found) < len(wanted):
@@ -203,7 +203,7 @@ def _prove(proving: _Proving, progress: Callable[[int], object]) -> Proof:
         max(f.largest for f in found),
         len(found),
         max(f.slower for f in found),
-        states.held(setup),
+        states.describe_setup(setup),
         tuple(words),
     )
 
@@ -227,9 +227,11 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
 def _spared(proving: _Proving, number: int, drawn: set[str], error: RefusedError) -> str:
     """Return what a state has to be without so that the original runs in it."""
     line, reason = error.args
-    neutral = Job(proving.original, states.stated(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional)
+    neutral = InterpreterJob(
+        proving.original, states.build_stored(proving.setup), bool(proving.setup.inch), proving.setup.skip_optional
+    )
     try:
-        with Run(neutral) as run:
+        with InterpreterRun(neutral) as run:
             for _ in run.blocks():
                 pass
     except ProgramError as e:
