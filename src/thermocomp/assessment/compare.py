@@ -272,9 +272,44 @@ def judge(
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
+    return Assessment(
+        model=name,
+        target=model.target,
+        block=split.block,
+        measured=measured,
+        predicted=predicted,
+        row=samples.row[rows],
+        test=samples.test[rows],
+        cycle=samples.cycle[rows],
+        verdict=_verdict(model, samples, split, learned, rules, rows, measured, (predicted, ran.deviation)),
+        sensors=model.sensors,
+        n_sensors=(len(model.sensors), len(model.sensors)),
+        fit_s=fit_s,
+        n_effective=effective_sample_size(measured - predicted),
+        robustness=stressed.robustness if stressed else None,
+        frozen=model,
+        alone=ran.deviation,
+        limits=None if limits is None else ran.limits,
+        rejected=0 if limits is None else int(ran.rejected.sum()),
+        turned_away="" if limits is None else ran.why,
+    )
+
+
+def _verdict(
+    model: ErrorModel,
+    samples: Samples,
+    split: Split,
+    learned: Learned | None,
+    rules: Rules,
+    rows: BoolArray,
+    measured: FloatArray,
+    both: tuple[FloatArray, FloatArray],
+) -> do_no_harm.Verdict:
+    """Return the verdict on `rows`, by the worse of what would run and the model alone, in each part that is judged."""
+    target = [c.name for c in samples.targets].index(model.target)
     segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
     against = learned or samples.learned(target, rows)
-    verdict = do_no_harm.Verdict(
+    return do_no_harm.Verdict(
         units=tuple(
             _worse(
                 do_no_harm.measure(
@@ -286,7 +321,7 @@ def judge(
                     margin=rules.margin,
                     stretch=split.stretch,
                 )
-                for run_or_alone in (predicted, ran.deviation)
+                for run_or_alone in both
             )
             for unit, mine in segments
             if mine.sum() >= do_no_harm.MIN_ROWS
@@ -295,27 +330,6 @@ def judge(
         caps=_caps(split, learned, samples, target),
         refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
         stated=rules.margin,
-    )
-    return Assessment(
-        model=name,
-        target=model.target,
-        block=split.block,
-        measured=measured,
-        predicted=predicted,
-        row=samples.row[rows],
-        test=samples.test[rows],
-        cycle=samples.cycle[rows],
-        verdict=verdict,
-        sensors=model.sensors,
-        n_sensors=(len(model.sensors), len(model.sensors)),
-        fit_s=fit_s,
-        n_effective=effective_sample_size(measured - predicted),
-        robustness=stressed.robustness if stressed else None,
-        frozen=model,
-        alone=ran.deviation,
-        limits=None if limits is None else ran.limits,
-        rejected=0 if limits is None else int(ran.rejected.sum()),
-        turned_away="" if limits is None else ran.why,
     )
 
 

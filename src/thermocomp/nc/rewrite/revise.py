@@ -195,12 +195,9 @@ class Revision:
             known.refuse_unknown(block, self.setup, by_position=self.drift.by_position)
             cutting = self._cuts(block)
             speed = steered.speed(block)
-            if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
-                self.standing = line.number
+            self._note_block(block, start, speed, cutting)
             samples = self._advance(block, end - self.seconds, speed, point, cutting)
             self.seconds = end
-            if block.tool_change is not None:
-                self.tool_changes.append(start)
             if block.moves:
                 point = block.moves[-1].end
             deviation = self.drift.deviation(point)
@@ -239,8 +236,7 @@ class Revision:
             )
         if not headed:
             raise ProgramError(max(self.lines, 1), "there is nothing in this program")
-        if not ended and any(carried):
-            self._refuse_open()
+        self._refuse_open(ended, carried)
 
     def _cut(self, block: Block, samples: list[Sample], knots: list[tuple[float, Vector]], demand: Vector) -> Cut:
         """Return how far the tool is off in a cut, and note what has held the correction."""
@@ -344,6 +340,12 @@ class Revision:
                 samples.append(Sample(k / count, self.drift.deviation(place), demand))
         return samples
 
+    def _note_block(self, block: Block, start: float, speed: float, cutting: bool) -> None:
+        if block.tool_change is not None:
+            self.tool_changes.append(start)
+        if not (speed or self.standing) and cutting and block.kind in ("line", "arc", "curve") and block.moves:
+            self.standing = block.line.number
+
     def _note_held(self, block: Block, demand: Vector, drift: Vector, ends: tuple[Vector, Vector], cut: Cut) -> None:
         """Note what keeps the correction from following in a cut that began at a drift."""
         tolerance = self.demand.tolerance
@@ -362,9 +364,9 @@ class Revision:
         if gap > self.held.get(self._why, (0.0, 0))[0]:
             self.held[self._why] = gap, block.line.number
 
-    def _refuse_open(self) -> None:
+    def _refuse_open(self, ended: bool, carried: Vector) -> None:
         """Raise `ProgramError` if an offset would stay in force behind the last line."""
-        if self.method.leaves_offset:
+        if not ended and any(carried) and self.method.leaves_offset:
             raise ProgramError(
                 self.lines, "the program has no end (M2, M30 or %) at which the offset could be taken back"
             )
