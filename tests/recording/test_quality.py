@@ -288,7 +288,20 @@ def test_one_cycle_is_told_with_its_reason() -> None:
     assert [(f.severity, f.kind) for f in check(plain)] == [("info", "no cycle")]
     assert "no spindle speed" in check(plain)[0].text
     assert check(turning) == ()
-    assert "never starts anew" in check(turning.with_cycles(make_single_cycle(N)))[0].text
+    once = np.where(TIME < 7500, 3000.0, 0.0)
+    still = replace(turning, table=turning.table.assign(n=once)).with_cycles(make_single_cycle(N))
+    assert "does not start anew" in check(still)[0].text
+    assert "starts has a stop and a run of 300 s" in check(turning.with_cycles(make_single_cycle(N)))[0].text
+
+
+def test_a_drift_of_millimetres_is_another_unit() -> None:
+    plain = _recording(t1=_warm_up())
+    for factor, told in ((100.0, False), (1e5, True)):
+        table = plain.table.assign(z_um=factor * np.linspace(0.0, 0.74, N) ** 2)
+        recording = replace(plain, table=table, channels=(*plain.channels, Channel("z_um", "displacement", "um")))
+        found = [f for f in check(recording) if f.kind == "unit"]
+        assert ([f.severity for f in found] == ["trouble"]) is told
+        assert all("more than any machine drifts" in f.text for f in found)
 
 
 def test_the_gravest_comes_first() -> None:

@@ -235,10 +235,12 @@ class Verdict:
         if any("not alike" in cap for cap in self.caps):
             return "record cycles at other speeds or on other days"
         if self.caps:
-            return "judge it by leave-one-cycle-out or leave-one-file-out, on recordings without trouble"
+            by_stretch = any("one stretch" in cap for cap in self.caps)
+            way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without that"
+            return f"judge it {way}"
         n = len(self.units)
         if n < MIN_UNITS:
-            return f"record {MIN_UNITS - n} more thermal cycles, at other speeds or on other days"
+            return f"record {_count(MIN_UNITS - n, 'more thermal cycle')}, at other speeds or on other days"
         if self._moving < MIN_UNITS - 1:
             return "record cycles with a warm-up or a change of speed"
         more = self._units_for(LEVEL if self.p is None else LEVEL / max(self.tried, 1))

@@ -243,8 +243,8 @@ def assess(
         )
         samples = drop_unsound(samples, recordings)
         told = tuple(zip(samples.test_names, samples.starts, strict=True))
-        covered = covered or coverage.find_validity(samples, units(samples), recordings)
-        overall = _assess(model, _called_as_in(model, samples), rules, limits)
+        overall, judged = _assess(model, _called_as_in(model, samples), rules, limits)
+        covered = covered or coverage.find_validity(samples, judged, recordings)
         cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
     return Judged(tuple(models), tuple(found), seen, covered, told)
@@ -265,8 +265,15 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
     return model.provenance.data_sha256 if model.provenance else ()
 
 
-def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -> Assessment:
-    """Judge a model on what it has not learned from; on everything if there is nothing else, and say so."""
+def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -> tuple[Assessment, Judging]:
+    """Judge a model on what it has not learned from; on everything if there is nothing else, and say so.
+
+    Returns
+    -------
+    Assessment
+    Judging
+        Its units.
+    """
     known = find_learned_rows(model, samples)
     judged = np.isfinite(samples.deviations[:, 0])
     n, of = int((known & judged).sum()), int(judged.sum())
@@ -282,8 +289,9 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     name = model.provenance.method if model.provenance else model.family
     found = judge(name, model, samples, split, rules=rules, limits=limits)
-    caps = (*found.verdict.caps, *cap_alike_units(samples, units(samples, ~known)))
-    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n)
+    judging = units(samples, ~known)
+    caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
+    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging
 
 
 def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:

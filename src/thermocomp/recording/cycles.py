@@ -12,6 +12,10 @@ from thermocomp.core.exceptions import RecordingError
 FloatArray = NDArray[np.float64]
 
 
+#: shorter runs and stops of the spindle do not split a test [s]
+SPLITS = 300.0
+
+
 @dataclass(frozen=True)
 class Cycle:
     """Rows ``start`` to ``stop - 1`` of a recording.
@@ -33,7 +37,7 @@ class Cycle:
 
 
 def find_cycles(
-    time: FloatArray, speed: FloatArray, *, min_run: float = 300.0, min_stop: float = 300.0
+    time: FloatArray, speed: FloatArray, *, min_run: float = SPLITS, min_stop: float = SPLITS
 ) -> tuple[Cycle, ...]:
     """Split a test into thermal cycles by its spindle speed.
 
@@ -52,7 +56,7 @@ def find_cycles(
     Returns
     -------
     tuple of Cycle
-        One cycle that covers everything if the spindle never starts anew.
+        One cycle that covers everything if the spindle does not start anew.
     """
     known = np.isfinite(speed)
     if not known.any():

@@ -7,6 +7,7 @@ import numpy as np
 from thermocomp.core.machine import Channel
 from thermocomp.recording import suspects
 from thermocomp.recording.clocks import clocks
+from thermocomp.recording.cycles import SPLITS
 from thermocomp.recording.findings import (
     SEVERITIES,
     BoolArray,
@@ -218,7 +219,16 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
 def _no_cycle(recording: Recording) -> Iterator[Finding]:
     if len(recording.cycles) > 1:
         return
-    why = "the spindle never starts anew" if recording.speed else "there is no spindle speed and no column 'cycle'"
+    why = "there is no spindle speed and no column 'cycle'"
+    if recording.speed is not None:
+        speed = np.abs(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)))
+        runs = int(np.count_nonzero(np.diff(speed > 0.02 * speed.max(initial=0.0), prepend=False)) + 1) // 2
+        why = "the spindle does not start anew"
+        if runs > 1:
+            why = (
+                f"none of the spindle's {runs} starts has a stop and a run of {SPLITS:.0f} s about it (are the times "
+                "minutes or hours? Then say so in a mapping: [time] unit)"
+            )
     text = (
         f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"
     )

@@ -329,7 +329,10 @@ def _chosen_channels(
         raise InputError("no target given: name at least one displacement channel")
     for c in target_channels:
         if c.quantity not in ("displacement", "angle"):
-            raise InputError(f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle")
+            raise InputError(
+                f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle; "
+                f"head it drift_{c.unit} or name it in a mapping if it is one"
+            )
     if inputs is None:
         speed = first.speed
         input_channels = first.temperatures + ((speed,) if speed is not None else ())

@@ -9,6 +9,10 @@ from thermocomp.recording.findings import Finding, FloatArray, Signal
 _ABSOLUTE = 273.15
 
 
+#: a displacement beyond that in a whole test is no drift [um]
+FAR = 5000.0
+
+
 def temperature_units(signals: Sequence[Signal]) -> Iterator[Finding]:
     """Yield temperatures that are Kelvin or degrees Fahrenheit, though the heading says degC.
 
@@ -66,7 +70,9 @@ def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: flo
 
 
 def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield displacements whose numbers must be mm, though the heading says um.
+    """Yield displacements whose numbers must be mm, though the heading says um, or um that are called mm.
+
+    No machine drifts by `FAR`.
 
     A probe whose values lie within 0.3 um in the whole test, noise and all, is quieter than any: 0.3 mm is more than
     machines drift. And where the probe that moves most makes less than 0.05 um per degC of the sensor that moves
@@ -84,6 +90,12 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
     largest = max(spans.values(), default=0.0)
     all_of_them = np.isfinite(warming) and warming >= 1 and largest < 0.05 * warming
     for name, width in moving.items():
+        if width > FAR:
+            text = (
+                f"moves by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are these um, or nm? "
+                'Then say so in a mapping: unit = "um"'
+            )
+            yield Finding("trouble", name, "unit", text)
         if width >= 0.3 and not all_of_them:
             continue
         against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
