@@ -24,6 +24,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Reading
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
+from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.recording.quality import check
 from thermocomp.recording.samples import stack
 from thermocomp.runtime.compensator import Compensator
@@ -98,15 +99,14 @@ print(judging.name)
 print(f"{'':10} {'MAE':>6} {'RMS':>6} {'max':>6}  sensors")
 for a in comparison.overall():
     mae, rms, largest = (a.metric(m) for m in ("mae", "rms", "max_abs"))
-    verdict = "accepted" if a.accepted else "refused"
-    print(f"{a.model:10} {mae:6.2f} {rms:6.2f} {largest:6.2f} {len(a.sensors):8}  {verdict}")
+    print(f"{a.model:10} {mae:6.2f} {rms:6.2f} {largest:6.2f} {len(a.sensors):8}  {a.word}")
 mae, rms, largest = (a.none_metric(m) for m in ("mae", "rms", "max_abs"))
 print(f"{'none':10} {mae:6.2f} {rms:6.2f} {largest:6.2f}")
 
 # %%
 # What is left of the drift, in um: mean of its absolute value (MAE), root of its mean square (RMS), and its largest
-# value. *None* is the machine without compensation. A method is accepted only if it is surely better than none in
-# every single cycle, not on average.
+# value. *None* is the machine without compensation. A method is accepted if it is shown to be better than that and than
+# constants over the cycles, and does harm in none of them.
 
 best = comparison.best("z_um")
 print(f"{best.model}: RMS {best.metric('reduction'):.0f} % less than without compensation")
@@ -143,12 +143,24 @@ plt.show()
 # -----------------
 #
 # The winner is fitted to all six cycles and frozen into plain numbers. The model keeps its error on unseen cycles,
-# not the flattering one of the fit.
+# not the flattering one of the fit. Before it is written, noise and lost sensors are tried on it.
 
 model = study.fit(samples, best.model, judging).models[0]
 honest = model.honest_error
 print(f"{model.family}, {len(model.sensors)} sensors")
 print(f"honest error: {honest.rms:.2f} um RMS, {honest.verdict}")
+print(honest.reason.replace("; ", ";\n"))
+
+# %%
+# Fitted to everything it leans on single sensors: one that is lost without a notice would cost more than the drift. So
+# it is unproven, and may run in shadow only. A stronger ridge leans less on each of them. It leaves a little more of
+# the unseen cycles, and it may run.
+
+steady = DynamicRidge(strengths=(1e-3, 1e-2, 0.1, 1.0))
+model = study.fit(samples, steady, judging).models[0]
+honest = model.honest_error
+print(f"honest error: {honest.rms:.2f} um RMS, {honest.verdict}")
+assert honest.verdict == "accepted"
 
 # %%
 # 5. The model file

@@ -22,7 +22,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD
 
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 
 #: no paper's model stops at the edge of its trained range: so far beyond it that no reading gets there
 PAPERS_SUPPORT = Support(margin=1e3)
@@ -317,7 +317,7 @@ def described(residual: FloatArray, deviation: FloatArray) -> float:
     return float(1 - np.sum(residual**2) / np.sum((deviation - deviation.mean()) ** 2))
 
 
-def table(caption: str, items: Iterable[Item], columns: Mapping[str, Callable[[Item], str]]) -> StudyTable:
+def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[_Item], str]]) -> StudyTable:
     """Lay items out, a row each.
 
     Parameters

@@ -64,7 +64,7 @@ class Claim:
 
 
 #: what a study found, and its claims are judged by
-Found = TypeVar("Found")
+_Found = TypeVar("_Found")
 
 
 class Ours(NamedTuple):
@@ -88,15 +88,15 @@ class Ours(NamedTuple):
     note: str = ""
 
 
-class Claims(Generic[Found]):
+class Claims(Generic[_Found]):
     """The claims of a study, in the order in which they are told: each with the function that makes our side of it."""
 
     def __init__(self) -> None:
-        self._judges: list[Callable[[Found], Sequence[Claim]]] = []
+        self._judges: list[Callable[[_Found], Sequence[Claim]]] = []
 
     def add(
         self, ids: str, text: str, paper: str = ""
-    ) -> Callable[[Callable[[Found], Ours | str]], Callable[[Found], Claim]]:
+    ) -> Callable[[Callable[[_Found], Ours | str]], Callable[[_Found], Claim]]:
         """Add a claim, judged by the function that is decorated.
 
         Parameters
@@ -110,8 +110,8 @@ class Claims(Generic[Found]):
             Takes a function of what was found; it returns our side, or its text alone where nothing could be false.
         """
 
-        def register(ours: Callable[[Found], Ours | str]) -> Callable[[Found], Claim]:
-            def judge(found: Found) -> Claim:
+        def register(ours: Callable[[_Found], Ours | str]) -> Callable[[_Found], Claim]:
+            def judge(found: _Found) -> Claim:
                 told = ours(found)
                 mine = Ours(told) if isinstance(told, str) else told
                 holds = None if mine.holds is None else bool(mine.holds)
@@ -123,11 +123,11 @@ class Claims(Generic[Found]):
 
         return register
 
-    def include(self, others: "Claims[Any]", part: Callable[[Found], Any]) -> None:
+    def include(self, others: "Claims[Any]", part: Callable[[_Found], Any]) -> None:
         """Go on with all claims about a part of what was found."""
         self._judges.append(lambda found: others(part(found)))
 
-    def __call__(self, found: Found) -> tuple[Claim, ...]:
+    def __call__(self, found: _Found) -> tuple[Claim, ...]:
         """Return all claims, judged by what was found."""
         return tuple(claim for judge in self._judges for claim in judge(found))
 
