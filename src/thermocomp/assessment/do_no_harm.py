@@ -107,7 +107,7 @@ class Verdict:
 
     Parameters
     ----------
-    units : tuple of Unit
+    units : tuple of JudgedUnit
     unit : str
         Of the deviations.
     caps : tuple of str
@@ -295,7 +295,7 @@ def measure(
 
     Returns
     -------
-    Unit
+    JudgedUnit
     """
     residual = measured - predicted
     allowed = margin_of(learned, unit) if margin is None else margin

@@ -144,7 +144,7 @@ def name_cycles(samples: Samples, block: IntArray) -> str:
 
 
 def leave_one_cycle_out(samples: Samples) -> Judging:
-    """Judge on each thermal cycle in turn, learn from all others; see `stretches`.
+    """Judge on each thermal cycle in turn, learn from all others; see `join_short_cycles`.
 
     Raises
     ------

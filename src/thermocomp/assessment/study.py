@@ -302,7 +302,7 @@ def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
 
 
 def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
-    """Return the thermal cycles of recordings, or of some of their rows, as units; see `stretches`."""
+    """Return the thermal cycles of recordings, or of some of their rows, as units; see `join_short_cycles`."""
     none = np.zeros(len(samples), dtype=np.bool_)
     cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
     blocks = join_short_cycles(cycle, samples.test)

@@ -151,7 +151,7 @@ class Volumetric:
     machine : Machine
     recording : Recording or None
         What was replayed; None: the reference state.
-    course : Course
+    course : PointCourse
     moments : tuple of Moment
     missing : int
         Rows of the recording in which an input is missing: the state before is held there, as it would be live.

@@ -39,7 +39,7 @@ def assess(
         TOML file that says what the columns are.
     harm_margin : float
         Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
-    compensator : Compensator
+    compensator : CompensatorOptions
         Its limits: what would run is judged, not the model alone.
     beginning : Beginning
         How the recordings begin.

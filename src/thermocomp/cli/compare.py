@@ -34,7 +34,7 @@ def compare(
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files; each is one test.
-    study : Study
+    study : StudyOptions
         What is predicted from what, and on what it is judged.
     models : list of str
         Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
@@ -42,7 +42,7 @@ def compare(
     primary : str
         Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
         number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.
-    compensator : Compensator
+    compensator : CompensatorOptions
         Its limits: what would run is judged, not the models alone.
     beginning : Beginning
         How the recordings begin.

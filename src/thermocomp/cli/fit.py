@@ -43,7 +43,7 @@ def fit(
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files; each is one test.
-    study : Study
+    study : StudyOptions
         What is predicted from what, and on what it is judged.
     model : str
         A method as in ``thermocomp compare``, all but gp.
@@ -59,7 +59,7 @@ def fit(
     accept_unproven : str
         Who takes an unproven model all the same, and why: "NAME, REASON". It is written into the model file and said
         wherever the model is shown. A refused one is never taken.
-    compensator : Compensator
+    compensator : CompensatorOptions
         Its limits: what would run is judged, not the model alone.
     beginning : Beginning
         How the recordings begin.

@@ -64,7 +64,7 @@ def iso230(
         Temperature of the surroundings; the first whose name says air, ambient or room if not given.
     model : Path
         Model file from thermocomp fit: what it leaves of each displacement is told beside it.
-    compensator : Compensator
+    compensator : CompensatorOptions
         Its limits: what it would leave is told, not what the model alone would.
     beginning : Beginning
         How the recordings begin; it matters to a model.

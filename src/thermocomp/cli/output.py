@@ -176,10 +176,10 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
             console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
-    for line in describe_running(judged.overall()):
-        console.print(escape(line))
         if a.robustness is not None and a.robustness.unlike > 0.1:
             console.print(f"[yellow]but[/] {escape(a.target)}: {describe_unlike(a.robustness)}")
+    for line in describe_running(judged.overall()):
+        console.print(escape(line))
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     known = {name: v for name, v in fitted.items() if v is not None}
     if known:

@@ -33,7 +33,7 @@ def select(
     ----------
     recordings : list of Path
         CSV, XLSX or Parquet files; each is one test.
-    study : Study
+    study : StudyOptions
         What is predicted from what, and on what it is judged.
     method : str
         How to choose. pareto: error on unseen cycles against the number of sensors; subsets: exact best subset of

@@ -42,7 +42,7 @@ class Runs:
     ----------
     stride : int
     rows : str
-        First row of each run, rising, as `packed` has it; counted through all tests.
+        First row of each run, rising, as `pack_marks` has it; counted through all tests.
     moving : str
         1 where target and an input move beyond their noise around the run, else 0.
     marks : dict of str to str

@@ -70,7 +70,7 @@ def record(
     Parameters
     ----------
     experiment : str, Path or Experiment
-        See `find`.
+        See `find_experiment`.
     seed : int
         Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
     sensor_noise : float, optional

@@ -179,7 +179,7 @@ def refuse_cell(
 
     Parameters
     ----------
-    table : Table
+    table : FileTable
     source : str
         The file.
     row, column : int

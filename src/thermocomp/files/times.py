@@ -45,9 +45,9 @@ def read_times(
     ----------
     cells : DataFrame
         With the columns of time and date, named by position.
-    columns : Plan
+    columns : ColumnPlan
     mapping : Mapping
-    table : Table
+    table : FileTable
         That the cells come from.
     source : Path
         The file.

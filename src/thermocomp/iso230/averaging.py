@@ -263,7 +263,7 @@ def average_test(
 
     Returns
     -------
-    Course
+    AveragedCurve
         From `start` on.
     """
     parts = (slice(None, start + 1), slice(start + 1, stop + 1), slice(stop + 1, None))

@@ -85,8 +85,8 @@ def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, Exponentia
 
     Returns
     -------
-    one : Fit or None
-    two : Fit or None
+    one : ExponentialFit or None
+    two : ExponentialFit or None
         None if the second exponential is not called for: BIC does not fall by it, or the two time constants are nearer
         than a factor of two, or an amplitude is below twice its standard error.
     """

@@ -82,7 +82,7 @@ class Settling:
     t63, t90 : float
         When 63.2 % and 90 % of the change were first reached, since the start [s]. Of the change up to the end: if the
         channel has not settled, the true ones are later; nan if it is not clear, returns or overshoots.
-    one, two : Fit or None
+    one, two : ExponentialFit or None
         None if it could not be fitted; `two` also if a second exponential is not called for.
     """
 

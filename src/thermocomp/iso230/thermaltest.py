@@ -130,14 +130,14 @@ class ThermalCurve:
         In words.
     values : ndarray of shape (n_rows,)
         Since the start of the test, row by row; nan where missing.
-    course : Course
+    course : AveragedCurve
         The same averaged: what `figures` tells.
     figures : Figures
     settling : Settling or None
         How fast it follows the start of the drives; None if they never start.
     after : ndarray of shape (n_rows,) or None
         What a model leaves of it; None without a model.
-    after_course : Course or None
+    after_course : AveragedCurve or None
     after_figures : Figures or None
     """
 
@@ -164,9 +164,9 @@ class Targets:
     axis : {'X', 'Y', 'Z'}
     positions : ndarray of shape (n_targets,)
         Rising [mm].
-    curves : tuple of Curve
+    curves : tuple of ThermalCurve
         Error at each target, in their order.
-    length : Curve
+    length : ThermalCurve
         Change of the length between the first and the last target: error at the last minus error at the first [um].
     """
 
@@ -197,9 +197,9 @@ class ThermalTest:
         its last one.
     load : str
         What the spindle or the axis did, in words.
-    curves : tuple of Curve
+    curves : tuple of ThermalCurve
         Of every displacement and angle that is not a target.
-    tilts : tuple of Curve
+    tilts : tuple of ThermalCurve
         From paired probes [urad].
     pairs : tuple of Pair
     targets : tuple of Targets
@@ -264,7 +264,7 @@ def evaluate_averaged_curve(time: FloatArray, course: AveragedCurve, rows: Float
     ----------
     time : ndarray of shape (n_rows,)
         Since the start of the test [s].
-    course : Course
+    course : AveragedCurve
     rows : ndarray of shape (n_rows,)
         The curve before it was averaged; nan where missing.
     stop : int

@@ -41,11 +41,11 @@ class TransformRegressor(StaticRegressor):
     ----------
     psi_ : float
         Maximal correlation ``|corr(theta, sum phi)|``, as reached (W-02).
-    theta_ : Table
+    theta_ : SampledFunction
         theta over y.
-    phi_ : tuple of Table
+    phi_ : tuple of SampledFunction
         phi over each input.
-    sum_phi_ : Table
+    sum_phi_ : SampledFunction
         Sum of phi over theta, row by row of the training data sorted by y: a straight line if the model holds.
     errors_ : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.
@@ -248,7 +248,7 @@ def nearest(table: SampledFunction, k: int) -> Curve:
 
     Parameters
     ----------
-    table : Table
+    table : SampledFunction
         With rising, perhaps equal x.
     k : int
 

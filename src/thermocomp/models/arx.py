@@ -79,7 +79,7 @@ class ARX(ClockedRegressor):
     intercept_ : float
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
-    trials_ : tuple of Trial
+    trials_ : tuple of TriedSetting
         What was judged in free run on cycles left out; empty if nothing was.
     cv_rms_ : float
         Of the choice; nan if nothing was judged.

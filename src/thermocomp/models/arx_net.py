@@ -105,7 +105,7 @@ class NetARX(ClockedRegressor):
     interval_ : float
         [s]
     net_ : Perceptron
-    trials_ : tuple of Trial
+    trials_ : tuple of TriedSetting
         Numbers of hidden nodes that were judged; empty if there was nothing to choose.
     cv_rms_ : float
     chosen_by_ : str

@@ -59,7 +59,7 @@ class Clocked:
     ----------
     interval : float
         [s]
-    runs : list of Run
+    runs : list of TickedRun
     y, dt : ndarray of shape (n_rows,)
     folds : ndarray of int of shape (n_rows,)
         -1 for rows that are not learned from.

@@ -153,7 +153,7 @@ def set_cold_profiles(
     tests : sequence of Profiles
     options : PositionOptions
     learn : ndarray of bool of shape (n_states,), optional
-        The mean is that of the tests of which a state may be learned from; see `learned`.
+        The mean is that of the tests of which a state may be learned from; see `blank_unlearned`.
 
     Raises
     ------

@@ -98,7 +98,7 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
 
     Returns
     -------
-    Fitted
+    FittedMethod
 
     Raises
     ------
@@ -163,7 +163,7 @@ def train(
     Parameters
     ----------
     name, samples, target, learn
-        Of `fitted`.
+        Of `fit_method`.
     support : Support
         For the frozen model.
     prints : bool
@@ -178,7 +178,7 @@ def train(
     Raises
     ------
     FitError
-        See `fitted`.
+        See `fit_method`.
     """
     fit = fit_method(name, samples, target, learn)
     how, estimator, seen, predicted = fit.how, fit.estimator, fit.seen, fit.predicted

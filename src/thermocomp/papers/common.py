@@ -329,7 +329,7 @@ def table(caption: str, items: Iterable[_Item], columns: Mapping[str, Callable[[
 
     Returns
     -------
-    Table
+    StudyTable
     """
     return StudyTable(caption, tuple(columns), [[write(item) for write in columns.values()] for item in items])
 
@@ -347,7 +347,7 @@ def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray], 
 
     Returns
     -------
-    Table
+    StudyTable
     """
     rows = []
     for (what, method), residual in residuals.items():

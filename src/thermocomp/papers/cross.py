@@ -122,7 +122,7 @@ def simulate_task(experiment: CrossExperiment, seed: int) -> Task:
 
     Parameters
     ----------
-    experiment : Experiment
+    experiment : CrossExperiment
     seed : int
 
     Returns
@@ -211,7 +211,7 @@ def run(
         Tests of one measured machine.
     methods : sequence of str
         ``all`` stands for all of `thermocomp.models.methods.METHODS`.
-    experiments : sequence of Experiment
+    experiments : sequence of CrossExperiment
     targets : sequence of str, optional
         Displacements of the measured machine; all of them if not given.
 

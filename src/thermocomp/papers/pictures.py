@@ -30,7 +30,7 @@ def curves(
 
     Returns
     -------
-    list of Curve
+    list of PlotCurve
     """
     styles: dict[str, Style] = dict.fromkeys(dashed, "dashed")
     styles.update(dict.fromkeys(points, "points"))
@@ -48,7 +48,7 @@ def single(
         See `thermocomp.papers.study.Figure`.
     axes : tuple of str
         What stands at x and y.
-    curves : sequence of Curve
+    curves : sequence of PlotCurve
     title : str
         Of the panel.
     columns : int

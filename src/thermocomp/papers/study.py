@@ -159,7 +159,7 @@ class Panel:
     ----------
     title, xlabel, ylabel : str
         With the unit in brackets.
-    curves : sequence of Curve
+    curves : sequence of PlotCurve
     """
 
     title: str
@@ -232,7 +232,7 @@ class Study:
     title : str
         Of the paper, with authors and year.
     claims : tuple of Claim
-    tables : tuple of Table
+    tables : tuple of StudyTable
     figures : tuple of Figure
     numbers : mapping of str to float
         Figures that the gallery page asserts, by a name that says the unit (``mae_ann_x_um``).

@@ -63,7 +63,7 @@ def run(
 
     Returns
     -------
-    Run
+    ModelRun
     """
     stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
     complete = np.asarray(np.isfinite(values).all(axis=1))

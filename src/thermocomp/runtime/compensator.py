@@ -67,7 +67,7 @@ class Compensator:
     ----------
     models : tuple of ErrorModel
         Models of time, stepped one by one, each from a zero of its own.
-    lines : dict of str to Line
+    lines : dict of str to DeviationLine
         By target or axis.
     limits : Limits
 

@@ -103,9 +103,9 @@ class Programme(RecordingSetup):
     Parameters
     ----------
     name : str
-    segments : tuple of Segment
+    segments : tuple of SteadySegment
         Each lasts a whole number of samplings.
-    soak : tuple of Segment
+    soak : tuple of SteadySegment
         What was done before, from a machine that was off for long; the test begins in the state it leads to.
     """
 

@@ -76,7 +76,7 @@ class InterpreterRun:
 
     Parameters
     ----------
-    *jobs : Job
+    *jobs : InterpreterJob
         All of the same program.
 
     Attributes

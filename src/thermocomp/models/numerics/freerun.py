@@ -99,7 +99,7 @@ def output_error(
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of TickedRun
     targets : sequence of ndarray of shape (n_ticks + 1,)
         Displacement at each tick of each run; nan where not known.
     k, m : int

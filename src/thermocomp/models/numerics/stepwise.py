@@ -232,7 +232,7 @@ def stepwise(
 
     Returns
     -------
-    Selection
+    StepwiseSelection
     """
     work = _Tableau(triangle, tolerance)
     steps: list[Step] = []

@@ -84,7 +84,7 @@ def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[Ti
 
     Returns
     -------
-    list of Run
+    list of TickedRun
     """
     starts = np.flatnonzero(np.isinf(dt))
     if not starts.size or starts[0] != 0:
@@ -124,7 +124,7 @@ def displacements(
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of TickedRun
     y, dt : ndarray of shape (n_rows,)
     known : ndarray of bool of shape (n_rows,)
         Rows whose displacement may be used.
@@ -163,7 +163,7 @@ def interpolate_at_rows(
 
     Parameters
     ----------
-    run : Run
+    run : TickedRun
     ticked : ndarray of shape (n_ticks + 1,)
     ahead : callable
         Gives the tick after some ticks, if the inputs went on as given: ``ahead(ticks, inputs)``.

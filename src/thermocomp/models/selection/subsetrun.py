@@ -97,7 +97,7 @@ def run(
 
     Returns
     -------
-    Result
+    SearchResult
     """
     p = problem.triangle.shape[1] - 1
     limit = np.full(p + 1, -np.inf)

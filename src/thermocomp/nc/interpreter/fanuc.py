@@ -42,8 +42,8 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
 
     Parameters
     ----------
-    state : State
-    words : Orders
+    state : InterpreterState
+    words : BlockWords
     code : str
         The motion that the line makes.
 
@@ -122,9 +122,9 @@ def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
 
     Parameters
     ----------
-    state : State
+    state : InterpreterState
         Something has been turned, and X and Y have not been named since.
-    words : Orders
+    words : BlockWords
     code : str
         The motion that the line makes.
 

@@ -73,7 +73,7 @@ class Follower:
         Raises
         ------
         ProgramError
-            See `follow`.
+            See `follow_program`.
         """
         if self._ended:
             return self._idle(line)

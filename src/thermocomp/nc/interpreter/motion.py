@@ -180,6 +180,8 @@ def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
 def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """G5 and G5.1; the move is told as the straight line from start to end."""
     code, values = state.modal.motion, words.values
+    if code not in ("G5", "G5.1"):  # whoever adds a code to the table has to say what it does
+        raise words.error(f"{code} is known, and nothing does it")
     if state.modal.plane != 17 or {"Z", "A", "B", "C"} & values.keys():
         raise words.error(f"{code} is for X and Y in G17 only")
     if state.modal.cutter:
@@ -202,8 +204,8 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
 
     Parameters
     ----------
-    state : State
-    words : Orders
+    state : InterpreterState
+    words : BlockWords
     block : Block
         Gets the moves.
     again : bool

@@ -99,8 +99,10 @@ def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
         still = offsets.set_shift(values)
     elif code == "G92.3":
         still = offsets.restore_shift()
-    else:
+    elif code in ("G92.1", "G92.2"):
         still = offsets.drop_shift(keep=code == "G92.2")
+    else:  # whoever adds a code to the table has to say what it does
+        raise words.error(f"{code} is known, and nothing does it")
     state.renamed(still)
 
 

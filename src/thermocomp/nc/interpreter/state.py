@@ -160,7 +160,7 @@ class InterpreterState:
 
         Parameters
         ----------
-        words : Orders
+        words : BlockWords
         start, end : tuple of float
             Machine coordinates [mm].
         arc : Arc or None
@@ -192,7 +192,7 @@ class InterpreterState:
 
         Parameters
         ----------
-        words : Orders
+        words : BlockWords
         start, end : tuple of float
             Machine coordinates [mm].
         pitch : float

@@ -140,7 +140,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
     Parameters
     ----------
     blocks : iterable of Block
-    kinematics : Kinematics
+    kinematics : MotionLimits
 
     Yields
     ------

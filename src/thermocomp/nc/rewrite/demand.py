@@ -63,7 +63,7 @@ class Demand:
         ----------
         time : float
             [s]
-        drift : Drifting
+        drift : DriftSource
             At that time.
         point : tuple of float
             Machine coordinates [mm].

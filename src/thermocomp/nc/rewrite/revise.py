@@ -66,10 +66,10 @@ class Revision:
     Parameters
     ----------
     setup : Setup
-    kinematics : Kinematics
-    drift : Drifting
+    kinematics : MotionLimits
+    drift : DriftSource
         At its start state.
-    method : Method
+    method : CorrectionMethod
     demand : Demand
     header_lines : int
         Lines of the header.

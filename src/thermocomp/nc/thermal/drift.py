@@ -46,7 +46,7 @@ class Drift:
     stations : sequence of Station
         Per axis one, or several along one axis: between them the deviation is linear, beyond them that of the
         outermost (P-04).
-    start : Start
+    start : ThermalStart
         From `thermocomp.nc.thermal.start`.
     others : mapping of str to Signal, optional
         Inputs that the program does not tell.

@@ -96,7 +96,7 @@ class Wiring:
     Parameters
     ----------
     model : ErrorModel
-    others : mapping of str to Signal
+    others : mapping of str to InputSignal
         Inputs that the program does not tell.
 
     Raises
@@ -140,7 +140,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
 
     Returns
     -------
-    dict of str to Signal
+    dict of str to InputSignal
 
     Raises
     ------

@@ -48,7 +48,7 @@ def begin_cold(stations: Sequence[Station], others: Inputs) -> ThermalStart:
 
     Returns
     -------
-    Start
+    ThermalStart
 
     Raises
     ------
@@ -70,7 +70,7 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
 
     Returns
     -------
-    Start
+    ThermalStart
 
     Raises
     ------
@@ -114,7 +114,7 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
 
     Returns
     -------
-    Start
+    ThermalStart
 
     Raises
     ------

@@ -49,7 +49,7 @@ class Volume:
 
     Parameters
     ----------
-    learned : Learned
+    learned : LearnedVolume
     errors : mapping of str to ndarray of shape (n, 3)
         By what was compensated [um].
     causes : mapping of str to ndarray of shape (n, 3)
@@ -106,7 +106,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
 
     Parameters
     ----------
-    learned : Learned
+    learned : LearnedVolume
     seed : int
         Of weather, noise, points and rows; another one than what was learned from.
 

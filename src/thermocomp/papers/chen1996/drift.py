@@ -64,9 +64,9 @@ class LearnedDrift:
         The same, frozen.
     wide : mapping of str to ErrorModel
         Ours, to tell what the choice of the subgroups does: stepwise regressions on all nine, as the net gets them.
-    nets : sequence of Trained
+    nets : sequence of LearnedNet
         9-20-3, each from another start.
-    others : mapping of str to sequence of Trained
+    others : mapping of str to sequence of LearnedNet
         What the paper tried and rejected (C-26, C-28, C-30).
     """
 
@@ -134,7 +134,7 @@ def learn(seed: int, told: Callable[[float], None]) -> LearnedDrift:
 
     Returns
     -------
-    Learned
+    LearnedDrift
     """
     samples = drift_samples(recordings("chen1996", seed))
     heat = samples.only(TEMPERATURES)

@@ -74,7 +74,7 @@ def beside(what: str, equation: str, ours: Mapping[str, float], paper: Mapping[s
 
     Returns
     -------
-    Table
+    StudyTable
     """
     rows = [[t, *(f"{c[t]:.3f}" if t in c else "" for c in (ours, paper))] for t in {**ours, **paper}]
     return StudyTable(f"{what} here and in {equation}", ("term", "here", equation), rows)
@@ -114,7 +114,7 @@ def figure(number: int, text: str, axes: tuple[str, str], curves: Sequence[PlotC
         Of the caption.
     axes : tuple of str
         What stands at x and y.
-    curves : sequence of Curve
+    curves : sequence of PlotCurve
 
     Returns
     -------

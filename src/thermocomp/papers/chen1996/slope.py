@@ -111,7 +111,7 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
 
     Returns
     -------
-    Positioning
+    LearnedPositioning
     """
     (first,), (second,) = (map(with_differences, recordings("chen1996-slope", s)) for s in (seed, other_seed))
     learned, other = (from_recording(day, "EYY") for day in (first, second))

@@ -37,7 +37,7 @@ class Unseen:
     ----------
     tests : sequence of Samples
         At 1250 1/min, and at random speeds.
-    learned : Learned
+    learned : LearnedDrift
     dynamic : mapping of str to ErrorModel
         Ours, learned from the same 810 rows, the spindle speed included.
     """
@@ -97,7 +97,7 @@ def observe(learned: LearnedDrift, seed: int) -> Unseen:
 
     Parameters
     ----------
-    learned : Learned
+    learned : LearnedDrift
     seed : int
         Another one than that of the five tests, else the weather would be one that was learned from.
 

@@ -57,7 +57,7 @@ def learn(seed: int) -> LearnedVolume:
 
     Returns
     -------
-    Learned
+    LearnedVolume
     """
     tests = virtual.record("volumetric", seed=seed)
     inputs = [c.name for c in tests[0].temperatures] + ["spindle_rpm"]

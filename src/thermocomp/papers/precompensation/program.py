@@ -189,7 +189,7 @@ def revise_program(
         One per position.
     way : str
         One of `WAYS`.
-    start : Start, optional
+    start : ThermalStart, optional
         State of the machine when the program begins; cold without it. The drift counts from there: it is then that the
         work is set up.
 

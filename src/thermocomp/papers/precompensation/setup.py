@@ -97,7 +97,7 @@ class Computed:
         RMS of least squares with k = 1, m = 0, one step ahead, at all positions [um].
     clocks : dict of float to (tuple of int, float, float)
         By the interval [s], at the first position: orders by FPE, free-run RMS with them, and with k = 1, m = 0 [um].
-    cuts : list of Cut
+    cuts : list of CuttingTest
     warm : Warm
     room : float
         How far Z of a machine drifts that stands still for a day, peak to peak [um]: none of it follows from the speed

@@ -53,7 +53,7 @@ class Side:
     ----------
     program, machine : tuple of float
         Where it stands [mm, deg].
-    frame : Frame
+    frame : ProgramFrame
     origins, rotations : dict by work coordinate system
         As they are stored now [mm, deg].
     """

@@ -77,7 +77,7 @@ class Side:
 
     Parameters
     ----------
-    run : Run
+    run : InterpreterRun
     original : callable
         Line of the original for lines of the program that is run.
     drop : callable

@@ -53,7 +53,7 @@ def compare(
 
     Parameters
     ----------
-    first, second : Run
+    first, second : InterpreterRun
         Of the original, and of the revised program.
     ledger : Ledger
         What the lines of the original should be shifted by.
