@@ -158,6 +158,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             "seen_in_training": judged.seen,
             "starts": _starts(judged.starts),
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
+            "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
             "trouble": trouble,
             "validity": asdict(judged.validity) if judged.validity is not None else None,
             "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},

@@ -555,8 +555,8 @@ def check_finite(owner: str, **numbers: Any) -> None:
 def _column(table: Columns, name: str, owner: str) -> NDArray[Any]:
     try:
         return np.asarray(table[name])
-    except (KeyError, ValueError, IndexError) as e:
-        raise InputError(f"{owner}: the table has no column {name!r}") from e
+    except (KeyError, ValueError, IndexError, TypeError) as e:
+        raise InputError(f"{owner}: the table has no column {name!r}; give a DataFrame, or a dict of columns") from e
 
 
 def _numbers(table: Columns, name: str, owner: str) -> FloatArray:
