@@ -252,8 +252,9 @@ def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
     whole = np.flatnonzero(mark > 0)
     ways = np.zeros(number.max(initial=-1) + 1, dtype=np.intp)
     for at in (0, later):  # as the beginning of a run, and as its end
-        pairs = np.unique(np.stack([number[whole + at], mark[whole].astype(np.intp)]), axis=1)
-        ways = np.maximum(ways, np.bincount(pairs[0], minlength=len(ways)))
+        pairs = np.unique((number[whole + at].astype(np.uint64) << np.uint64(32)) | mark[whole])
+        halves_of = (pairs >> np.uint64(32)).astype(np.intp)
+        ways = np.maximum(ways, np.bincount(halves_of, minlength=len(ways)))
     seldom = ways[number] <= WAYS
     order = whole[np.argsort(mark[whole], kind="stable")]
     soon = (np.diff(mark[order]) == 0) & (np.diff(order) < PERIOD * LENGTH * stride)
