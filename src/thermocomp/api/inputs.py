@@ -32,7 +32,7 @@ Starts = Start | Sequence[Start] | None
 
 
 def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None) -> Recording:
-    """Read one test from a file.
+    r"""Read one test from a file.
 
     Parameters
     ----------
@@ -49,6 +49,18 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     ------
     RecordingError, UnitError
         See `thermocomp.files.recordings.read`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import thermocomp as tc
+    >>> lines = ["time [min];Lager [degC];Z [um]", "0;20,0;0,0", "1;20,6;2,1", "2;21,1;3,8"]
+    >>> _ = Path("monday.csv").write_text("\n".join(lines))
+    >>> tc.read("monday.csv").to_frame()
+       time_s  Lager_C  Z_um
+    0     0.0     20.0   0.0
+    1    60.0     20.6   2.1
+    2   120.0     21.1   3.8
     """
     return files.read(path, mappings.read_mapping(mapping) if isinstance(mapping, str | Path) else mapping)
 
@@ -292,6 +304,24 @@ def training_table(
     ------
     InputError
         A channel is missing.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
+    >>> table = tc.training_table(tc.simulate("wessel-milling"), "s1_um")
+    >>> table
+    <TrainingTable: 405 rows, 4 columns, 5 test(s), 31 cycle(s)>
+    >>> scores = cross_val_score(
+    ...     tc.LeastSquares(),
+    ...     table.X,
+    ...     table.y,
+    ...     groups=table.test,
+    ...     cv=LeaveOneGroupOut(),
+    ...     scoring="neg_mean_absolute_error",
+    ... )
+    >>> [f"{-score:.1f} um" for score in scores]  # each day left out
+    ['3.9 um', '9.6 um', '9.1 um', '6.5 um', '6.8 um']
     """
     tests = recordings_of(recordings, mapping)
     samples = prepare(tests, target, inputs, absolute=absolute, judged=False).samples

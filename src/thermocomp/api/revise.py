@@ -53,7 +53,7 @@ def revise(
     date: str | None = None,
     **words: Any,
 ) -> RevisedProgram:
-    """Correct an NC program by the drift it will cause, before it is run.
+    r"""Correct an NC program by the drift it will cause, before it is run.
 
     Parameters
     ----------
@@ -79,6 +79,27 @@ def revise(
     ------
     InputError
         An option, the program or something else cannot be used.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import thermocomp as tc
+    >>> learned, _ = tc.simulate("precompensation")
+    >>> fitted = tc.fit(
+    ...     learned, "z_at_0_um", "dynamic", inputs="spindle_rpm", accept_unproven="M. Weber, trial on machine 7"
+    ... )
+    >>> fitted.save("speed.json").name
+    'speed.json'
+    >>> lines = ["G21 G90 G94 G54", "S4000 M3", "G0 X0 Y0 Z5", "G1 Z-1 F100", "X50", "G0 Z50", "M2"]
+    >>> _ = Path("part.ngc").write_text("\n".join(lines))
+    >>> done = tc.revise("part.ngc", "speed.json", "revised.ngc", axis=["z_at_0_um=Z"], cold=True, unproved=True)
+    >>> done.summary["changed"], f"{done.summary['axes'][0]['left_um']:.1f} um"  # lines changed, drift left
+    (2, '0.1 um')
+    >>> print("\n".join(Path("revised.ngc").read_text().splitlines()[-4:]))
+    G1 Z-1 F100
+    X50 Z-0.9984
+    G0 Z50.0016
+    M2
     """
     models = [model] if isinstance(model, str | Path) else list(model)
     given = {"model": models, **words}

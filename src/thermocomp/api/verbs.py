@@ -50,6 +50,13 @@ def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | N
     ------
     InputError
         There is no such experiment.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> (recording,) = tc.simulate("hwang", seed=1)
+    >>> recording
+    <Recording hwang: 37 rows, 6.0 h, 14 temperatures, 1 displacements, 4 thermal cycle(s)>
     """
     return virtual.record(virtual.find_experiment(experiment), seed=seed, sensor_noise=noise)
 
@@ -123,6 +130,18 @@ def compare(
     ------
     InputError
         A recording, channel or model cannot be used.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> days = tc.simulate("wessel-milling")
+    >>> found = tc.compare(days, "s1_um", ["ols", "mra"], leave_one="file")
+    >>> found.to_frame()[["model", "rms", "none_rms", "verdict"]].round(1)
+      model  rms  none_rms   verdict
+    0   mra  7.3      79.6  unproven
+    1   ols  8.5      79.6  accepted
+    >>> found.best  # the accepted model with the smallest error
+    {'s1_um': 'ols'}
     """
     tests = recordings_of(recordings, mapping)
     ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
@@ -197,6 +216,16 @@ def fit(
     ------
     InputError
         A recording, channel or model cannot be used, or the model cannot be frozen.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> days = tc.simulate("wessel-milling")
+    >>> fitted = tc.fit(days, "s1_um", "ols", leave_one="file")
+    >>> fitted.model.honest_error.word, f"{fitted.model.honest_error.rms:.1f} um"  # on days it had not seen
+    ('accepted', '8.5 um')
+    >>> fitted.save("model.json").name
+    'model.json'
     """
     tests = recordings_of(recordings, mapping)
     ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
@@ -250,6 +279,18 @@ def assess(
     ------
     InputError
         There is no model, or a file or a channel the models need cannot be used.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> *days, new_day = tc.simulate("wessel-milling")
+    >>> fitted = tc.fit(days, "s1_um", "ols", leave_one="file")
+    >>> found = tc.assess(fitted, new_day)
+    >>> found.to_frame()[["model", "block", "rms", "none_rms", "verdict"]].round(1)
+      model       block  rms  none_rms   verdict
+    0   ols  all cycles  9.3      77.5  unproven
+    >>> print(found.to_frame()["reason"][0])
+    judged on 2 units, at least 3 are needed; record 1 more thermal cycle, at other speeds or on other days
     """
     if isinstance(models, str | Path):
         models = modelfile.read(models)
@@ -299,6 +340,16 @@ def select(
     ------
     InputError
         A recording, channel, method or setting cannot be used.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> chosen = tc.select(tc.simulate("hwang"), "z_um", "grouping")
+    >>> chosen.sensors
+    {'z_um': ('t_y_bearing_C', 't_rear_seat_C', 't_column_front_left_C')}
+    >>> chosen
+    <Selected: z_um: t_y_bearing_C, t_rear_seat_C, t_column_front_left_C (smallest residual mean square, 3.869 um^2,
+    among the members of 3 of 4 groups).>
     """
     if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
         raise InputError(f"method {method!r}: want pareto, subsets, grouping, partial-f, stepwise or ace")

@@ -30,6 +30,12 @@ class Deviation:
     ------
     InputError
         A number is not finite.
+
+    Examples
+    --------
+    >>> from thermocomp import Deviation
+    >>> Deviation(offset=12.0, slope=20.0, reference_position=100.0).at(350.0)  # [um]
+    17.0
     """
 
     offset: float
@@ -63,6 +69,12 @@ class Correction:
     ------
     InputError
         A number is not finite: it must never get to a controller.
+
+    Examples
+    --------
+    >>> from thermocomp import Correction, Deviation
+    >>> Correction.opposing(Deviation(12.0, slope=20.0)).at(250.0)  # [um]
+    -17.0
     """
 
     offset: float
@@ -97,6 +109,12 @@ class Limits:
         A new target closer than this to the correction in force changes nothing [um].
     reading_age : float
         A reading older than this is not used [s].
+
+    Examples
+    --------
+    >>> from thermocomp import Limits
+    >>> Limits(magnitude=80.0, rate=0.05).in_words()
+    'at most 80 um, 0.05 um/s, dead band 0 um'
     """
 
     magnitude: float = 500.0

@@ -34,6 +34,25 @@ class LinearDynamic(ErrorModel):
         Of each lag [s].
     lagged : tuple of float
         Read-out of each lag.
+
+    Examples
+    --------
+    >>> from thermocomp import LinearDynamic
+    >>> from thermocomp.core.model import Input
+    >>> speed = Input("spindle_rpm", "speed", "1/min", reference=0.0, rezero=False, low=0.0, high=6000.0)
+    >>> model = LinearDynamic(
+    ...     target="z_um",
+    ...     unit="um",
+    ...     inputs=(speed,),
+    ...     signals=((0,),),
+    ...     direct=(0.0,),
+    ...     lag_signals=(0,),
+    ...     time_constants=(1800.0,),
+    ...     lagged=(0.005,),
+    ... )
+    >>> table = {"time_s": [0.0, 1800.0, 3600.0, 18000.0], "spindle_rpm": [0.0, 6000.0, 6000.0, 6000.0]}
+    >>> model.predict(table).round(1).tolist()  # settles at 30 um
+    [0.0, 19.0, 25.9, 30.0]
     """
 
     family: ClassVar[str] = "linear-dynamic"

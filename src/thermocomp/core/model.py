@@ -246,6 +246,14 @@ class ErrorModel(ABC):
         What of its inputs' space was trained; None: a range per input is all that is known.
     zeroing : Zeroing
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
+
+    Examples
+    --------
+    >>> import thermocomp as tc
+    >>> rises = [[0.0], [5.0], [10.0]]
+    >>> model = tc.freeze(tc.LeastSquares().fit(rises, [0.0, 10.0, 20.0]), target="z_um")
+    >>> model.predict({"x0": [0.0, 4.0]}).round(1).tolist()
+    [0.0, 8.0]
     """
 
     family: ClassVar[str]

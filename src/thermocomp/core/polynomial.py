@@ -27,6 +27,23 @@ class Polynomial(ErrorModel):
         Each the indices of the variables it multiplies.
     coefficients : tuple of float
         One per term.
+
+    Examples
+    --------
+    >>> from thermocomp import Polynomial
+    >>> from thermocomp.core.model import Input
+    >>> from thermocomp.core.terms import Variable
+    >>> front = Input("t_front_C", "temperature", "degC", reference=20.0, rezero=True, low=0.0, high=15.0)
+    >>> model = Polynomial(
+    ...     target="z_um",
+    ...     unit="um",
+    ...     inputs=(front,),
+    ...     variables=(Variable.single("t_front_C", 0),),
+    ...     terms=((0,), (0, 0)),
+    ...     coefficients=(2.0, 0.1),
+    ... )
+    >>> model.predict({"t_front_C": [20.0, 25.0, 30.0]}).round(1).tolist()  # the first row counts as zero [um]
+    [0.0, 12.5, 30.0]
     """
 
     family: ClassVar[str] = "polynomial"

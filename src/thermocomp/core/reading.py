@@ -16,6 +16,13 @@ class Reading:
         Channel name to value in house units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float
         Axis letter to position [mm].
+
+    Examples
+    --------
+    >>> from thermocomp import Reading
+    >>> reading = Reading(60.0, {"t_front_C": 21.5, "spindle_rpm": 6000.0}, {"Z": 250.0})
+    >>> reading.values["t_front_C"]
+    21.5
     """
 
     time: float

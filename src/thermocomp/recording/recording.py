@@ -48,6 +48,17 @@ class Recording:
         Other names a channel answers to: the file's own heading, the name without its unit.
     notes : tuple of str
         What the reader did that a user should know.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from thermocomp import Recording
+    >>> table = pd.DataFrame({"time_s": [0, 60, 120], "t_front_C": [20.0, 20.6, 21.1], "z_um": [0.0, 2.1, 3.8]})
+    >>> recording = Recording.from_dataframe(table, name="monday")
+    >>> recording
+    <Recording monday: 3 rows, 0.0 h, 1 temperatures, 1 displacements, 1 thermal cycle(s)>
+    >>> recording.time.tolist(), recording.table["z_um"].tolist()
+    ([0.0, 60.0, 120.0], [0.0, 2.1, 3.8])
     """
 
     name: str

@@ -57,6 +57,15 @@ class Start:
     ------
     InputError
         The word does not go with the rest.
+
+    Examples
+    --------
+    >>> from thermocomp import Start, simulate
+    >>> (monday,) = simulate("hwang")
+    >>> print(Start("continued", earlier=(monday,), gap=600.0).told("tuesday"))  # starts=... of compare, fit, assess
+    tuesday: continued from hwang (goes on from an earlier file, and counts from the zero of that); stated
+    >>> Start("known", zero={"t_bed_front_C": 20.0}).content("tuesday")["zero_degC"]
+    {'t_bed_front_C': 20.0}
     """
 
     word: Word = "cold"
