@@ -18,6 +18,7 @@ from smallmachine import small_machine
 
 import thermocomp as tc
 from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
+from thermocomp.api.verbs import SelectionMethod
 from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare as own_compare
 from thermocomp.core.exceptions import InputError
@@ -211,9 +212,15 @@ def test_selection(results: dict[str, Result], recording: Recording) -> None:
     found = results["select"]
     assert isinstance(found, Selected)
     assert set(found.sensors["z_um"]) <= {"t1_C", "t2_C", "t3_C"}
-    steps = tc.select(recording, "z_um", "partial-f")
-    with pytest.raises(InputError, match="partial-f has no figure: see its tables"):
-        steps.plot()
+    methods: dict[SelectionMethod, str] = {
+        "partial-f": "1 - R2",
+        "subsets": "RMS left out [um]",
+        "ace": "1 - mean Psi z_um",
+    }
+    for method, shown in methods.items():
+        (axes,) = tc.select(recording, "z_um", method).plot().axes
+        assert axes.get_xlabel() == shown
+        assert len(axes.get_lines()) == len(axes.get_yticklabels()) > 0
     for wrong, message in (
         ({"method": "best"}, "method 'best': want pareto"),
         ({"threshold": 0.5}, "--threshold is for --method grouping"),

@@ -290,7 +290,7 @@ class Selected(Result):
         Raises
         ------
         InputError
-            The method has none: its tables say it all.
+            There is no such target, or nothing was chosen from.
         """
         from thermocomp.report import selections
 
@@ -299,9 +299,7 @@ class Selected(Result):
             raise InputError(f"no choice for {target!r}; there are {', '.join(c.target for c in self.choices)}")
         drawn = selections.draw(mine[0])
         if drawn is None:
-            raise InputError(
-                f"{mine[0].method} has no figure: see its tables, choices[0].tables; pareto and grouping have"
-            )
+            raise InputError(f"{mine[0].method} has nothing to draw: see {mine[0].reason}")
         return drawn[0].figure
 
     def __str__(self) -> str:

@@ -1,19 +1,29 @@
 """Figures of a sensor selection, as SVG text. Each answers one question; the question stands in its docstring."""
 
+from typing import cast
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from thermocomp.assessment.choice import Choice
+from thermocomp.assessment.choice import Choice, Table
 from thermocomp.assessment.pareto import Budget
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.report.figures import COLOURS, NONE, Drawn, drawing, shorten_name, svg
 
+#: what is drawn of the other methods: the first of these that a table has, and the words beside it
+TOLD = {
+    "RMS left out [um]": "Each number of sensors with its best set: what is left of thermal cycles that are left out.",
+    "MSE_p [um^2]": "Each number of sensors with its best set: residual mean square.",
+    "R2": "The steps from top to bottom: share of the error's variance that is not explained after each.",
+    "mean Psi": "Sets of sensors: how far their maximal correlation with the error stays below 1.",
+}
+
 
 def draw(choice: Choice) -> tuple[Drawn, str] | None:
-    """Return the figure of a choice and its caption; None if its tables say it all."""
+    """Return the figure of a choice and its caption; None if there is nothing to draw."""
     found = choice.details
     if isinstance(found, Budget):
         return budget(found), (
@@ -25,7 +35,39 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
             "Left: correlation of every two temperatures, those of a group side by side and framed; names of "
             "representatives are bold. Right: the best subset of each number of representatives."
         )
+    # the sets that Wessel ranks come after the best for each displacement
+    for table in reversed(choice.tables):
+        for word, caption in TOLD.items():
+            shown = [j for j, heading in enumerate(table.columns) if heading.startswith(word)]
+            if shown and table.rows and "displacement" not in table.columns:
+                return rows(table, shown[0], choice.target), f"{caption} Full: what was chosen."
     return None
+
+
+def rows(table: Table, value: int, target: str) -> Drawn:
+    """Show what each row of a table leaves: a number of sensors, a step, or a set, and a dot."""
+    heading = table.columns[value]
+    share = not heading.endswith("]")  # 0.97 and 0.99 differ by a factor in what is left
+    left = [abs(share - cast(float, row[value])) for row in table.rows]
+    names = [j for j in table.words if j < value] or [0]
+    words = [" ".join(str(row[j]) for j in names) for row in table.rows]
+    with drawing("rows" + target):
+        figure = Figure(figsize=(9.6, 1.4 + 0.22 * len(left)), layout="constrained")
+        ax = figure.subplots()
+        for row, x in enumerate(left):
+            chosen = table.marked in (None, row)
+            ax.plot(x, row, "o", color=COLOURS[0], mfc=COLOURS[0] if chosen else "none", ms=7)
+        ax.set_xscale("log")
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter("{x:g}")
+        ax.tick_params(axis="x", which="minor", labelsize=7)
+        ax.set_yticks(range(len(left)), [shorten_name(w, 60) for w in words], fontsize=8)
+        ax.set_ylim(len(left) - 0.4, -0.6)
+        ax.set_xlabel(f"1 - {heading}" if share else heading)
+        ax.set_ylabel("number of sensors" if names == [0] and table.columns[0] == "sensors" else "")
+        title = f"{shorten_name(target)}: {table.title[0].lower()}{table.title[1:]}"
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
+        return svg(figure)
 
 
 def grouping(g: CorrelationGrouping, target: str) -> Drawn:
