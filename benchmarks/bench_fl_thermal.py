@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.files import recordings
+from thermocomp.recording import splits
 from thermocomp.recording.samples import stack
 
 PUBLISHED = {

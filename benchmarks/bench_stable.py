@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 import thermocomp as tc
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.results import Comparison
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples, stack
 
 METHODS = ("ols", "partial-f", "mra", "dynamic")

@@ -18,10 +18,10 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.core.machine import Channel
 from thermocomp.models.methods import METHODS, deployable
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack

@@ -19,7 +19,6 @@ import numpy as np
 
 from thermocomp.assessment import study
 from thermocomp.assessment.compare import compare
-from thermocomp.assessment.splits import leave_one_cycle_out
 from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Reading
 from thermocomp.datasets.virtual import record
@@ -27,6 +26,7 @@ from thermocomp.files import modelfile
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.recording.quality import check
 from thermocomp.recording.samples import stack
+from thermocomp.recording.splits import leave_one_cycle_out
 from thermocomp.runtime.compensator import Compensator
 
 # %%

@@ -19,10 +19,10 @@ from smallmachine import small_machine
 import thermocomp as tc
 from thermocomp.api.results import Assessed, Compared, FittedModels, Result, Selected
 from thermocomp.api.verbs import SelectionMethod
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare as own_compare
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.methods import METHODS
+from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.assessment.compare import ALL, compare, judge, n_pieces
 from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import Robustness, pool_robustness, stress
@@ -21,6 +21,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack

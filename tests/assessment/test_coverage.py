@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import coverage, splits, study
+from thermocomp.assessment import coverage, study
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.validity import Validity
 from thermocomp.files import modelfile
+from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 

@@ -7,13 +7,14 @@ import pandas as pd
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.selecting import select
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from smallmachine import crowded_machine, small_machine
 
-from thermocomp.assessment import pareto, splits
+from thermocomp.assessment import pareto
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.metrics import rms
@@ -16,6 +16,7 @@ from thermocomp.core import lagbank
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.machine import Channel
 from thermocomp.files.recordings import read
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack

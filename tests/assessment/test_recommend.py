@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.recommend import GROUPS, PAIRS, inner_splits
 from thermocomp.assessment.results import Rules
 from thermocomp.core.exceptions import InputError
+from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.starts import COLD

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from smallmachine import crowded_machine
 
-from thermocomp.assessment import selecting, splits
+from thermocomp.assessment import selecting
 from thermocomp.assessment.choice import Choice, Settings, Table, format_cell
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection import subsetsearch
 from thermocomp.models.selection.subsets import best_subsets
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples, stack
 
 METHODS = ("grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")

@@ -14,7 +14,6 @@ from thermocomp.assessment import study
 from thermocomp.assessment.compare import judge
 from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import stress
-from thermocomp.assessment.splits import Split, by_rows, by_time, leave_one_cycle_out
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
@@ -25,6 +24,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle, find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack
+from thermocomp.recording.splits import Split, by_rows, by_time, leave_one_cycle_out
 from thermocomp.recording.starts import Start
 
 TARGET = "z_um"

@@ -2,11 +2,13 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from driftmodels import growing
@@ -23,31 +25,60 @@ PAGE = Path(__file__).parents[2] / "docs" / "house.rst"
 PACKAGE = Path(thermocomp.__file__).parent
 
 
-def told(title: str) -> list[tuple[str, str]]:
-    """Return file and function of each call of a way, as the page lists them."""
+class Call(NamedTuple):
+    """A call on the page, and the one of the page inside which it happens."""
+
+    file: str
+    function: str
+    inside: tuple[str, str] | None
+
+    @property
+    def room(self) -> str:
+        return self.file.partition("/")[0]
+
+
+def told(title: str) -> list[Call]:
+    """Return the calls of a way, as the page lists them: what is set in happens inside the call above it."""
     _, text = PAGE.read_text(encoding="utf-8").split(f"\n{title}\n{'-' * len(title)}\n")
     block = text.split(".. code-block:: text\n\n")[1].split("\n\n")[0]
-    return [(file, name) for file, name in re.findall(r"^   (\S+\.py) +(\S+)", block, re.MULTILINE)]
+    above: list[tuple[int, Call]] = []
+    found = []
+    for blanks, file, name in re.findall(r"^   ( *)(\S+\.py) +(\S+)", block, re.MULTILINE):
+        while above and above[-1][0] >= len(blanks):
+            above.pop()
+        call = Call(file, name, above[-1][1][:2] if above else None)
+        above.append((len(blanks), call))
+        found.append(call)
+    return found
 
 
 @contextmanager
-def traced() -> Iterator[list[tuple[str, str]]]:
-    """Note which functions of the package are called, each when it is called first."""
-    found: dict[tuple[str, str], None] = {}
+def traced(wanted: Sequence[Call]) -> Iterator[list[Call]]:
+    """Note the calls of the page as they happen for the first time, and inside which other."""
+    known = {call[:2] for call in wanted}
+    stack: list[tuple[FrameType, tuple[str, str]]] = []
+    found: dict[tuple[str, str], Call] = {}
 
     def note(frame: FrameType, event: str, _: Any) -> None:
         code = frame.f_code
-        if event == "call" and code.co_filename.startswith(str(PACKAGE)):
-            found[str(Path(code.co_filename).relative_to(PACKAGE)), code.co_qualname] = None
+        if not code.co_filename.startswith(str(PACKAGE)):
+            return
+        if event == "call":
+            name = (str(Path(code.co_filename).relative_to(PACKAGE)), code.co_qualname)
+            if name in known:
+                found.setdefault(name, Call(*name, stack[-1][1] if stack else None))
+                stack.append((frame, name))
+        elif event == "return" and stack and stack[-1][0] is frame:
+            stack.pop()
 
     before = sys.getprofile()
-    called: list[tuple[str, str]] = []
+    called: list[Call] = []
     sys.setprofile(note)
     try:
         yield called
     finally:
         sys.setprofile(before)
-        called += found
+        called += found.values()
 
 
 def compared(folder: Path) -> None:
@@ -75,7 +106,19 @@ def compensated(_: Path) -> None:
 )
 def test_the_calls_happen_in_the_order_of_the_page(title: str, way: Callable[[Path], None], job_folder: Path) -> None:
     wanted = told(title)
-    with traced() as called:
+    with traced(wanted) as called:
         way(job_folder)
     assert len(wanted) > 5
-    assert [call for call in called if call in wanted] == wanted
+    assert called == wanted
+
+
+@pytest.mark.parametrize(
+    ("title", "twice"), [("One reading", {}), ("One CSV", {}), ("One NC line", {"files": 2})], ids=str
+)
+def test_no_room_is_entered_twice(title: str, twice: dict[str, int]) -> None:
+    entered: Counter[str] = Counter()
+    wanted = told(title)
+    for caller in dict.fromkeys(call.inside for call in wanted):
+        home = caller[0].partition("/")[0] if caller else ""
+        entered.update(r for r, _ in groupby(c.room for c in wanted if c.inside == caller and c.room != home))
+    assert {room: n for room, n in entered.items() if n > 1} == twice

@@ -18,7 +18,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
@@ -36,6 +36,7 @@ from thermocomp.models.pls import PartialLeastSquares
 from thermocomp.models.ridge import Ridge
 from thermocomp.models.shrinkage import ShrunkRegressor, choose, scaling
 from thermocomp.models.training import train
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]

@@ -14,7 +14,6 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import Input, Support
@@ -29,6 +28,7 @@ from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.sensors import SensorSelector
 from thermocomp.models.training import train
 from thermocomp.models.unfrozen import EstimatorModel
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]

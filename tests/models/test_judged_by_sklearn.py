@@ -9,7 +9,6 @@ from sklearn import config_context
 from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.core.model import Support
 from thermocomp.models.arx_net import NetARX
@@ -19,6 +18,7 @@ from thermocomp.models.mlp import SigmoidNet
 from thermocomp.models.mlp_sklearn import SklearnNet
 from thermocomp.models.ppr import ProjectionPursuit
 from thermocomp.models.timed import TimedRegressor
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples, stack
 
 #: those that would take long as they are

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from thermocomp.assessment import splits
 from thermocomp.assessment.compare import compare
 from thermocomp.core.additive import Additive
 from thermocomp.core.exceptions import FitError, InputError
@@ -19,6 +18,7 @@ from thermocomp.files import modelfile
 from thermocomp.models import ppr
 from thermocomp.models.methods import METHODS, Method
 from thermocomp.models.ppr import ProjectionPursuit
+from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.assessment.compare import compare
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import stack

@@ -13,11 +13,12 @@ import pytest
 from rich.console import Console
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.results import Comparison
 from thermocomp.cli.output import show_comparison
 from thermocomp.files import modelfile
+from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.report import figures, html

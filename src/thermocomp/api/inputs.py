@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from thermocomp.assessment import splits
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 from thermocomp.files import mapping as mappings
 from thermocomp.files import recordings as files
+from thermocomp.recording import splits
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.sound import drop_unsound
+from thermocomp.recording.splits import Judging
 from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]

@@ -10,7 +10,6 @@ from thermocomp.api.inputs import judging_of
 from thermocomp.api.positionsettings import PositionSettings
 from thermocomp.assessment import position as assessing
 from thermocomp.assessment.position import PositionStudy
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import mapping as mappings
 from thermocomp.files import positionfile
@@ -21,6 +20,7 @@ from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging
 from thermocomp.report import records
 
 #: stands for every component that has columns of its own

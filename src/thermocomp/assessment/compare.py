@@ -16,7 +16,6 @@ from thermocomp.assessment.recommend import Inner, Recommendation, correct_verdi
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import pool_robustness, stress
-from thermocomp.assessment.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.learned import Learned
@@ -25,6 +24,7 @@ from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import MIN_ROWS, Judging, Split, join_short_cycles, name_cycles
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -214,7 +214,7 @@ def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
         With all blocks if there are too few readings in each of them.
     """
     known = np.isfinite(samples.deviations[:, target])
-    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= do_no_harm.MIN_ROWS)
+    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= MIN_ROWS)
     return replace(judging, splits=kept) if kept else judging
 
 
@@ -324,7 +324,7 @@ def _verdict(
                 for run_or_alone in both
             )
             for unit, mine in segments
-            if mine.sum() >= do_no_harm.MIN_ROWS
+            if mine.sum() >= MIN_ROWS
         ),
         unit=model.unit,
         caps=_caps(split, learned, samples, target),
@@ -363,9 +363,7 @@ def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
-    blocks = [
-        b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= do_no_harm.MIN_ROWS
-    ]
+    blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]

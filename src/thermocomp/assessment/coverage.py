@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.choice import Cell, Table
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.validity import Validity
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

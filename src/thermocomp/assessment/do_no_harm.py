@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from thermocomp.core.learned import Learned
+from thermocomp.recording.splits import MIN_ROWS
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Word = Literal["accepted", "unproven", "refused"]
 
-#: rows below which a stretch says nothing about a cycle
-MIN_ROWS = 20
 #: units below which nothing is shown: two of them agree too easily
 MIN_UNITS = 3
 #: noise that a probe has at least [um]

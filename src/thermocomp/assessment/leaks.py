@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.fingerprints import overlap, repeats
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]

@@ -13,12 +13,12 @@ from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.metrics import rms
 from thermocomp.assessment.replay import replay_compensated
-from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.methods import expand
 from thermocomp.models.selection.subsets import best_subsets
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.replay import replay
-from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import RULES, HonestError
@@ -19,6 +18,7 @@ from thermocomp.models.position import PositionFit, fit_position, slope_samples
 from thermocomp.models.positionoptions import PositionOptions, Setting, fill_options, reference_position
 from thermocomp.recording.profiles import Profiles
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split, leave_one_cycle_out
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -138,7 +138,7 @@ def study(
         it is open how many slopes there are and the thermal part is refused, the cold profile alone is judged and
         taken.
     judging : callable
-        Makes splits of the states, such as those of `thermocomp.assessment.splits`.
+        Makes splits of the states, such as those of `thermocomp.recording.splits`.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable

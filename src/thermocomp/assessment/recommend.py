@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm
-from thermocomp.assessment.splits import Judging, Split
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.training import fit_method
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]

@@ -10,11 +10,11 @@ from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity
 from thermocomp.assessment.recommend import Recommendation
 from thermocomp.assessment.robustness import Robustness
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
+from thermocomp.recording.splits import Judging
 from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]

@@ -12,7 +12,6 @@ from thermocomp.assessment import pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.leaks import refuse_leaks
-from thermocomp.assessment.splits import Judging
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
@@ -29,6 +28,7 @@ from thermocomp.models.selection.maximal_correlation import (
 )
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging
 
 FloatArray = NDArray[np.float64]
 #: N of the boxcar of maximal correlation (W-04)

@@ -13,7 +13,6 @@ from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import stress, worse
-from thermocomp.assessment.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
@@ -24,6 +23,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
 from thermocomp.recording.sound import drop_unsound
+from thermocomp.recording.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.recording.starts import Start, find_starts
 
 BoolArray = NDArray[np.bool_]

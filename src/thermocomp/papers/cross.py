@@ -9,7 +9,6 @@ from scipy.stats import spearmanr
 from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.assessment.replay import replay
 from thermocomp.assessment.results import Assessment
-from thermocomp.assessment.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.datasets.virtual import record
 from thermocomp.models.methods import expand
 from thermocomp.papers.common import rms, stacked
@@ -17,6 +16,7 @@ from thermocomp.papers.pictures import curves, single
 from thermocomp.papers.study import Claim, Figure, Progress, Study, StudyTable, tell_nobody
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split, leave_one_cycle_out
 
 #: the papers' methods, least squares beside them, and ours; all are fast. `thermocomp.models.methods.METHODS` has more
 FAST = ("ols", "mra", "mlp", "ace", "grouping", "partial-f", "arx", "ace-monotone", "dynamic")

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.assessment.do_no_harm import MIN_ROWS
 from thermocomp.core.exceptions import InputError
 from thermocomp.recording.samples import Samples
 
@@ -15,6 +14,8 @@ IntArray = NDArray[np.intp]
 
 #: [s]
 DAY = 86400.0
+#: rows below which a stretch says nothing about a cycle
+MIN_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.assessment import splits, study
+from thermocomp.assessment import study
 from thermocomp.core.exceptions import InputError
+from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples, stack
