@@ -13,6 +13,7 @@ from thermocomp.assessment.coverage import find_validity
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
+from thermocomp.assessment.refit import refit_accepted
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import pool_robustness, stress
@@ -42,6 +43,7 @@ def compare(
     rules: Rules = Rules(),
     support: Support = Support(),
     robustness: bool = True,
+    refit: bool = True,
     limits: Limits | None = Limits(),
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
@@ -63,6 +65,8 @@ def compare(
         What the models do outside their trained range.
     robustness : bool
         Also replay with noise and lost sensors.
+    refit : bool
+        With `robustness`: also try what is accepted as it would be written, fitted to all rows.
     limits : Limits or None
         Of the compensator that is judged; None: the models alone are judged, as they are compared in papers.
     jobs : int
@@ -118,6 +122,8 @@ def compare(
         best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
         found += _concluded(mine, verdicts, rules, best, capped)
+    if robustness and refit:
+        found = refit_accepted(found, samples, support, jobs=jobs)
     return Comparison(
         judging,
         tuple(found),

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import cap_alike_units, compare, judge, split_by_cycle
 from thermocomp.assessment.leaks import find_learned_rows
+from thermocomp.assessment.refit import stress_written
 from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
-from thermocomp.assessment.robustness import stress, worse
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
@@ -101,7 +101,15 @@ def fit(
     if not deployable(method):
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
     comparison = compare(
-        samples, [method], judging, rules=rules, support=support, limits=limits, jobs=jobs, progress=progress
+        samples,
+        [method],
+        judging,
+        rules=rules,
+        support=support,
+        refit=False,
+        limits=limits,
+        jobs=jobs,
+        progress=progress,
     )
     models, estimators, r_squared = [], [], []
     everything = np.ones(len(samples), dtype=np.bool_)
@@ -110,13 +118,8 @@ def fit(
     for k, overall in enumerate(comparison.overall()):
         trained = train(method, samples, k, everything, support=support, prints=True)
         progress(f"{overall.target} {method} all rows")
-        rows = samples.valid & np.isfinite(samples.deviations[:, k])
-        if overall.robustness is not None:
-            # what is written has seen more than what was judged, and may lean on a sensor as that did not
-            own = stress(trained.model, samples, samples.deviations[rows, k], rows).robustness
-            overall = replace(overall, robustness=worse(overall.robustness, own))  # noqa: PLW2901
-        tried[overall.target] = overall
-        honest = honest_error(overall, judging)
+        tried[overall.target] = stress_written(overall, trained.model, samples)
+        honest = honest_error(tried[overall.target], judging)
         models.append(replace(trained.model, honest_error=honest, validity=covered))
         estimators.append(trained.estimator)
         r_squared.append(trained.r_squared)

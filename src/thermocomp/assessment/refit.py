@@ -1,0 +1,73 @@
+"""What would be written: a method fitted to all rows, tried with noise and lost sensors.
+
+It has seen more than the models that were judged, and may lean on a sensor as they did not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from thermocomp.assessment.results import Assessment
+from thermocomp.assessment.robustness import stress, worse
+from thermocomp.core.exceptions import FitError
+from thermocomp.core.model import ErrorModel, Support
+from thermocomp.models.methods import deployable
+from thermocomp.models.training import train
+from thermocomp.recording.samples import Samples
+
+
+def stress_written(judged: Assessment, model: ErrorModel, samples: Samples) -> Assessment:
+    """Return an assessment with the robustness of the model that is written, where that is worse.
+
+    Parameters
+    ----------
+    judged : Assessment
+        Over all blocks.
+    model : ErrorModel
+        Fitted to all rows.
+    samples : Samples
+
+    Returns
+    -------
+    Assessment
+        The same if noise and lost sensors were not tried.
+    """
+    if judged.robustness is None:
+        return judged
+    k = [t.name for t in samples.targets].index(model.target)
+    rows = samples.valid & np.isfinite(samples.deviations[:, k])
+    own = stress(model, samples, samples.deviations[rows, k], rows).robustness
+    return replace(judged, robustness=worse(judged.robustness, own))
+
+
+def refit_accepted(judged: Sequence[Assessment], samples: Samples, support: Support, *, jobs: int) -> list[Assessment]:
+    """Fit what is accepted to all rows, as `thermocomp.assessment.study.fit` does, and try that as well.
+
+    Parameters
+    ----------
+    judged : sequence of Assessment
+    samples : Samples
+    support : Support
+        For the models.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
+
+    Returns
+    -------
+    list of Assessment
+        The same, less sure of what noise or a lost sensor would make worse than none.
+    """
+    work = (delayed(_refit)(a, samples, support) for a in judged if a.overall and a.accepted and deployable(a.model))
+    tried = {(a.target, a.model): a for a in Parallel(n_jobs=jobs)(work)}
+    return [tried.get((a.target, a.model), a) if a.overall else a for a in judged]
+
+
+def _refit(judged: Assessment, samples: Samples, support: Support) -> Assessment:
+    k = [t.name for t in samples.targets].index(judged.target)
+    try:
+        written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
+        return stress_written(judged, written.model, samples)
+    except FitError as e:
+        return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {e}",)))
