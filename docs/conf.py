@@ -81,4 +81,9 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "show_nav_level": 2,
 }
-html_sidebars = {"index": []}
+# no empty sidebar beside a page without pages below it
+html_sidebars = {
+    page.stem: []
+    for page in HERE.glob("*.*")
+    if page.suffix in (".rst", ".md") and (page.stem == "index" or "toctree:" not in page.read_text("utf-8"))
+}

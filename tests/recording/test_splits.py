@@ -70,19 +70,19 @@ def test_short_cycles_are_left_out_together(recording: Recording) -> None:
     cut = recording.with_cycles([Cycle(str(k), a, b) for k, (a, b) in enumerate(itertools.pairwise(ends))])
     samples = stack([cut], ["z_um"])
     judging = splits.leave_one_cycle_out(samples)
-    assert [s.block for s in judging.splits] == ["cycle 0 and 2 more", "cycle 3", "cycle 4 and 1 more"]
+    assert [s.block for s in judging.splits] == ["cycle 0 to 2", "cycle 3", "cycle 4 to 5"]
     assert [int(s.judge.sum()) for s in judging.splits] == [215, 285, 300]
     assert judging.name == "leave one thermal cycle out (6 cycles, 3 of them too short: out with the one before)"
     fitted = study.fit(samples, "ols", judging)
     (model,) = fitted.models
     assert model.honest_error is not None
-    assert set(model.honest_error.cycles) == {"0 and 2 more", "3", "4 and 1 more"}
+    assert set(model.honest_error.cycles) == {"0 to 2", "3", "4 to 5"}
     assert np.isfinite(list(model.honest_error.cycles.values())).all()
     judged = study.assess([model], [cut])
     assert [a.block for a in judged.assessments] == [
-        "cycle 0 and 2 more",
+        "cycle 0 to 2",
         "cycle 3",
-        "cycle 4 and 1 more",
+        "cycle 4 to 5",
         "all cycles",
     ]
 

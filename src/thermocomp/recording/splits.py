@@ -140,8 +140,8 @@ def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) ->
 
 def name_cycles(samples: Samples, block: IntArray) -> str:
     """Return the name of a cycle, or of several one after the other."""
-    more = f" and {len(block) - 1} more" if len(block) > 1 else ""
-    return f"{samples.cycle_names[block[0]]}{more}"
+    first, last = (samples.cycle_names[c] for c in (block[0], block[-1]))
+    return first if len(block) == 1 else f"{first} to {last}"
 
 
 def leave_one_cycle_out(samples: Samples) -> Judging:
