@@ -26,7 +26,7 @@ test: $(VENV)/.dev
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh linuxcnc-uspace
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -n 2 --dist loadfile -m long
-	$(BIN)/python -m pytest -m hours
+	$(BIN)/python -m pytest -m hours -rP
 
 check: $(VENV)/.dev
 	$(BIN)/ruff format --check
