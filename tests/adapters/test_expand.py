@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.adapters.linuxcnc.expansion.expand import expand
+from thermocomp.adapters.linuxcnc.expansion.origins import SYSTEMS
 from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.adapters.linuxcnc.rs274 import HIGHEST_TOOL, Stored, read
+from thermocomp.adapters.linuxcnc.stored import draw_controller
 from thermocomp.core.exceptions import InputError, ProgramError
 
 pytestmark = pytest.mark.usefixtures("interpreter")
@@ -45,6 +48,12 @@ START = "G17 G40 G80 G90 G94"
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
+        # a work coordinate system that is chosen, whichever is in force; none that is not
+        *((f"G21 {code}\nG0 X1\nM2\n", ["G21", code, "G0 X1", "M2"]) for code in SYSTEMS.values()),
+        ("G21\nG0 X1\nM2\n", ["G21", "G0 X1", "M2"]),
+        # radii, if the program says which
+        ("G21 G8\nG0 X1\nM2\n", ["G8", "G21", "G0 X1", "M2"]),
+        ("G21 G7\nG0 X2\nM2\n", ["G8", "G21", "G0 X1", "M2"]),
         # loops, parameters, expressions
         (
             "G21\n#1=0\no1 while [#1 LT 2]\nG0 X[#1*1.5] Y-1\n#1=[#1+1]\no1 endwhile\nM2\n",
@@ -330,3 +339,23 @@ block = st.one_of(
 def test_random_programs_expand_and_stay_as_they_are_when_expanded_again(plain: Plain, blocks: list[str]) -> None:
     first = plain("G21 G64\nG0 X0 Y0 Z5\n" + "\n".join(blocks) + "\nM2\n")
     assert plain("\n".join(first[1:]) + "\n") == first
+
+
+def test_the_radii_of_a_subprogram_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text("G21\no<sub> call\nM2\n")
+    (tmp_path / "sub.ngc").write_text("o<sub> sub\nG7 G0 X2\no<sub> endsub\nM2\n")
+    with pytest.raises(ProgramError, match=r"a subprogram says G7 or G8 .*write G8 at its top \(line 2 of sub.ngc\)"):
+        expand(tmp_path / "part.ngc", tmp_path / "out.ngc")
+
+
+def test_what_is_written_stands_in_its_system_whatever_is_in_force(tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text("G21 G54 G8\n#1=5\nG0 X[#1] Y0 Z0\nM2\n")
+    expand(tmp_path / "part.ngc", tmp_path / "out.ngc")
+    for startup in ("G64 G98", "G7 G64 G98"):
+        stored = replace(draw_controller(7, startup), system=2)
+        moves = [
+            [call.machine for call in read(tmp_path / name, stored) if call.kind == "rapid" and call.line]
+            for name in ("part.ngc", "out.ngc")
+        ]
+        assert moves[0] == moves[1]
+        assert moves[0]

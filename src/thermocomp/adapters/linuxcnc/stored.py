@@ -36,6 +36,8 @@ class Stored:
         Machine coordinates at the start, X to W [mm, deg]; None: the origin of the first work coordinate system.
     parameters : dict of int to float
         Others, such as ``#100``.
+    system : int
+        Work coordinate system in force at the start: 1, G54, after the end of a program; any after an MDI command.
     """
 
     origins: Mapping[int, Sequence[float]] = field(default_factory=dict)
@@ -50,6 +52,7 @@ class Stored:
     startup: str = "G64 G98"
     start: Sequence[float] | None = None
     parameters: Mapping[int, float] = field(default_factory=dict)
+    system: int = 1
 
     def numbers(self) -> dict[int, float]:
         """Return all parameters as the controller keeps them."""
@@ -58,6 +61,7 @@ class Stored:
         result |= {5181 + i: value for i, value in enumerate(self.home30)}
         result |= {5211 + i: value for i, value in enumerate(self.shift)}
         result[5210] = float(any(self.shift))
+        result[5220] = float(self.system)
         for system, origin in self.origins.items():
             result |= {5201 + 20 * system + i: value for i, value in enumerate(origin)}
         result |= {5210 + 20 * system: angle for system, angle in self.rotations.items()}

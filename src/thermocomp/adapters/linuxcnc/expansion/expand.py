@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 
-from thermocomp.adapters.linuxcnc.expansion.origins import DEPENDS, G10
+from thermocomp.adapters.linuxcnc.expansion.origins import DEPENDS, G10, SYSTEMS
 from thermocomp.adapters.linuxcnc.expansion.plain import Writer
 from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.adapters.linuxcnc.expansion.words import Side
@@ -18,6 +18,10 @@ from thermocomp.core.exceptions import InputError, ProgramError
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
 _ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
+#: diameters or radii for X: the interpreter makes no call of them, and plain lines are in radii
+_DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
+#: seeds of the controllers that a program is written from, and that it is proved in
+_WRITTEN, _PROVED = (1, 2), (3, 4)
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,7 @@ class _Around:
     subroutines: Sequence[Path]
     user_codes: bool
     seconds: int
+    systems: Mapping[int, int]  #: work coordinate system in force at the start, by seed
 
     def run(
         self,
@@ -75,7 +80,7 @@ class _Around:
     def controller(self, seed: int) -> Stored:
         """Return a controller that has nothing else in common with that of another seed."""
         stored = draw_controller(seed, self.startup or "")
-        return replace(stored, diameters={**stored.diameters, **self.diameters})
+        return replace(stored, diameters={**stored.diameters, **self.diameters}, system=self.systems[seed])
 
 
 def expand(
@@ -131,9 +136,12 @@ def expand(
     InputError
         `out` exists already, or the program is not there.
     """
-    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds)
+    if not path.is_file():
+        raise InputError(f"{path} is not a file")
     if out.exists():
         raise InputError(f"{out} exists already; nothing is overwritten")
+    systems = _start_systems(path, block_delete)
+    around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds, systems)
     part = out.with_name(out.name + ".part")
     acts = 0
     try:
@@ -142,7 +150,7 @@ def expand(
             for text, line in _lines(path, around):
                 file.write(text + "\n")
                 sources.append(line)
-        for seed in (3, 4):
+        for seed in _PROVED:
             left: tuple[dict[int, float], dict[int, float]] = ({}, {})
             stored = around.controller(seed)
             try:
@@ -162,8 +170,6 @@ def expand(
 
 def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     """Yield the lines of the plain program, each with the line of the program it comes from."""
-    if not path.is_file():
-        raise InputError(f"{path} is not a file")
     percent = _first(path) == "%"
     if percent:
         yield "%", 0
@@ -176,7 +182,10 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
         yield f"G21 {around.startup}", 0
     if around.inch is not None:
         yield "G20" if around.inch else "G21", 0
-    one, two = around.controller(1), around.controller(2)
+    radii = any(_lines_with(_DIAMETERS, path, around.block_delete))
+    if radii:
+        yield "G8", 0
+    one, two = (around.controller(seed) for seed in _WRITTEN)
     writer = Writer(one, two, _Source(path), around.inch, around.user_codes)
     opened: set[Path] = set()
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
@@ -185,25 +194,49 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
                 raise writer.refuse(f"where it ends {DEPENDS}")
             yield from writer.write(first, second)
     for file in sorted(opened):
-        _refuse_orienting(file, path, around.block_delete)
+        _refuse_lost(file, path, around.block_delete, radii=radii)
     if not writer.ended:
         yield from writer.flush()
         if percent:
             yield "%", 0
 
 
-def _refuse_orienting(file: Path, program: Path, block_delete: bool) -> None:
-    """Refuse M19 in a file that was run: without R the interpreter passes it over without a trace."""
+def _start_systems(program: Path, block_delete: bool) -> dict[int, int]:
+    """Return the work coordinate systems that are in force at the start, by seed.
+
+    The interpreter makes no call where one is chosen that is in force already. So a program is written where one is
+    that it does not name, and proved in two others, of which one is G54: what it chooses is seen, and what it leaves
+    as it is stays so.
+    """
+    named = (
+        any(_lines_with(re.compile(re.escape(code) + r"(?![0-9.])"), program, block_delete))
+        for code in SYSTEMS.values()
+    )
+    free = [system for system, is_named in zip(SYSTEMS, named, strict=True) if not is_named]
+    written = free[-1] if free else len(SYSTEMS)
+    other = next(system for system in reversed(SYSTEMS) if system != written)
+    return dict.fromkeys(_WRITTEN, written) | dict(zip(_PROVED, (other, 1 if written != 1 else 2), strict=True))
+
+
+def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) -> None:
+    """Refuse what the interpreter passes over without a trace in a file that was run: M19 without R, G7 and G8."""
+    own = file == program.resolve()
+    reasons = {_ORIENTS: "it orients the spindle (M19), which plain lines would lose"}
+    if not radii:
+        reasons[_DIAMETERS] = "a subprogram says G7 or G8 and the program does not; write G8 at its top"
+    for code, reason in reasons.items():
+        for number in _lines_with(code, file, block_delete):
+            where = "" if own else f" (line {number} of {file.name})"
+            raise ProgramError(number if own else 1, f"it cannot be expanded: {reason}{where}")
+
+
+def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterator[int]:
+    """Yield the numbers of the lines with a code."""
     with file.open(encoding="latin-1") as lines:
         for number, text in enumerate(lines, 1):
-            code = _NO_CODE.sub("", text).upper()
-            if _ORIENTS.search(code) and not (block_delete and code.startswith("/")):
-                own = file == program.resolve()
-                where = "" if own else f" (line {number} of {file.name})"
-                raise ProgramError(
-                    number if own else 1,
-                    f"it cannot be expanded: it orients the spindle (M19), which plain lines would lose{where}",
-                )
+            words = _NO_CODE.sub("", text).upper()
+            if code.search(words) and not (block_delete and words.startswith("/")):
+                yield number
 
 
 def _first(path: Path) -> str:
