@@ -8,11 +8,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+#: take hours, or judge the verdict and no speed: run when they are named
+BY_HAND = ("verdict", "stable")
+
 
 def main() -> int:
     here = Path(__file__).resolve().parent
     wanted = sys.argv[1:]
-    scripts = [p for p in sorted(here.glob("bench_*.py")) if not wanted or p.stem.removeprefix("bench_") in wanted]
+    names = {p.stem.removeprefix("bench_"): p for p in sorted(here.glob("bench_*.py"))}
+    scripts = [p for name, p in names.items() if (name in wanted if wanted else name not in BY_HAND)]
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     missed = []
     for script in scripts:

@@ -52,6 +52,17 @@ def test_a_rapid_that_moves_nothing_moves_nothing(tmp_path: Path) -> None:
     judge(tmp_path, original, revised, rows, placed=False)
 
 
+def test_the_rounding_of_inches_is_no_move_unless_a_rotary_axis_turns(tmp_path: Path) -> None:
+    """Two inches and 50.8 mm are one place; with a correction they are two, 0.04 um apart."""
+    first, rows = HEAD + "G0 X0 Y0 Z20 A0\nG1 X50.8 F100\n", [shift(), shift(), shift(10), shift(10)]
+    moved = first.replace("X50.8", "X50.81")
+    judge(tmp_path, first + "G1 X50.8\nM2\n", moved + "G1 X50.81004\nM2\n", rows)
+    with pytest.raises(ProgramError, match=r"line 4: .*by 0\.20 um where the original moves nothing"):
+        judge(tmp_path, first + "G1 X50.8\nM2\n", moved + "G1 X50.8102\nM2\n", [*rows[:3], shift(10.2)])
+    with pytest.raises(ProgramError, match=r"by 0\.04 um where the original moves a rotary axis only"):
+        judge(tmp_path, first + "G1 X50.8 A90 F360\nM2\n", moved + "G1 X50.81004 A90 F360\nM2\n", rows)
+
+
 def test_a_circle_stays_one(tmp_path: Path) -> None:
     """So small and fast a one that its time does not tell."""
     original = HEAD + "G0 X0.05 Y0 Z0\nG2 X0.05 Y0 I-0.05 J0 F6000\nM2\n"

@@ -227,8 +227,10 @@ class _Comparison:
         still = (stands < STILL) & (was.plane == 0) & straight
         # a rapid to where the tool may stand already, or not: the program leaves it open
         still &= shifts.placed | turning | (was.kind != self.sides[0].run.codes["rapid"])
+        # beside a rotary axis anything that moves takes its feed; else it is how numbers are rounded in inches and mm
+        least = np.where(turning, STILL, 1e-3 * ROUNDING)
         yield _Check(
-            still & (moves >= STILL),
+            still & (moves >= least),
             lambda i: (
                 f"moves X, Y, Z by {moves[i] * 1e3:.2f} um where the original moves "
                 + ("a rotary axis only" if turning[i] else "nothing")
@@ -293,9 +295,12 @@ class _Comparison:
 
     def _times(self, was: Calls, now: Calls, moving: Mask) -> Iterator[_Check]:
         change = np.abs(now.seconds - was.seconds)
-        linear = (np.abs(was.end - was.start)[:, [0, 1, 2, 6, 7, 8]].max(axis=1) > STILL) | (was.plane > 0)
+        way = np.abs(was.end - was.start) > STILL
+        linear = way[:, [0, 1, 2, 6, 7, 8]].any(axis=1) | (was.plane > 0)
         linear |= self.sides[0].is_kind(was.kind, "tap", "curve")
-        allowed = np.where(linear, np.maximum(SLOWER * was.seconds, PAUSE), _EXACT * np.maximum(was.seconds, 1.0))
+        turning_alone = way[:, 3:6].any(axis=1) & ~linear
+        exact, near = _EXACT * np.maximum(was.seconds, 1.0), np.maximum(SLOWER * was.seconds, PAUSE)
+        allowed = np.where(turning_alone, exact, near)
         if moving.any():
             self.slower = max(self.slower, float((change / np.maximum(was.seconds, PAUSE / SLOWER))[moving].max()))
         yield _Check(
