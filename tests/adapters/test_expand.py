@@ -51,6 +51,8 @@ START = "G17 G40 G80 G90 G94"
         # a work coordinate system that is chosen, whichever is in force; none that is not
         *((f"G21 {code}\nG0 X1\nM2\n", ["G21", code, "G0 X1", "M2"]) for code in SYSTEMS.values()),
         ("G21\nG0 X1\nM2\n", ["G21", "G0 X1", "M2"]),
+        # an offset of nothing, twice
+        ("G92.1\nG52 X0 Y0 Z0\nG21\nG0 X1\nM2\n", ["G92.1", "G21", "G0 X1", "M2"]),
         # radii, if the program says which
         ("G21 G8\nG0 X1\nM2\n", ["G8", "G21", "G0 X1", "M2"]),
         ("G21 G7\nG0 X2\nM2\n", ["G8", "G21", "G0 X1", "M2"]),
@@ -293,6 +295,9 @@ def test_the_proof_tells_a_full_circle_from_none(tmp_path: Path) -> None:
 
 def test_the_proof_looks_at_what_is_left_in_the_controller() -> None:
     compare_parameters({5221: 1.0, 100: 5.0, 5162: 0.0}, {5221: 1.0})
+    compare_parameters({5210: 1.0}, {})
+    with pytest.raises(ProgramError, match="another parameter #5210"):
+        compare_parameters({5210: 1.0, 5211: 2.0}, {5211: 2.0})
     with pytest.raises(ProgramError, match="another parameter #5221"):
         compare_parameters({5221: 1.0}, {5221: 1.00001})
 

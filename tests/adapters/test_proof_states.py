@@ -416,3 +416,7 @@ def test_an_arc_in_pieces_keeps_its_centre(tmp_path: Path) -> None:
     judge(tmp_path, original, pieces.format("-10 J0"), [shift()] * 4, texts={3: 2}, knots=FLAT_INSIDE)
     with pytest.raises(ProgramError, match=r"line 3: .*a piece of a divided move"):
         judge(tmp_path, original, pieces.format("-9.998 J-0.00002"), [shift()] * 4, texts={3: 2}, knots=FLAT_INSIDE)
+
+
+def test_a_code_that_is_taken_as_harmless_is_told() -> None:
+    assert "M101 moves nothing" in states.describe_setup(replace(PLAIN, harmless=frozenset({101})))

@@ -116,6 +116,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (judged(lags("z_um")), ["--origin", "G60=1 mm, 2 mm, 3 mm"], "want a work coordinate system"),
         (judged(lags("z_um")), ["--origin", "G54=1 mm, 2 mm"], "want X, Y and Z"),
         (judged(lags("z_um")), ["--tool", "one=1 mm"], "want the number of a tool"),
+        (judged(lags("z_um")), ["--harmless", "M88"], "LinuxCNC has no such code; a user's own are M100 to M199"),
         (judged(lags("z_um")), ["--harmless", "M3"], "M3 is known (spindle on, clockwise), and is followed as that"),
         (judged(lags("z_um")), ["--tolerance", "0 um"], "must be positive"),
         (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is no thermal drift"),

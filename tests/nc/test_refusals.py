@@ -189,7 +189,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G10 L50", "is not supported"),
         ("G52 X1\nG92 X2", "G52 and G92"),
         ("M10", "if it leaves axes and spindle as they are: --harmless M10"),
-        ("G999", "unknown (fanuc): nobody knows what it does; remove it"),
+        ("G999", "unknown (fanuc): nobody knows what it does; say it in codes that are followed"),
         ("T0101", "a lathe program: X is a diameter"),
         ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: a lathe program"),
         ("G50 S2500", "a lathe program"),

@@ -314,7 +314,8 @@ class Controller:
         on: lines that begin with / are not run. off: they may be run or not, and what depends on it is refused. With
         --expand it has to be said: off writes them out as plain lines.
     harmless : list of str
-        M codes of the machine's maker that move no axis and leave the spindle as it is, such as M88.
+        M codes of the machine's maker that move no axis and leave the spindle as it is, such as M88
+        of a Fanuc or M101 of LinuxCNC.
     """
 
     controller: Literal["linuxcnc", "fanuc"] | None = None

@@ -113,6 +113,7 @@ def _assumed(setup: Setup) -> str:
         )
         if missing
     ]
+    found += [f"M{number} moves nothing (--harmless)" for number in sorted(setup.harmless)]
     return f"; assumed: {', '.join(found)}" if found else ""
 
 

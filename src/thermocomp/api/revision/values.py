@@ -213,9 +213,11 @@ def m_code_of(text: str, controller: Controller) -> int:
     """
     number = text.upper().removeprefix("M")
     if not number.isdecimal():
-        raise InputError(f"--harmless {text!r}: want an M code, such as M88")
+        raise InputError(f"--harmless {text!r}: want an M code, such as M{101 if controller == 'linuxcnc' else 88}")
     if (code := find_code("M", float(number), controller)) is not None:
         raise InputError(f"--harmless {text!r}: {code.name} is known ({code.does}), and is followed as that")
+    if controller == "linuxcnc" and not 100 <= int(number) < 200:
+        raise InputError(f"--harmless {text!r}: LinuxCNC has no such code; a user's own are M100 to M199")
     return int(number)
 
 

@@ -128,11 +128,11 @@ class Reader:
             code = Code(name, name, "moves nothing")
         if code is None:
             user = letter == "M" and 100 <= number < 200 and self._controller == "linuxcnc"
-            remedy = f"if it leaves axes and spindle as they are: --harmless {name}; else" if letter == "M" else ""
+            remedy = f"if it leaves axes and spindle as they are: --harmless {name}; else " if letter == "M" else ""
             raise ProgramError(
                 line.number,
                 f"{name} is unknown ({'a code of the user' if user else self._controller}): nobody knows what it does; "
-                f"{remedy} remove it".replace(";  ", "; "),
+                f"{remedy}say it in codes that are followed (docs/precompensation.rst)",
             )
         if code.refused:
             raise ProgramError(line.number, f"{code.name} ({code.does}): {code.refused}")

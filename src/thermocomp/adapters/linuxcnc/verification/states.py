@@ -131,6 +131,7 @@ def describe_setup(setup: Setup) -> tuple[str, ...]:
     else:
         said += [f"{system_name(system)} turned by {angle:g} deg" for system, angle in angles]
     said += ["no G92"] * setup.no_shift + [setup.startup] * bool(setup.startup)
+    said += [f"M{number} moves nothing" for number in sorted(setup.harmless)]
     return (*said, *["optional lines left out"] * setup.skip_optional)
 
 
