@@ -33,8 +33,9 @@ def ledger(
     texts: Mapping[int, int] | None = None,
     knots: Mapping[int, tuple[Vector, ...]] | None = None,
     placed: bool = True,
+    others: Mapping[int, Vector] | None = None,
 ) -> Ledger:
-    """Return what lines 1, 2, ... carry at their end, and on the way; and how many lines they have become."""
+    """Return what lines 1, 2, ... carry at their end, or may carry instead, and on the way; and how many they are."""
     made = Ledger()
     if header:
         made.take(Revised(0, "", ("",) * header, None, 0.0, 0.0, NONE, NONE, NONE))
@@ -43,7 +44,10 @@ def ledger(
         written = ("",) * (texts or {}).get(number, 1)
         block = Block(Line(number, ""), modal)
         inside = (knots or {}).get(number, ())
-        made.take(Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, placed=placed, knots=inside))
+        other = (others or {}).get(number)
+        made.take(
+            Revised(number, "", written, block, 0.0, 0.0, NONE, after, inner, other=other, placed=placed, knots=inside)
+        )
     return made
 
 

@@ -70,6 +70,14 @@ def test_a_circle_stays_one(tmp_path: Path) -> None:
         judge(tmp_path, original, original.replace("G2 X0.05 Y0", "G2 X0.05 Y-0.00005"), [shift()] * 4)
 
 
+def test_an_arc_that_may_be_shifted_is_shifted_as_a_whole(tmp_path: Path) -> None:
+    original, either = HEAD + "G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F100\nM2\n", dict.fromkeys((2, 3, 4), (0.0, 10.0, 0.0))
+    judge(tmp_path, original, original, [shift()] * 4, others=either)
+    judge(tmp_path, original, original.replace("Y0", "Y0.01"), [shift()] * 4, others=either)
+    with pytest.raises(ProgramError, match=r"line 3: .*moves Y of an arc's centre by 10\.00 um instead of 0\.00 um"):
+        judge(tmp_path, original, original.replace("J0", "J0.01"), [shift()] * 4, others=either)
+
+
 def test_a_call_belongs_to_its_line(tmp_path: Path) -> None:
     original = HEAD + "G0 X0 Y0 Z20\nM8\n\nM2\n"
     with pytest.raises(ProgramError, match=r"line 3: .*makes a 'flood' that belongs to line 4"):

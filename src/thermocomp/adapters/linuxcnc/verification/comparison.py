@@ -280,6 +280,10 @@ class _Comparison:
             for other in (shifts.before, shifts.inner):
                 near = np.minimum(off, np.abs(found - other[:, [i, j]]))
                 off = np.where((~last)[:, None], near, off)
+            ends = (now.end - was.end)[:, [i, j]] * 1e3
+            for other in shifts.others[1:]:  # the arc as a whole, with its end
+                whole = other[:, [i, j]]
+                off = np.minimum(off, np.maximum(np.abs(found - whole), np.abs(ends - whole)))
             self._note(off[mine])
 
             def say(n: int, axes: str = "XYZ"[i] + "XYZ"[j], off: Floats = off, found: Floats = found) -> str:
