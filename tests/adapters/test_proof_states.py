@@ -167,6 +167,16 @@ def test_an_unstated_rotation_turns_a_correction(tmp_path: Path) -> None:
     assert "G92" in proof.drawn
 
 
+def test_a_system_that_is_not_named_may_be_any(tmp_path: Path) -> None:
+    """Where G54 gets its origin from the place of the tool, Z20 is another place, if G54 is in force."""
+    original = HEAD.replace(" G54", "") + "G0 X0 Y0 Z20\nG10 L20 P1 Z0\nX10\nZ20\nM2\n"
+    revised = original.replace("Y0 Z20", "Y0 Z20.01").replace("P1 Z0", "P1 Z0.01").replace("\nZ20", "\nZ20.012")
+    rows: Rows = [shift(), *[shift(0, 0, 10)] * 3, shift(0, 0, 12)]
+    judge(tmp_path, "G54" + original, "G54" + revised, rows)
+    with pytest.raises(ProgramError, match=r"line 5: .* where system in force is another.*write G54 before"):
+        judge(tmp_path, original, revised, rows)
+
+
 def test_a_shift_in_force_is_lost_by_an_offset(tmp_path: Path) -> None:
     original = HEAD + "G0 X0 Y0 Z20\nG1 X10 F100\nM2\n"
     revised = HEAD + "G90 G52 Z-0.02\nG0 X0 Y0 Z20\nG1 X10 F100\nM2\n"
@@ -229,6 +239,7 @@ def test_the_states_are_extreme_and_hold_what_is_stated() -> None:
         assert one.stored.start != other.stored.start
         assert one.stored.active_length != other.stored.active_length
         assert one.stored.spindle != other.stored.spindle
+        assert one.stored.system != other.stored.system
     held = replace(setup, inch=True, skip_optional=True, no_shift=True, startup="G98", rotations=PLAIN.rotations)
     for number in range(states.STATES):
         s = states.state(held, number, set(states.list_unstated(held)))

@@ -53,6 +53,15 @@ def test_a_stored_rotation_has_to_be_told_if_x_is_corrected(
     assert ("(--rotation none) or which (--rotation 'G54=12 deg')" in said(capsys)) == (code == 2)
 
 
+def test_where_no_system_is_named_each_may_be_in_force(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_models([judged(lags("x_um"))], "x.json")
+    Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
+    assert revise("--model", "x.json", "--rotation", "G54=12.5 deg") == 2
+    assert "(--rotation none) or write G54 before the first move, and which (--rotation 'G54=12 deg')" in said(capsys)
+    assert revise("--model", "x.json", "--rotation", "none", proved=True) == 0
+    assert "G92 (in half of them), G98/G99, system in force, origins" in capsys.readouterr().out
+
+
 def test_table_picture_and_message_tell_one_figure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -102,6 +111,10 @@ def test_what_another_offset_would_cost_is_told(job_folder: Path, capsys: pytest
     header = Path("out.ngc").read_text(encoding="ascii").splitlines()
     assert f"({MARK} made for G54 X0 Y0 Z300, T1 120 mm)" in header
     assert f"({MARK} {sentence})" in header
+    Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
+    assert revise(*options, "--overwrite") == 0
+    note = f"it is made for G54 X0 Y0 Z300, T1 120 mm, G54 in force at the start; {sentence}"
+    assert note in json.loads(capsys.readouterr().out)["notes"]
 
 
 def test_a_refusal_in_a_long_program_comes_before_the_work(

@@ -44,7 +44,7 @@ FEATURES = [
     Feature("peck drilling", "G99 G83 X10 Y10 Z-8 R2 Q3\nX20\nG80\nG0 Z10\n"),
     Feature("incremental cycle", "G91 G81 X5 Y5 Z-6 R-3 L3\nG80 G90\nG0 Z10\n"),
     Feature("origin by G10 L2", "G10 L2 P1 Z-3\nG0 Z10\nG1 Z-1\nX5\nG10 L2 P1 Z0\nG0 Z10\n"),
-    Feature("origin by G10 L20", "G1 Z-1\nG10 L20 P1 Z0\nX20\nG1 Z-1\nG0 Z12\n"),
+    Feature("origin by G10 L20", "G1 Z-1\nG10 L20 P0 Z0\nX20\nG1 Z-1\nG0 Z12\n"),
     Feature("tool length by G43.1", "G43.1 Z25\nG0 Z10\nG1 Z-1\nX5\nG0 Z10\nG49\nG0 Z20\n"),
     Feature("machine coordinates", "G1 Z-1\nG53 G0 Z20\nX30\nG0 Z5\nG1 Z-1\nG53 G0 X0 Y0 Z20\n"),
     Feature("home", "G1 Z-1\nG28 Z5\nG0 X20\nZ5\nG1 Z-1\nG91 G28 Z0\nG90\n"),
@@ -58,7 +58,7 @@ FEATURES = [
     Feature("a cut that may be skipped", "X9\n/G1 Z-1 F100\n/X20\nG0 Z10\nX0\n"),
     Feature("block delete", "G1 Z-1\n/ Z-2\nX20\nZ-1.5\nG0 Z10\n"),
     Feature(
-        "rotated coordinates", "G10 L2 P1 R30\nG0 X10 Y0\nG1 Z-1\nX20\nY20\nG10 L2 P1 R0\nG0 X0 Y0 Z10\n", offset=5
+        "rotated coordinates", "G54 G10 L2 P1 R30\nG0 X10 Y0\nG1 Z-1\nX20\nY20\nG10 L2 P1 R0\nG0 X0 Y0 Z10\n", offset=5
     ),
     Feature("other systems", "G55\nG0 X5 Y5 Z10\nG1 Z-1\nG54 G0 Z10\nX0 Y0\n"),
     Feature("cutter compensation", "G0 X-20 Y-20\nG1 Z-1\nG41.1 D4 G1 X0 Y-10\nY20\nX20\nG40 X30 Y30\nG0 Z10\n"),

@@ -100,7 +100,7 @@ def test_percent_ends_the_program() -> None:
 
 
 def test_axes_are_known_once_an_absolute_word_has_come() -> None:
-    blocks = run("G21 G90 G0 X1\nG91 Y1\nG90 Z5 Y2\nG53 G0 Z0\nG1 F100 Z1\nG28 X3\nX1\nG54\nG55\n")
+    blocks = run("G54 G21 G90 G0 X1\nG91 Y1\nG90 Z5 Y2\nG53 G0 Z0\nG1 F100 Z1\nG28 X3\nX1\nG54\nG55\n")
     assert [b.known for b in blocks] == [
         (True, False, False),
         (True, False, False),

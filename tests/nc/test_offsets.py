@@ -1,15 +1,18 @@
 """Offsets between program and machine coordinates."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.block import Block, Point, Setup
 from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.interpreter.offsets import Offsets
 from thermocomp.nc.parser.tokens import read_lines, split_lines
 
-ALL = (True, True, True)
+ALL, NONE = (True, True, True), (False, False, False)
 coordinates = st.tuples(*[st.floats(-1e3, 1e3)] * 3)
 
 
@@ -70,16 +73,37 @@ def test_g92_names_the_place_and_tells_nothing_new_about_where_it_is() -> None:
 
 
 def test_g10_l2_of_the_active_system_makes_its_axes_uncertain() -> None:
-    blocks = run("G0 X1 Y1 Z1\nG10 L2 P0 Z5\nZ1\nG10 L2 P3 X9\nG10 L2 P1 R30\n")
+    blocks = run("G54 G0 X1 Y1 Z1\nG10 L2 P0 Z5\nZ1\nG10 L2 P3 X9\nG10 L2 P1 R30\n")
     assert [b.known for b in blocks[1:]] == [(True, True, False), ALL, ALL, (False, False, True)]
     assert blocks[1].end == (1.0, 1.0, -4.0)
     assert blocks[4].modal.rotation == 30.0
 
 
 def test_systems_the_program_sets_are_certain() -> None:
-    text = "G10 L2 P1 X0 Y0 Z0\nG10 L2 P2 X100 Y0 Z0\nG92.1 G49\nG0 X1 Y1 Z1\nG55\n"
+    text = "G54 G10 L2 P1 X0 Y0 Z0\nG10 L2 P2 X100 Y0 Z0\nG92.1 G49\nG0 X1 Y1 Z1\nG55\n"
     assert run(text)[-1].known == ALL
     assert run(text)[-1].end == (-99.0, 1.0, 1.0)
+
+
+def test_which_system_is_in_force_is_not_known_until_it_is_named() -> None:
+    origins = "G92.1 G49\nG10 L2 P1 X0 Y0 Z0\nG10 L2 P2 X100 Y0 Z0\n"
+    blocks = run(f"{origins}G0 X1 Y1 Z1\nG54\nX2 Y2 Z2\nG54\nG55\n")
+    assert [b.known for b in blocks[3:]] == [ALL, NONE, ALL, ALL, ALL]
+    assert [b.modal.system_told for b in blocks] == [False] * 4 + [True] * 4
+    # the one that is set may be the one in force
+    blocks = run("G0 X1 Y1 Z1\nG10 L2 P5 X0 Z3\nX1 Y1 Z1\nG10 L20 P1 Y1\nG10 L20 P0 X5\n")
+    assert [b.known for b in blocks] == [ALL, (False, True, False), ALL, (True, False, True), (True, False, True)]
+    with pytest.raises(ProgramError, match=r"line 1: G10 L2 P0 .* write G54 \(or another\) before it"):
+        run("G10 L2 P0 X1\n")
+
+
+@pytest.mark.parametrize("angle", [0.0, 7.0])
+def test_a_rotation_of_all_systems_is_known_whichever_is_in_force(angle: float) -> None:
+    told = [b.modal.rotation_told for b in run("G0 X0\nG54\n", Setup(inch=False, rotations={1: angle}))]
+    assert told == [False, True]
+    every = Setup(inch=False, rotations=dict.fromkeys(range(1, 10), angle))
+    assert run("G0 X0\n", every)[0].modal.rotation_told
+    assert not run("G0 X0\n", replace(every, rotations={**every.rotations, 9: 3.0}))[0].modal.rotation_told
 
 
 def test_tool_lengths_of_g10() -> None:

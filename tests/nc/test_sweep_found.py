@@ -10,7 +10,7 @@ pytestmark = pytest.mark.usefixtures("interpreter")
 FOUND = {
     "holes end at their first level": "G0 X0 Y0 Z20\nG99 G81 X10 Z-12 R1 F100\nG98 X20\nG80\nG4 P20\nG0 Z30",
     "a rotary axis alone goes home": "G0 X10 Y0 Z20 A90\nG4 P20\nG28 A0\nG4 P20\nG0 X30\nG0 X30 Y5 Z10",
-    "a rotary axis at home goes home": "G0 X10 Y0 Z20 A0\nG4 P20\nG28 A0\nG4 P20\nG0 X30\nG10 L20 P1 Z0\nG0 Z9",
+    "a rotary axis at home goes home": "G0 X10 Y0 Z20 A0\nG4 P20\nG28 A0\nG4 P20\nG0 X30\nG10 L20 P0 Z0\nG0 Z9",
     "a rapid turns only, behind a stop": "G0 X0 Y0 Z20\nG91 A-45\nG90\nG4 P20\nM1\nG0 Z20 A-45\nG4 P9\nG0 X5",
     "a level comes to be R behind a stop": (
         "G0 X0 Y0 Z2\nG4 P20\n/M0\nG98 G81 X10 Z-3 R5 F400\nG4 P9\nG81 X20 Z-8 R2\nX30\nG80\nG0 Z20"

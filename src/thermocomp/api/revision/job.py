@@ -281,11 +281,9 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
 
 def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
     """Return what the header says."""
-    setup, place = job.revision.setup, list[str]()
-    if job.drift.by_position:
-        place = headers.describe_place(setup, job.revision.elsewhere, job.drift.axes)
-    return [
-        f"thermocomp {__version__}, {job.when.date()}, for {setup.controller}",
+    place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
+    facts = [
+        f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
         f"program {job.program.name}",
         *headers.describe_models(job.models),
         *headers.told_taken(job.taken),
@@ -294,8 +292,9 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
         job.method,
         headers.describe_bound(bounds),
         *place,
-        *headers.describe_proof(proof),
     ]
+    # the first line says that it has been revised
+    return [*facts, *headers.describe_proof(proof, job.revision.header_lines - len(facts) - 1)]
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:

@@ -75,7 +75,7 @@ def describe_place(job: Job, done: Done) -> list[str]:
         return []
     revision = job.revision
     cost = headers.cost(revision.elsewhere, job.drift.axes)
-    return [f"it is made for {headers.describe_origins(revision.setup)}; {cost}"]
+    return [f"it is made for {headers.describe_origins(revision)}; {cost}"]
 
 
 def explain_nothing(job: Job, done: Done) -> str:

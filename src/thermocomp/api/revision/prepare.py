@@ -6,6 +6,7 @@ from itertools import islice
 from pathlib import Path
 
 from thermocomp.adapters.linuxcnc import rs274
+from thermocomp.adapters.linuxcnc.verification.verify import foresee_sentence
 from thermocomp.api.revision import headers
 from thermocomp.api.revision.job import ALL_THE_SAME, Job, Paths
 from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
@@ -71,7 +72,8 @@ def prepare_job(
     method = way.made(setup, drift.driven)
     models = _files(found, drifting.hashes())
     taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
-    header_lines = headers.count_lines(models, taken, by_position=drift.by_position, unproved=way.unproved)
+    states = "" if way.unproved else foresee_sentence(setup)
+    header_lines = headers.count_lines(models, taken, states, by_position=drift.by_position)
     revision = Revision(setup, kinematics, drift, method, way.demand(), header_lines, not way.no_split)
     _check_interpreter(way, setup, diameters=controller.diameter is not None)
     if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:

@@ -37,6 +37,8 @@ class Modal:
         G7: words of X are diameters.
     system : int
         Work coordinate system: 1 is G54, 6 G59, 7 to 9 G59.1 to G59.3; 100 + p is G54.1 Pp.
+    system_told : bool
+        The program has said which; else it is taken for G54.
     rotation : float
         Of the program's coordinates about Z, stored or by G68 [deg].
     rotation_told : bool
@@ -67,6 +69,7 @@ class Modal:
     cutter: bool = False
     diameter: bool = False
     system: int = 1
+    system_told: bool = False
     rotation: float = 0.0
     rotation_told: bool = False
     origin_told: bool = False

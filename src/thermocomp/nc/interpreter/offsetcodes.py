@@ -2,12 +2,11 @@
 
 from thermocomp.nc.interpreter.block import Block, Known, Point
 from thermocomp.nc.interpreter.codes import ROTARY
-from thermocomp.nc.interpreter.offsets import EXTERNAL, mark_axes
+from thermocomp.nc.interpreter.offsets import EXTERNAL, LAST, mark_axes
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
 
 _SYSTEMS = {f"G{53 + n}": n for n in range(1, 7)} | {f"G59.{n}": 6 + n for n in range(1, 4)}
-_G59_3 = 9
 _LENGTH_CERTAIN: Known = (True, True, True)
 
 
@@ -132,7 +131,7 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
             raise words.error("R with G10 L2 is not Fanuc's; remove it")
         top = 6 if kind == 2 else 300
     else:
-        system, rotation, top = number or offsets.system, words.values.get("R"), 9
+        system, rotation, top = number or offsets.system, words.values.get("R"), LAST
         if "I" in words.values or "J" in words.values or (rotation is not None and kind == 20):
             raise words.error(f"G10 L{kind} takes X Y Z{' and R' if kind == 2 else ''} only")
     if number > top:
@@ -141,10 +140,15 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
         offsets.name_origin(system, state.machine, values, state.known)
         if system == offsets.system:
             block.kind = "set"
-            state.renamed(_LENGTH_CERTAIN)
+            state.renamed(mark_axes(_LENGTH_CERTAIN, values, to=offsets.named or not number))
         return
+    if not (number or offsets.named or state.fanuc):
+        raise words.error(
+            "G10 L2 P0 sets the work coordinate system in force, and the program has not said which that is; write G54 "
+            "(or another) before it, or its number for P"
+        )
     offsets.set_origin(system, values, rotation, add=state.fanuc and not state.modal.absolute)
-    if system in (offsets.system, EXTERNAL):
+    if system in (offsets.system, EXTERNAL) or not offsets.named:
         state.renamed(mark_axes(_LENGTH_CERTAIN, values, to=False))
         state.placed()
         if rotation is not None or (offsets.rotation and (0 in values or 1 in values)):
@@ -163,7 +167,7 @@ def _length(state: InterpreterState, words: BlockWords, block: Block, kind: int,
     if kind != 1:
         block.kind = "set"
         offsets = state.offsets
-        system = offsets.system if kind == 10 else _G59_3
+        system = offsets.system if kind == 10 else LAST
         shift = offsets.shift[2] if kind == 10 else 0.0
         length = state.machine[2] - offsets.origins.get(system, (0.0, 0.0, 0.0))[2] - shift - length
         certain = kind == 10 and state.known[2] and offsets.certain_tool[2]

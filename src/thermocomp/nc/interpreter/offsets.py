@@ -13,6 +13,8 @@ _ZERO: Point = (0.0, 0.0, 0.0)
 _NEVER: Known = (False, False, False)
 _ALL: Known = (True, True, True)
 
+#: LinuxCNC: the last work coordinate system, G59.3
+LAST = 9
 #: Fanuc: the external offset, added to all work coordinate systems
 EXTERNAL = 0
 
@@ -48,6 +50,8 @@ class Offsets:
 
     def __init__(self, setup: Setup) -> None:
         self.system = 1
+        #: the program has said which system is in force; until then it is taken for G54
+        self.named = False
         self.origins: dict[int, Point] = dict(setup.offsets)
         self.rotations: dict[int, float] = dict(setup.rotations)
         self._certain_origins: dict[int, Known] = {}
@@ -84,7 +88,7 @@ class Offsets:
     @property
     def certain(self) -> Known:
         """Per axis, whether program coordinates tell machine coordinates."""
-        origin = self._certain_origins.get(self.system, _NEVER)
+        origin = self._certain_origins.get(self.system, _NEVER) if self.named else _NEVER
         return combine_known(origin, combine_known(self._certain_shift, self.certain_tool))
 
     @property
@@ -95,7 +99,8 @@ class Offsets:
     @property
     def rotation_told(self) -> bool:
         """Whether program or setup say how the system in force is turned."""
-        return self.system in self.rotations
+        alike = len({self.rotations.get(system, math.nan) for system in range(1, LAST + 1)}) == 1
+        return self.system in self.rotations and (self.named or alike)
 
     def state(self) -> tuple[object, ...]:
         """Return all that tells whether something has changed."""
@@ -124,12 +129,12 @@ class Offsets:
 
     def select(self, system: int) -> Known:
         """G54 and its like; returns per axis whether a known program coordinate still is."""
-        if system == self.system:
+        if system == self.system and self.named:
             return _ALL
         before, turned = self._certain_origins.get(self.system, _NEVER), self.rotation
-        self.system = system
+        still = combine_known(before, self._certain_origins.get(system, _NEVER)) if self.named else _NEVER
+        self.system, self.named = system, True
         self._update()
-        still = combine_known(before, self._certain_origins.get(system, _NEVER))
         # where the coordinates turn, X and Y depend on each other
         return (False, False, still[2]) if turned != self.rotation else still
 

@@ -89,6 +89,7 @@ class InterpreterState:
         offsets = self.offsets
         self.changed(
             system=offsets.system,
+            system_told=offsets.named,
             rotation=offsets.rotation,
             rotation_told=self.fanuc or offsets.rotation_told,
             origin_told=offsets.origin_told,

@@ -55,8 +55,8 @@ def clean_comment(text: str) -> str:
     return "".join(c if " " <= c <= "~" else "_" for c in text.translate(_TOLD))
 
 
-def wrap_text(text: str, lines: int) -> list[str]:
-    """Return a text in so many lines of a header; dots stand for what does not fit."""
+def wrap_text(text: str, lines: int | None = None) -> list[str]:
+    """Return a text in lines of a header, as many as it takes; dots stand for what does not fit into so many."""
     return textwrap.wrap(text, ROOM, max_lines=lines, placeholder=" ...")
 
 

@@ -92,9 +92,11 @@ def refuse_untold_rotation(block: Block, carried: Vector) -> None:
     """Raise `ProgramError` if a rotation that is stored in the controller would turn corrections of X and Y."""
     if not (carried[0] or carried[1]) or block.modal.rotation_told:
         return
-    name = system_name(block.modal.system)
+    name, told = system_name(block.modal.system), block.modal.system_told
+    which = f"write {name} before the first move, and which (--rotation '{name}=12 deg')"
     raise ProgramError(
         block.line.number,
-        f"X or Y is corrected, and a rotation of {name} that is stored in the controller (G10 L2 R) would turn that: "
-        f"say that there is none (--rotation none) or which (--rotation '{name}=12 deg')",
+        f"X or Y is corrected, and a rotation of {name if told else 'the work coordinate system in force'} that is "
+        "stored in the controller (G10 L2 R) would turn that: say that there is none (--rotation none) or "
+        + (f"which (--rotation '{name}=12 deg')" if told else which),
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import ProgramError
-from thermocomp.nc.interpreter.block import Block, Known, Modal
+from thermocomp.nc.interpreter.block import Block, Known, Modal, system_name
 from thermocomp.nc.interpreter.codes import ROTARY
 from thermocomp.nc.rewrite.frame import Frame, Vector
 from thermocomp.nc.rewrite.text import LONGEST, Digits, part_comments
@@ -181,8 +181,12 @@ class CorrectionMethod(ABC):
                 "G10 L10 and L11 take the tool's length from where it stands, which holds the drift already; "
                 "measure tools outside the program",
             )
-        if int(block.values.get("P", 0)) not in (0, block.modal.system):
-            raise ProgramError(block.line.number, "G10 L20 for a system that is not in force is not supported")
+        if (number := int(block.values.get("P", 0))) and not (block.modal.system_told and number == block.modal.system):
+            raise ProgramError(
+                block.line.number,
+                "G10 L20 for a system that may not be in force is not supported; write "
+                f"{system_name(number)} before it, or P0",
+            )
         return True
 
     def leave(self, block: Block) -> None:

@@ -82,6 +82,8 @@ class Revision:
         What the correction leaves of the drift in the cuts.
     elsewhere : Elsewhere
         What another work offset would cost, where the drift depends on the place.
+    taken_system : bool
+        The tool cut before the program said in which work coordinate system: G54 was taken.
     corrected : bool
         A correction was in force at some time.
     lines, changed : int
@@ -109,6 +111,7 @@ class Revision:
     split: bool = True
     left: Left = field(default_factory=Left, init=False)
     elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
+    taken_system: bool = field(default=False, init=False)
     corrected: bool = field(default=False, init=False)
     lines: int = field(default=0, init=False)
     changed: int = field(default=0, init=False)
@@ -211,6 +214,7 @@ class Revision:
                 if block.kind == "cycle":
                     knots = [(0.0, change.inner), (1.0, change.inner)]
                 cut = self._cut(block, samples, knots, demand)
+                self.taken_system |= not block.modal.system_told
                 if self.drift.by_position:
                     self.elsewhere.take(end, point, self.drift)
             else:

@@ -22,6 +22,7 @@ REMEDIES: Final[Mapping[str, str]] = MappingProxyType(
         "rotation": "say --rotation none if none is stored, or state it, such as --rotation 'G54=0 deg'",
         "G92": "say --no-g92 if no G92 or G52 is in force when the program starts",
         "G98/G99": "write G98 or G99 before the first cycle, or state it: --startup G98",
+        "system in force": "write G54 before the first move",
         "origins": "state them, such as --origin 'G54=0 mm, 0 mm, 0 mm'",
         "tool lengths": "state them, such as --tool '1=120 mm'",
         "homes": "state it: --home '0 mm, 0 mm, 0 mm'; G30 cannot be stated",
@@ -62,7 +63,7 @@ def list_unstated(setup: Setup) -> tuple[str, ...]:
     held = {
         "rotation": all(system in setup.rotations for system in SYSTEMS),
         "G92": setup.no_shift,
-        "G98/G99": startup.modal(setup).retract_stated,
+        "G98/G99": not {"G98", "G99"}.isdisjoint(setup.startup.split()),
         "homes": False,
         "unit": setup.inch is not None,
         "optional lines": setup.skip_optional,
@@ -93,6 +94,8 @@ def state(setup: Setup, number: int, what: frozenset[str] | set[str]) -> Control
         changes["shift"] = other.shift
     if "G98/G99" in what and one:
         changes["startup"] = base.startup.replace("G99", "G98")
+    if "system in force" in what:
+        changes["system"] = 1 + number
     if "origins" in what:
         # the rotary axes' origins are never stated
         given = {s: (*origin[:3], *other.origins[s][3:]) for s, origin in base.origins.items()}

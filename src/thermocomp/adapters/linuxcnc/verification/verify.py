@@ -40,9 +40,7 @@ class Proof(NamedTuple):
     @property
     def sentence(self) -> str:
         """In which states it was proved."""
-        held = ", ".join(("what the program says", *self.held))
-        drawn = (f"{name} (in half of them)" if name in states.HALF else name for name in self.drawn)
-        return f"in {self.states} controller states; the same in all: {held}; not the same: {', '.join(drawn)}"
+        return _say_states(self.states, self.held, self.drawn)
 
 
 class _Proving(NamedTuple):
@@ -129,7 +127,8 @@ def prove(
     if (reason := rs274.find_obstacle()) is not None:
         raise Unprovable(reason)
     if setup.controller == "linuxcnc":
-        return _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
+        proof = _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
+        return proof._replace(held=_assumed(setup, proof.held))
     with TemporaryDirectory(prefix="translation-") as folder:
         try:
             first = _Translated.of(original, Path(folder) / "original.ngc", setup)
@@ -138,12 +137,33 @@ def prove(
             raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
         origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
         proof = _prove(_Proving(first.path, second.path, ledger, first.setup, origin), progress)
-        # a Fanuc stores no rotation, but G68 may have been left on; and with G52 or G68 no G92 can be drawn
-        assumed = {"no rotation": "no G68 at the start (assumed)"}
-        if not setup.no_shift:
-            assumed["no G92"] = "no G92 at the start (assumed)"
-        held = (assumed.get(word, word) for word in proof.held)
-        return proof._replace(held=("as LinuxCNC runs its translation", *held))
+        return proof._replace(held=_assumed(setup, proof.held))
+
+
+def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
+    """Return what is the same in all states, and which of that nobody has stated."""
+    if setup.controller == "linuxcnc":
+        # all moves of X and all arcs would be others
+        return (*held, "G8 and G91.1 at the start (assumed)")
+    # a Fanuc stores no rotation, but G68 may have been left on; and with G52 or G68 no G92 can be drawn
+    assumed = {"no rotation": "no G68 at the start (assumed)"}
+    if not setup.no_shift:
+        assumed["no G92"] = "no G92 at the start (assumed)"
+    return ("as LinuxCNC runs its translation", *(assumed.get(word, word) for word in held))
+
+
+def foresee_sentence(setup: Setup) -> str:
+    """Return what a proof will say of its states, but for what does not run in all of them."""
+    drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
+    return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
+
+
+def _say_states(count: int, held: Sequence[str], drawn: Sequence[str]) -> str:
+    named = (f"{name} (in half of them)" if name in states.HALF else name for name in drawn)
+    return (
+        f"in {count} controller states; the same in all: {', '.join(('what the program says', *held))}; "
+        f"not the same: {', '.join(named)}"
+    )
 
 
 def _same(lines: Integers) -> Integers:
