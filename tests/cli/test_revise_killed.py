@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -51,3 +52,20 @@ def test_the_next_run_clears_away_what_a_killed_one_has_left(job_folder: Path) -
     assert hidden() == []
     assert Path("b.ngc").exists()
     assert not Path("a.ngc").exists()
+
+
+@pytest.mark.usefixtures("interpreter")
+def test_the_interpreter_s_folder_goes_too(job_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    temporary = job_folder / "tmp"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    code = "import sys, time\nfrom pathlib import Path\nfrom thermocomp.adapters.linuxcnc.rs274 import read\n"
+    code += "calls = read(Path(sys.argv[1]))\nnext(calls)\nprint('begun', flush=True)\ntime.sleep(60)\n"
+    with subprocess.Popen([sys.executable, "-c", code, "part.ngc"], stdout=subprocess.PIPE, text=True) as killed:
+        assert killed.stdout is not None
+        assert killed.stdout.readline() == "begun\n"
+        killed.kill()
+    assert len(list(temporary.iterdir())) == 1
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    assert revise(proved=True) == 0
+    assert not list(temporary.iterdir())

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import draft, publish, scratch
+from thermocomp.core.scratch import scratch
+from thermocomp.files.draft import draft, publish
 
 pytestmark = pytest.mark.skipif(find_spec("fcntl") is None, reason="files are not locked here")
 

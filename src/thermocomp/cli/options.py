@@ -2,7 +2,6 @@
 
 import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.scratch import scratch
 from thermocomp.core.zero import Zeroing
 from thermocomp.files.draft import refuse_existing
 
@@ -190,8 +190,8 @@ def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]"
         return read(paths)
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")
-    with tempfile.TemporaryDirectory(prefix="thermocomp-") as folder:
-        typed = Path(folder, "stdin.csv")
+    with scratch() as folder:
+        typed = folder / "stdin.csv"
         with typed.open("wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
         return read([typed if p == STDIN else p for p in paths])

@@ -1,47 +1,12 @@
-"""Write beside and move: a crash never leaves half a file where a whole one was, and what it leaves is cleared away.
+"""Write beside and move: a crash never leaves half a file where a whole one was."""
 
-Drafts stand in hidden folders beside their targets. The system holds a lock on each for as long as the run lives that
-has made it, however that ends: whoever can lock one knows that its run is dead, and removes it.
-"""
-
-import os
-import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 from thermocomp.core.exceptions import InputError
-
-_PREFIX = ".thermocomp-"
-_NAME = re.compile(re.escape(_PREFIX) + "[0-9a-f]{32}")
-_LOCK = "lock"
-
-
-@contextmanager
-def scratch(folder: Path) -> Iterator[Path]:
-    """Give a new folder for drafts in another one; it is removed at the end.
-
-    What killed runs have left in `folder` is removed too, what living ones use is not.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files will go: moving a draft there is one step, as both are on one disk.
-
-    Yields
-    ------
-    Path
-        Of a folder that holds nothing but its lock.
-    """
-    _clear(folder)
-    path, lock = _made(folder)
-    try:
-        yield path
-    finally:
-        shutil.rmtree(path, ignore_errors=True)
-        os.close(lock)
+from thermocomp.core.scratch import scratch
 
 
 @contextmanager
@@ -131,50 +96,3 @@ def _link(path: Path, target: Path) -> None:
     except OSError:  # a disk without links
         with path.open("rb") as source, target.open("xb") as copy:
             shutil.copyfileobj(source, copy)
-
-
-def _made(folder: Path) -> tuple[Path, int]:
-    """Return a new folder, and its lock."""
-    while True:
-        path = folder / f"{_PREFIX}{uuid4().hex}"
-        path.mkdir()
-        try:
-            lock = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-        except FileNotFoundError:  # taken for a dead one before it had its lock
-            continue
-        if _locked(lock) and not (path / _LOCK).exists():  # or just after
-            os.close(lock)
-            continue
-        return path, lock
-
-
-def _locked(lock: int, *, wait: bool = True) -> bool:
-    """Lock a file; return False where that cannot be: then nothing of others is removed either."""
-    try:
-        import fcntl  # not on Windows
-
-        fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except (ImportError, OSError):  # or somebody has it, or the disk knows no locks
-        return False
-    return True
-
-
-def _clear(folder: Path) -> None:
-    """Remove the folders of dead runs."""
-    found: list[Path] = []
-    with suppress(OSError):
-        found = [p for p in folder.iterdir() if _NAME.fullmatch(p.name)]
-    for path in found:
-        try:
-            lock = os.open(path / _LOCK, os.O_RDWR)
-        except FileNotFoundError:
-            with suppress(OSError):
-                path.rmdir()  # killed before it had a lock: there is nothing in it
-            continue
-        except OSError:
-            continue
-        try:
-            if _locked(lock, wait=False):
-                shutil.rmtree(path, ignore_errors=True)
-        finally:
-            os.close(lock)

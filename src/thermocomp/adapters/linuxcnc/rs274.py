@@ -6,7 +6,6 @@ with Debian's package linuxcnc-uspace and needs neither a machine nor a display.
 
 import math
 import subprocess
-import tempfile
 from collections.abc import Generator, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from thermocomp.adapters.linuxcnc import rs274process
 from thermocomp.adapters.linuxcnc.rs274process import AXES, InterpreterJob, InterpreterRun
 from thermocomp.adapters.linuxcnc.stored import HIGHEST_TOOL, Stored
 from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.scratch import scratch
 
 __all__ = [
     "AXES", "HIGHEST_TOOL", "ORIGIN", "PACKAGE", "PLANE_AXES", "ArcPath", "Canonical", "Place", "ProgramFrame",
@@ -143,11 +143,11 @@ def find_obstacle() -> str | None:
     python = rs274process.PYTHON
     if not python.exists():
         return f"{python} is not here; {advice}"
-    with tempfile.TemporaryDirectory(prefix="rs274-") as folder:
+    with scratch() as folder:
         trying = [str(python), rs274process.ISOLATED, "-c", "import gcode"]
         if subprocess.run(trying, capture_output=True, cwd=folder, check=False).returncode:
             return f"{python} cannot import gcode; {advice}"
-        trial = Path(folder, "trial.ngc")
+        trial = folder / "trial.ngc"
         trial.write_text("G21 M3 S7\nG0 X1\nM5\nM2\n", encoding="ascii")
         try:
             kinds = [call.kind for call in read(trial)]

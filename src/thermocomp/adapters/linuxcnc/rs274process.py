@@ -8,8 +8,8 @@ cannot tell of comments that are not.
 import json
 import os
 import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, NamedTuple, NoReturn
@@ -18,6 +18,7 @@ import numpy as np
 
 from thermocomp.adapters.linuxcnc.stored import HIGHEST_TOOL, Stored
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.core.scratch import scratch
 
 #: The Python of the Debian package, which has the module `gcode`.
 PYTHON = Path("/usr/bin/python3")
@@ -92,8 +93,8 @@ class InterpreterRun:
         if len(subroutines) > MOST_FOLDERS:
             raise InputError(f"{len(subroutines)} folders of subprograms; the interpreter takes {MOST_FOLDERS}")
         self.jobs, self.path, self._number = jobs, path, -1
-        self._home = tempfile.TemporaryDirectory(prefix="rs274-")
-        self.folder = Path(self._home.name)
+        self._home = ExitStack()
+        self.folder = self._home.enter_context(scratch())
         copy = self.folder / "program.ngc"
         with path.open("rb") as program, copy.open("wb") as written:
             while part := program.read(_PIPE):
@@ -118,7 +119,7 @@ class InterpreterRun:
     def __exit__(self, *_: object) -> None:
         self.process.kill()  # does nothing if it has ended
         self.process.communicate()
-        self._home.cleanup()
+        self._home.close()
 
     def blocks(self) -> Iterator[CallBlock]:
         """Yield what the interpreter tells of the next job; the last record is ``done``.

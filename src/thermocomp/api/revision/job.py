@@ -14,9 +14,10 @@ from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prov
 from thermocomp.api.revision import headers
 from thermocomp.api.revision.expanded import write_expanded
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.core.scratch import scratch
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.files import jobstate, ncprogram
-from thermocomp.files.draft import publish, scratch
+from thermocomp.files.draft import publish
 from thermocomp.nc.parser.tokens import program_lines
 from thermocomp.nc.rewrite import diff, header
 from thermocomp.nc.rewrite.course import Bound, Course, Run

@@ -6,7 +6,6 @@ It is run in eight stored controllers: what is stated is the same in all of them
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from thermocomp.adapters.linuxcnc.verification.comparison import Found, Lines, R
 from thermocomp.adapters.linuxcnc.verification.ledger import Integers, Ledger, Shift
 from thermocomp.adapters.linuxcnc.verification.translation import Translator, UntranslatableError
 from thermocomp.core.exceptions import ProgramError, Unprovable
+from thermocomp.core.scratch import scratch
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.parser.tokens import program_lines
 
@@ -129,10 +129,10 @@ def prove(
     if setup.controller == "linuxcnc":
         proof = _prove(_Proving(original, revised, ledger, setup, Lines(_same, ledger.originals)), progress)
         return proof._replace(held=_assumed(setup, proof.held))
-    with TemporaryDirectory(prefix="translation-") as folder:
+    with scratch() as folder:
         try:
-            first = _Translated.of(original, Path(folder) / "original.ngc", setup)
-            second = _Translated.of(revised, Path(folder) / "revised.ngc", setup)
+            first = _Translated.of(original, folder / "original.ngc", setup)
+            second = _Translated.of(revised, folder / "revised.ngc", setup)
         except UntranslatableError as e:
             raise Unprovable(f"line {e.line} cannot be said in LinuxCNC's words: {e.reason}") from e
         origin = Lines(first.lines, lambda lines: ledger.originals(second.lines(lines)), divided=False)
