@@ -152,7 +152,7 @@ def test_subprograms_in_other_files(run: Run, tmp_path: Path) -> None:
     (folder / "far.ngc").write_text("o<far> sub\n\nG0 Y[#1/0]\no<far> endsub\nM2\n", encoding="ascii")
     calls = run("G21\no<beside> call [4]\nG0 Z1\nM2\n")
     assert [(c.line, c.file) for c in calls if c.kind == "rapid"] == [(2, "beside.ngc"), (3, "")]
-    with pytest.raises(ProgramError, match="seeking o-word: o<far>"):
+    with pytest.raises(ProgramError, match=r"line 1: .*refuses it: o<far> is not there: .*\(--subroutines\)"):
         run("o<far> call [1]\nM2\n")
     with pytest.raises(ProgramError, match="line 1: the interpreter refuses it: Attempt to divide by zero"):
         run("o<far> call [1]\nM2\n", subroutines=[folder])
@@ -192,6 +192,12 @@ def test_refused_with_line_and_words(run: Run, text: str, line: int, reason: str
 def test_an_endless_loop_ends(run: Run) -> None:
     with pytest.raises(ProgramError, match="takes more than 1 s to interpret: has it an endless loop"):
         run("#1 = 1\no1 while [#1 GT 0]\n#1 = 1\no1 endwhile\nM2\n", seconds=1)
+
+
+@pytest.mark.long
+def test_a_loop_that_does_nothing_ends_before_its_time(run: Run) -> None:
+    with pytest.raises(ProgramError, match="line [3-5]: .* run for 20 s and done nothing: has it an endless loop"):
+        run("G21\nG0 X1\no1 while [1]\n#1 = 1\no1 endwhile\nM2\n", seconds=200)
 
 
 def test_a_crash_is_an_error(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -270,7 +270,7 @@ def test_integers_can_be_refused() -> None:
 
 def test_numbers_that_are_no_lengths_need_no_decimal_point() -> None:
     setup = Setup("fanuc", inch=False, integers="refuse")
-    text = "G05.1 Q1\nG0 X1.\nG05.1 Q1 X0 Y0 Z0\nG05 P10000\nG08 P1\nG187 P2 E0.01\nG61.1\nG64\nG43 H1 Z5.\n"
+    text = "G05.1 Q1 R3\nG0 X1.\nG05.1 Q1 X0 Y0 Z0\nG05 P10000\nG08 P1\nG187 P2 E0.01\nG61.1\nG64\nG43 H1 Z5.\n"
     blocks = run(text + "G99 G81 X1. Z-1. R1. F100 K3\nX2. L2\nG80\n", setup)
     assert [len(b.moves) for b in blocks] == [0, 1, 0, 0, 0, 0, 0, 0, 1, 13, 9, 0]
     assert blocks[2].end[0] == 1.0

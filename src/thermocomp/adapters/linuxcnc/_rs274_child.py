@@ -21,8 +21,10 @@ import re
 import resource
 import struct
 import sys
+import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from typing import Any, BinaryIO
@@ -30,6 +32,8 @@ from typing import Any, BinaryIO
 MM = 25.4
 #: records of a block
 BLOCK = 2048
+#: processor time after which a program that does nothing is refused [s]
+MOST_IDLE = 20.0
 
 
 def load_sibling(name: str) -> Any:
@@ -79,6 +83,8 @@ class Canon:
         self.name.argtypes = (P, ctypes.c_char_p, ctypes.c_size_t)
         self.buffer = ctypes.create_string_buffer(512)
         self.alone = True  # no other file has been opened
+        self.flushed = self.told = 0
+        self.last = 0.0  # processor time when a call was last seen [s]
 
     def begin(self, job: dict[str, Any]) -> None:
         """Take what the program is run in."""
@@ -172,6 +178,7 @@ class Canon:
         self.out.writelines(self.records)
         self.out.write(more)
         self.out.flush()
+        self.flushed += len(self.records)
         self.records.clear()
         self.more.clear()
 
@@ -361,6 +368,14 @@ class Canon:
 
     # --- what the module asks ---
     def check_abort(self) -> bool:
+        """Asked about once in a second."""
+        told, now = self.flushed + len(self.records), time.process_time()
+        if told != self.told:
+            self.told, self.last = told, now
+        elif now - self.last > MOST_IDLE and not self.hooks.failure:
+            self.where()
+            reason = f"it has run for {MOST_IDLE:.0f} s and done nothing: has it an endless loop?"
+            self.hooks.failure = RefusedError(self.line, reason)
         return self.hooks.failure is not None
 
     def get_tool(self, index: int) -> tuple[float, ...]:
@@ -395,7 +410,9 @@ def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
     tools._Z13tooldata_loadPKcPPc(job["table"].encode(), None)
     ctypes.c_int.in_dll(ctypes.CDLL(gcode.__file__), "_task").value = job["task"]
     canon.begin(job)
-    result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
+    result = 0
+    with suppress(KeyboardInterrupt):  # what `check_abort` makes of a failure
+        result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
     failure = canon.hooks.failure
     if isinstance(failure, RefusedError):
         canon.line, reason = failure.args

@@ -7,6 +7,7 @@ cannot tell of comments that are not.
 
 import json
 import os
+import re
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -34,6 +35,9 @@ RECORD = np.dtype([("kind", "<u2"), ("count", "<u2"), ("line", "<i4"), ("values"
 _UNITS = np.array((MM, MM, MM, 1.0, 1.0, 1.0, MM, MM, MM, 1.0))
 _ASCII = bytes(range(128)) + b"?" * 128
 _PIPE = 1 << 20
+#: the interpreter's words for a subprogram that it does not find
+_NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: from line: \d+)?.*")
+_MISSING = r"\1 is not there: of a subprogram name the folder (--subroutines); a loop or a branch needs its end"
 
 
 class CallBlock(NamedTuple):
@@ -159,7 +163,7 @@ class InterpreterRun:
             line, kind = int(records["line"][-1]), int(records["kind"][-1])
             done = kind == self.codes["done"]
             if kind == self.codes["error"]:
-                refusal = block.more[-1]
+                refusal = _NOT_THERE.sub(_MISSING, block.more[-1])
                 block = CallBlock(records[:-1], block.more)
             if len(block.records):
                 yield block

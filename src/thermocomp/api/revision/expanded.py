@@ -1,7 +1,7 @@
 """A program is written out in plain lines before it is revised (``--expand``)."""
 
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from thermocomp.adapters.linuxcnc.expansion.expand import expand
@@ -12,7 +12,12 @@ from thermocomp.nc.parser.tokens import program_lines
 
 
 def write_expanded(
-    program: Path, out: Path, setup: Setup, diameters: Mapping[int, float] | None, subroutines: Sequence[Path]
+    program: Path,
+    out: Path,
+    setup: Setup,
+    diameters: Mapping[int, float] | None,
+    subroutines: Sequence[Path],
+    progress: Callable[[int], object],
 ) -> "array[int]":
     """Write a program out: LinuxCNC's by its interpreter, a Fanuc's by an unroller of our own.
 
@@ -24,6 +29,8 @@ def write_expanded(
         Of the tools [mm], for LinuxCNC.
     subroutines : sequence of Path
         Folders of subprograms, for LinuxCNC.
+    progress : callable
+        Told how many lines are written of LinuxCNC's.
 
     Returns
     -------
@@ -44,6 +51,7 @@ def write_expanded(
             diameters=diameters,
             block_delete=setup.skip_optional,
             subroutines=subroutines,
+            progress=progress,
         ).sources
     sources = array("I")
     with ncprogram.open_to_read(program) as texts, ncprogram.open_to_write(out) as file:

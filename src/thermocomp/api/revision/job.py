@@ -1,6 +1,7 @@
 """One revision of a program: the files it reads and writes, all of them or none."""
 
 import time
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -161,7 +162,7 @@ def _revise(job: Job, phase: Phase) -> Done:
         source, lines = job.program, None
         if paths.expanded is not None:
             source = drafts[paths.expanded]
-            lines = write_expanded(job.program, source, job.revision.setup, job.diameters, job.subroutines)
+            lines = _expand(job, source, phase)
         ledger, course = Ledger(), Course()
         watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()
@@ -201,6 +202,18 @@ def _revise(job: Job, phase: Phase) -> Done:
         # the program comes last: where it is, all is
         publish({path: drafts[path] for path in reversed(paths.all())}, overwrite=job.overwrite)
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
+
+
+def _expand(job: Job, source: Path, phase: Phase) -> "array[int]":
+    with phase("expanding") as tell:
+        return write_expanded(
+            job.program,
+            source,
+            job.revision.setup,
+            job.diameters,
+            job.subroutines,
+            lambda lines: tell(0.0, f"{lines:,} lines"),
+        )
 
 
 def _rehearse(job: Job, source: Path, phase: Phase) -> None:

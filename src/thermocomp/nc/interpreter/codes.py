@@ -250,7 +250,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
 
 #: letters that are refused whatever stands with them
 REFUSED_LETTERS: Final[dict[str, str]] = {
-    "U": "the axes U V W are not supported",
+    "U": "the axes U V W are not supported; a dwell is G4 P, or G4 X of a Fanuc",
     "V": "the axes U V W are not supported",
     "W": "the axes U V W are not supported",
     "@": "polar coordinates (@ ^) are not supported; write X and Y",

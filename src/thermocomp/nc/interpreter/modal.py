@@ -24,7 +24,9 @@ def lengths(state: InterpreterState, words: BlockWords) -> None:
     setup, inch, groups = state.setup, state.modal.inch, words.groups
     motion = groups.get("motion", state.modal.motion)
     none = ""  # letters that count here: K repeats a Fanuc's cycle, Q is a number but in cycles, splines and G64
-    if "high speed" in groups or not (motion in CYCLES or motion == "G5" or "path" in groups):
+    if "high speed" in groups:
+        none = "QR"
+    elif not (motion in CYCLES or motion == "G5" or "path" in groups):
         none = "Q"
     elif state.fanuc and motion in CYCLES:
         none = "K"

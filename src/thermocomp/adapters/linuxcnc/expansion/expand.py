@@ -2,7 +2,7 @@
 
 import re
 from array import array
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -22,6 +22,8 @@ _ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
 _DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
 #: seeds of the controllers that a program is written from, and that it is proved in
 _WRITTEN, _PROVED = (1, 2), (3, 4)
+#: lines after which it is told how many are written
+_OFTEN = 1000
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,7 @@ def expand(
     subroutines: Sequence[Path] = (),
     user_codes: bool = False,
     seconds: int = 600,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> Expansion:
     """Write a program out in plain lines that do the same on every machine, whatever its origins and tool lengths.
 
@@ -123,6 +126,8 @@ def expand(
         Keep M100 to M199; without it they are refused, for nobody knows what they do.
     seconds : int
         Processor time each run may take [s].
+    progress : callable, optional
+        Told how many lines are written.
 
     Returns
     -------
@@ -150,6 +155,8 @@ def expand(
             for text, line in _lines(path, around):
                 file.write(text + "\n")
                 sources.append(line)
+                if not len(sources) % _OFTEN:
+                    progress(len(sources))
         for seed in _PROVED:
             left: tuple[dict[int, float], dict[int, float]] = ({}, {})
             stored = around.controller(seed)
