@@ -196,7 +196,7 @@ def test_an_endless_loop_ends(run: Run) -> None:
 
 @pytest.mark.long
 def test_a_loop_that_does_nothing_ends_before_its_time(run: Run) -> None:
-    with pytest.raises(ProgramError, match="line [3-5]: .* run for 20 s and done nothing: has it an endless loop"):
+    with pytest.raises(ProgramError, match=r"line [3-5]: .* run for 20 s and done nothing: has it an endless loop"):
         run("G21\nG0 X1\no1 while [1]\n#1 = 1\no1 endwhile\nM2\n", seconds=200)
 
 
