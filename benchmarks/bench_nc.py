@@ -98,8 +98,8 @@ def revise(program: Path, proof: str) -> dict[str, float]:
     sys.modules["matplotlib"] = None  # type: ignore[assignment]
     from thermocomp.adapters.linuxcnc import rs274process
     from thermocomp.cli.app import run
+    from thermocomp.core.inputs import Input
     from thermocomp.core.lineardynamic import LinearDynamic
-    from thermocomp.core.model import Input
     from thermocomp.files import modelfile
 
     if proof == "unproved":

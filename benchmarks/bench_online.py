@@ -16,7 +16,7 @@ from sklearn.preprocessing import StandardScaler
 
 from thermocomp.core import lagbank
 from thermocomp.core.correction import Limits
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.reading import Reading
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.runtime.compensator import Compensator

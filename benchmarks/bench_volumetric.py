@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.components import COMPONENTS
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Axis, Machine, Source
-from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.profile import PolynomialProfile

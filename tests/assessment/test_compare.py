@@ -13,9 +13,9 @@ from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import Robustness, pool_robustness, stress
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError, ModelFileError
+from thermocomp.core.inputs import Support
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile

@@ -9,7 +9,7 @@ from profilemachine import day, planted, profiles
 
 from thermocomp.assessment.position import n_pieces, study, study_all
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import Support
+from thermocomp.core.inputs import Support
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.position import PositionOptions, fit_position
 from thermocomp.models.positionoptions import SETTINGS, fill_options

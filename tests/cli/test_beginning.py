@@ -11,7 +11,7 @@ from smallmachine import small_machine
 
 from thermocomp.assessment.replay import replay_compensated as replayed
 from thermocomp.cli.app import run
-from thermocomp.core.model import HonestError
+from thermocomp.core.provenance import HonestError
 from thermocomp.files import modelfile, recordings
 from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle

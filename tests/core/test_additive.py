@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input, Support
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.terms import Variable
 from thermocomp.files import modelfile
 

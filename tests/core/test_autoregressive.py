@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet, Ticking, find_largest_root
 from thermocomp.core.exceptions import InputError, ReadingError
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.files import modelfile
 

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Network, Perceptron
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable, second_order_terms

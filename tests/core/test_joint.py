@@ -13,9 +13,10 @@ from smallmachine import small_machine
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import ErrorModel, Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.stack import Stack

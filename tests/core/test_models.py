@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import ErrorModel, Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.stack import Stack
 from thermocomp.core.terms import TermTable, Variable, second_order_terms

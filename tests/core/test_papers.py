@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from thermocomp.core.correction import Deviation
-from thermocomp.core.model import Input, Provenance
+from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.provenance import Provenance
 from thermocomp.core.terms import Term, Variable
 from thermocomp.files import modelfile
 

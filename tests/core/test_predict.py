@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing

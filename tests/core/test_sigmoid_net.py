@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.network import Affine, Network, Perceptron, sigmoid
 from thermocomp.files import modelfile
 

@@ -11,11 +11,13 @@ import pytest
 
 from thermocomp.core.components import BY_CODE, COMPONENTS
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.machine import Axis, Source
-from thermocomp.core.model import RULES, ErrorModel, HonestError, Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.structure import Structure
 from thermocomp.core.terms import Variable
 from thermocomp.files import modelfile, positionfile

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.fingerprints import Prints, Runs, pack_marks
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import RULES, HonestError, Input, Provenance, Support
+from thermocomp.core.provenance import RULES, HonestError, Provenance
 from thermocomp.files import jsonfile, modelfile
 
 PRINTS = Prints(

@@ -11,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import HonestError, Input, Provenance, Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile, Profile, SplineProfile
+from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.terms import Variable
 from thermocomp.files import jsonfile, modelfile, positionfile
 

@@ -4,10 +4,12 @@ from dataclasses import replace
 from typing import Literal
 
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import RULES, ErrorModel, HonestError, Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.terms import Variable
 
 SPEED = Input("spindle_rpm", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0)

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from thermocomp.cli.app import run
-from thermocomp.core.model import RULES, ErrorModel, HonestError
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.files import modelfile
 from thermocomp.nc.rewrite.header import MARK
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from smallmachine import small_machine
 
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from thermocomp.core.components import COMPONENTS
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.machine import Axis, Machine, Source, Vector
-from thermocomp.core.model import ErrorModel, Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.structure import Structure
 from thermocomp.core.terms import Variable

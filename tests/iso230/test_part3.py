@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from smallmachine import small_machine
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import HonestError, Input, Provenance
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record
 from thermocomp.iso230.part3 import assess, detect, find_pairs, find_stations

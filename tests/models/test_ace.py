@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input, Support
+from thermocomp.core.inputs import Input, Support
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.ace import ACE, SampledFunction, TransformRegressor, half_window, nearest

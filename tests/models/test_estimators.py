@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input, Support
+from thermocomp.core.inputs import Input, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.linear import TermRegressor

@@ -16,7 +16,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from thermocomp.assessment.compare import compare, n_pieces
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import Input, Support
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.foreign import ForeignRegressor, adopt_estimator

@@ -10,7 +10,7 @@ from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
 from smallmachine import small_machine
 
 from thermocomp.assessment.compare import compare
-from thermocomp.core.model import Support
+from thermocomp.core.inputs import Support
 from thermocomp.models.arx_net import NetARX
 from thermocomp.models.gp import GaussianProcess
 from thermocomp.models.methods import METHODS

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from thermocomp.adapters.linuxcnc import rs274
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import Input
 from thermocomp.datasets.virtual import find_experiment, record
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.start import begin_cold

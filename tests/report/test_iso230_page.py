@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.datasets.virtual import record

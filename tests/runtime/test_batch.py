@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.correction import Limits
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import ErrorModel, Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.terms import Variable

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import RULES, HonestError, Input
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensated, Compensator, CompensatorState

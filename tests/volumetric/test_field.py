@@ -12,9 +12,9 @@ from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Machine, Source
-from thermocomp.core.model import RULES, HonestError
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.volumetric.field import ErrorField
 from thermocomp.volumetric.kinematics import INDEX, Kinematics
 from thermocomp.volumetric.model import VolumetricModel

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
+from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Columns, ErrorModel
+from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
 from thermocomp.recording.recording import Recording
 

@@ -14,7 +14,8 @@ from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.results import Assessment, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.inputs import Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.datasets import virtual
 from thermocomp.files import modelfile
 from thermocomp.files.mapping import Mapping
@@ -107,7 +108,7 @@ def compare(
     mapping : str, Path or Mapping, optional
         What the columns of files are.
     support, margin : str, float
-        What the models do outside their trained range, see `thermocomp.core.model.Support`.
+        What the models do outside their trained range, see `thermocomp.core.inputs.Support`.
     robustness : bool
         Also replay with noise and lost sensors, as ``thermocomp compare`` does: a model that they make worse than none
         is unproven. Without it, which is quicker, none is accepted.

@@ -19,8 +19,9 @@ from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import pool_robustness, stress
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.inputs import Support
 from thermocomp.core.learned import Learned
-from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train

@@ -12,7 +12,7 @@ from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.learned import Learned
-from thermocomp.core.model import RULES, HonestError
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.size import Size
 from thermocomp.models.position import PositionFit, fit_position, slope_samples
 from thermocomp.models.positionoptions import PositionOptions, Setting, fill_options, reference_position

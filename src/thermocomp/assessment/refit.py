@@ -12,7 +12,8 @@ from joblib import Parallel, delayed
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.robustness import stress, worse
 from thermocomp.core.exceptions import FitError
-from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.inputs import Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples

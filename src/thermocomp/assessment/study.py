@@ -15,7 +15,9 @@ from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import RULES, ErrorModel, HonestError, Support
+from thermocomp.core.inputs import Support
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.validity import Validity
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import deployable, expand

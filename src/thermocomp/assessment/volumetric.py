@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.components import COMPONENTS
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
 from thermocomp.core.machine import Machine, Source, Vector
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.size import Size
 from thermocomp.recording.recording import Recording

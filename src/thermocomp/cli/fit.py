@@ -77,7 +77,7 @@ def fit(
     from thermocomp.assessment import study as studies
     from thermocomp.assessment.compare import n_pieces
     from thermocomp.cli import output as out
-    from thermocomp.core.model import Support
+    from thermocomp.core.inputs import Support
     from thermocomp.files import modelfile
 
     samples, judging = ready.samples, ready.judging

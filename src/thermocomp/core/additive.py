@@ -10,7 +10,8 @@ import numpy as np
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Constant, Lookup, Node, Sum
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Variable
 
 

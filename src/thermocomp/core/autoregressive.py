@@ -28,7 +28,8 @@ from numpy.typing import ArrayLike
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray, State, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.network import Affine, Perceptron
 
 #: share of the interval by which a reading may come early and still make the tick: rounding of clocks, nothing else

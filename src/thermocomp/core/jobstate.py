@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import check_finite
+from thermocomp.core.inputs import check_finite
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Lag, Node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Term, TermTable, Variable
 
 
@@ -38,7 +39,7 @@ class LinearDynamic(ErrorModel):
     Examples
     --------
     >>> from thermocomp import LinearDynamic
-    >>> from thermocomp.core.model import Input
+    >>> from thermocomp.core.inputs import Input
     >>> speed = Input("spindle_rpm", "speed", "1/min", reference=0.0, rezero=False, low=0.0, high=6000.0)
     >>> model = LinearDynamic(
     ...     target="z_um",

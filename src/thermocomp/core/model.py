@@ -5,207 +5,27 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.core.columns import Columns, count_rows, read_clock, read_numbers
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
-from thermocomp.core.fingerprints import Prints
-from thermocomp.core.instants import seconds
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
-from thermocomp.core.learned import Learned
+from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.validity import Validity
 from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-
-
-class Columns(Protocol):
-    """A table that gives a column by its name: a DataFrame, or a dict of arrays."""
-
-    def __getitem__(self, name: str, /) -> Any:
-        """Return a column."""
-
-    def __contains__(self, name: object, /) -> bool:
-        """Return whether there is a column of that name."""
-
-    def __iter__(self) -> Iterator[Any]:
-        """Return the names."""
-
-
-@dataclass(frozen=True)
-class Input:
-    """One input of a model, with the range it was trained in.
-
-    Parameters
-    ----------
-    name : str
-        Channel name.
-    quantity, unit : str
-        What it measures, in house units.
-    reference : float
-        Value that counts as zero [unit].
-    rezero : bool
-        True: the mean of the first readings after a start (or a re-zeroing) replaces `reference`, as the temperatures
-        of a drift test are counted from its start (`ErrorModel.zeroing`); False: `reference` is absolute, as for a
-        spindle speed.
-    low, high : float
-        Trained range of value minus reference [unit].
-    """
-
-    name: str
-    quantity: str
-    unit: str
-    reference: float
-    rezero: bool
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.low) and np.isfinite(self.high)):
-            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] must be finite numbers")
-        if not self.low <= self.high:
-            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
-
-
-@dataclass(frozen=True)
-class Support:
-    """What a model does outside its trained range.
-
-    Inputs are always clipped to the trained range widened by `margin`; on top of that
-
-    - ``clip``: nothing, the deviation at the clipped inputs is given,
-    - ``hold``: the last deviation from inside the range is given until all inputs are back,
-    - ``fade``: the deviation is faded to zero, linearly, over `fade_over` beyond the range.
-
-    A model with a `JointSupport` is outside, too, where its inputs together are unlike all that was trained: ``hold``
-    and ``fade`` act on that as well, ``clip`` gives what it gives (see `ErrorModel.distance`).
-
-    Parameters
-    ----------
-    policy : {'clip', 'hold', 'fade'}
-    margin : float
-        Share of each input's trained span that is still taken as inside.
-    fade_over : float
-        Share of each input's trained span over which ``fade`` reaches zero; of the joint distance: share of its limit.
-    """
-
-    policy: Literal["clip", "hold", "fade"] = "clip"
-    margin: float = 0.25
-    fade_over: float = 0.5
-
-    def __post_init__(self) -> None:
-        if not self.margin >= 0 or not self.fade_over > 0:
-            raise InputError(f"support: margin {self.margin} must be >= 0 and fade_over {self.fade_over} > 0")
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a model comes from.
-
-    Parameters
-    ----------
-    method : str
-        Name of the method, such as ``dynamic``.
-    parameters : dict of str to str
-        Its settings, as text.
-    data_sha256 : tuple of str
-        Hashes of the recordings it was fitted to.
-    cycles : tuple of str
-        Thermal cycles it was fitted to.
-    rows : int
-        Number of rows it was fitted to.
-    version : str
-        thermocomp version that fitted it.
-    source : str
-        A publication, for models taken from one.
-    learned : Learned or None
-        What those rows showed of the target.
-    prints : Prints or None
-        Fingerprints of the rows it was fitted to: they are known again in another file.
-    starts : tuple of str
-        How each of the recordings began: cold, continued, rezeroed or known; in the order of `data_sha256`.
-    """
-
-    method: str
-    parameters: dict[str, str] = field(default_factory=dict)
-    data_sha256: tuple[str, ...] = ()
-    cycles: tuple[str, ...] = ()
-    rows: int = 0
-    version: str = ""
-    source: str = ""
-    learned: Learned | None = None
-    prints: Prints | None = field(default=None, repr=False)
-    starts: tuple[str, ...] = ()
-
-
-#: version of the rules that a verdict is given by; files that do not say were judged by older ones
-RULES = 1
-
-
-@dataclass(frozen=True)
-class HonestError:
-    """Error on thermal cycles that the method had not seen.
-
-    Parameters
-    ----------
-    protocol : str
-        How the unseen cycles were chosen.
-    mae, rms, max_abs : float
-        Of the residual over all unseen cycles [unit of the model].
-    none_mae, none_rms : float
-        The same without compensation.
-    cycles : dict of str to float
-        RMS of the residual per unseen cycle.
-    verdict : {'accepted', 'unproven', 'refused'}
-        Of the do-no-harm gate.
-    reason : str
-        Why, in words.
-    units : int
-        Independent cycles or files it was judged on.
-    tried : int
-        Methods that were tried for the target.
-    rules : int
-        By which it was judged, see `RULES`; older ones prove nothing.
-    taken : str
-        Who takes an unproven model all the same, and why; empty without that.
-    harm_margin : float or None
-        Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
-    """
-
-    protocol: str
-    mae: float
-    rms: float
-    max_abs: float
-    none_mae: float
-    none_rms: float
-    cycles: dict[str, float]
-    verdict: Literal["accepted", "unproven", "refused"]
-    reason: str
-    units: int = 0
-    tried: int = 1
-    rules: int = 0
-    taken: str = ""
-    harm_margin: float | None = None
-
-    @property
-    def word(self) -> Literal["accepted", "unproven", "refused"]:
-        """The verdict as it counts today: accepted by older rules is unproven."""
-        return "unproven" if self.verdict == "accepted" and self.rules < RULES else self.verdict
-
-    @property
-    def why(self) -> str:
-        """The reason as it counts today."""
-        why = f"judged by older rules: {self.reason}" if self.word != self.verdict else self.reason
-        return f"{why}. Taken by {self.taken}" if self.taken else why
 
 
 class State(NamedTuple):
@@ -429,9 +249,9 @@ class ErrorModel(ABC):
         InputError
             A column is missing or holds something that is no number; or the time is missing for a model with a memory.
         """
-        columns = [_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
-        clock = self._clock(table, time)
-        n = len(columns[0]) if columns else len(clock) if clock is not None else _rows(table)
+        columns = [read_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
+        clock = read_clock(table, time, f"model of {self.target}", needed=self.remembers)
+        n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
         for name, values in [*zip((i.name for i in self.inputs), columns, strict=True), ("the time", clock)]:
             if values is not None and values.shape != (n,):
                 raise InputError(f"model of {self.target}: {name} has shape {values.shape}, and there are {n} rows")
@@ -441,7 +261,7 @@ class ErrorModel(ABC):
         usable: BoolArray = np.all(np.isfinite(values), axis=1)
         resting = np.zeros(n, dtype=np.bool_)
         if self.zeroing.speed in table:
-            speed = _numbers(table, self.zeroing.speed, f"model of {self.target}")
+            speed = read_numbers(table, self.zeroing.speed, f"model of {self.target}")
             resting = np.array([self.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
         zeros: dict[int, ArrayLike | None] = {0: reference}
         for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
@@ -461,27 +281,6 @@ class ErrorModel(ABC):
                 since = 0.0
             found[k] = state.deviation
         return found
-
-    def _clock(self, table: Columns, time: ArrayLike | str | None) -> FloatArray | None:
-        if time is None and "time_s" in table:
-            time = "time_s"
-        if time is None:
-            if self.remembers:
-                raise InputError(
-                    f"model of {self.target} has a memory: give the time of the rows [s] by time=, the name of a "
-                    "column or an array, or as a column time_s"
-                )
-            return None
-        owner = f"model of {self.target}"
-        given = _column(table, time, owner) if isinstance(time, str) else np.asarray(time)
-        try:
-            clock = seconds(given)
-        except (TypeError, ValueError) as e:
-            named = f"the time in column {time!r}" if isinstance(time, str) else "the time"
-            raise InputError(f"{owner}: {named} must be numbers [s] or datetimes: {e}") from e
-        if not np.isfinite(clock).all():
-            raise InputError(f"model of {self.target}: the time must be finite numbers")
-        return clock
 
     # -- derived numbers ---------------------------------------------------------------------------------------------
 
@@ -551,32 +350,3 @@ class ErrorModel(ABC):
                 f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "
                 '--accept-unproven "NAME, REASON", in Python taken("NAME, REASON") of the model'
             )
-
-
-def check_finite(owner: str, **numbers: Any) -> None:
-    """Raise `InputError` if one of the named number sequences holds a nan or an infinity."""
-    for name, values in numbers.items():
-        if not np.isfinite(np.asarray(values, dtype=np.float64)).all():
-            raise InputError(f"{owner}: {name} must be finite numbers, found {values}")
-
-
-def _column(table: Columns, name: str, owner: str) -> NDArray[Any]:
-    try:
-        return np.asarray(table[name])
-    except (KeyError, ValueError, IndexError, TypeError) as e:
-        raise InputError(f"{owner}: the table has no column {name!r}; give a DataFrame, or a dict of columns") from e
-
-
-def _numbers(table: Columns, name: str, owner: str) -> FloatArray:
-    values = _column(table, name, owner)
-    try:
-        if values.dtype.kind in "mM":
-            raise TypeError("found times")
-        return values.astype(np.float64)
-    except (TypeError, ValueError) as e:
-        raise InputError(f"{owner}: column {name!r} holds something that is no number: {e}") from e
-
-
-def _rows(table: Columns) -> int:
-    """Return the number of rows of a table of which no column is needed."""
-    return max((np.size(table[name]) for name in table), default=0)

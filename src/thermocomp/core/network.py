@@ -9,7 +9,8 @@ import numpy as np
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scale_node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel, FloatArray
 
 Activation = Literal["sigmoid", "tanh", "identity"]
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Node, sum_weighted
-from thermocomp.core.model import ErrorModel, FloatArray, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Term, TermTable, Variable
 
 
@@ -31,7 +32,7 @@ class Polynomial(ErrorModel):
     Examples
     --------
     >>> from thermocomp import Polynomial
-    >>> from thermocomp.core.model import Input
+    >>> from thermocomp.core.inputs import Input
     >>> from thermocomp.core.terms import Variable
     >>> front = Input("t_front_C", "temperature", "degC", reference=20.0, rezero=True, low=0.0, high=15.0)
     >>> model = Polynomial(

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import ErrorModel, Provenance, check_finite
+from thermocomp.core.inputs import check_finite
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.profile import Coordinates, Numbers, Profile, clamp, coordinates
+from thermocomp.core.provenance import Provenance
 
 FloatArray = NDArray[np.float64]
 

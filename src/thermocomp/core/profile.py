@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import check_finite
+from thermocomp.core.inputs import check_finite
 
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]

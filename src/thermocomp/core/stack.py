@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import BoolArray, ErrorModel, FloatArray, Input, State
+from thermocomp.core.model import BoolArray, ErrorModel, FloatArray, State
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
 

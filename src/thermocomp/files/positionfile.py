@@ -8,9 +8,9 @@ from typing import Any, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.exceptions import InputError, ModelFileError
-from thermocomp.core.model import Provenance
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import PolynomialProfile, Profile, SplineProfile
+from thermocomp.core.provenance import Provenance
 from thermocomp.files import jsonfile, modelfile
 
 #: as it stands in the file

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
 from thermocomp.models.base import FloatArray, StaticRegressor
 

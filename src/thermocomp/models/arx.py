@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.clocked import Clocked, ClockedRegressor, Recursion, TriedSetting, rms, too_few
 from thermocomp.models.numerics import ticks

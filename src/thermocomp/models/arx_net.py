@@ -11,7 +11,7 @@ from sklearn.utils import check_random_state
 
 from thermocomp.core.autoregressive import AutoregressiveNet
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.models.arx import ARX
 from thermocomp.models.base import FloatArray, IntArray

@@ -10,7 +10,9 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.core.inputs import Input, Support
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import Provenance
 from thermocomp.models.numerics.folds import number_folds
 
 FloatArray = NDArray[np.float64]

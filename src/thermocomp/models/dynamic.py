@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from thermocomp.core import lagbank
+from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
-from thermocomp.core.model import Input
 from thermocomp.core.terms import Term
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import moments as ridge

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.models.base import FloatArray, MemorylessRegressor

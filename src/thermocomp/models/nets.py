@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils import Tags
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.network import Affine, Network, Perceptron
 from thermocomp.models.base import FloatArray, IntArray, MemorylessRegressor
 from thermocomp.models.numerics.leastsquares import effective_sample_size

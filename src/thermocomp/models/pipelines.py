@@ -13,8 +13,10 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.validation import check_is_fitted
 
 from thermocomp.core.exceptions import FitError
-from thermocomp.core.model import ErrorModel, Input, Provenance, Support
+from thermocomp.core.inputs import Input, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.provenance import Provenance
 from thermocomp.core.terms import Variable
 from thermocomp.models.base import FloatArray, IntArray, ThermalRegressor
 from thermocomp.models.timed import TimedRegressor

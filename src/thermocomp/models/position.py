@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from thermocomp import __version__
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import ErrorModel, Provenance
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel, slope_unit
+from thermocomp.core.provenance import Provenance
 from thermocomp.core.terms import TermTable
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.models.geometric import ProfileFit, fit_profile

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.core.model import Support
+from thermocomp.core.inputs import Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.geometric import Kind, Order
 from thermocomp.recording.profiles import Profiles

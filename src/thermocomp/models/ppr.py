@@ -10,7 +10,7 @@ from scipy import linalg
 
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.model import Input
+from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
 from thermocomp.models.base import CycledRegressor, FloatArray, IntArray
 from thermocomp.models.shrinkage import Rule, choose, scaling

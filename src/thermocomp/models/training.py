@@ -14,8 +14,10 @@ from sklearn.metrics import r2_score
 
 from thermocomp import __version__
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.inputs import Support
 from thermocomp.core.joint import JointSupport
-from thermocomp.core.model import ErrorModel, Provenance, Support
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import Provenance
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.foreign import adopt_estimator, catch_failures, check_numbers, title

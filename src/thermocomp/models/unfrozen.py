@@ -12,7 +12,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.expression import Node
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, StaticRegressor
 
 

@@ -10,8 +10,9 @@ import pandas as pd
 from thermocomp.assessment import metrics
 from thermocomp.assessment.replay import replay
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Support
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import ErrorModel, Support
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import FIRST_READING

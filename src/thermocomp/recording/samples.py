@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.inputs import Input
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
-from thermocomp.core.model import Input
 from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, robust_mean
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start, bridge_files, find_resting_rows, find_starts, level

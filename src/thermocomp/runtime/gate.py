@@ -11,7 +11,8 @@ from numbers import Real
 from statistics import median
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
 
 #: what a sensor can say at all, per quantity: beyond it the sensor, not the machine, is the news

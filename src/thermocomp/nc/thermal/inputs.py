@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, explain_unknown
-from thermocomp.core.model import ErrorModel, Input
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.units import read_with_unit
 
 FloatArray = NDArray[np.float64]

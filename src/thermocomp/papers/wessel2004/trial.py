@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from thermocomp.assessment.replay import replay
-from thermocomp.core.model import Support
+from thermocomp.core.inputs import Support
 from thermocomp.models.ace import ACE
 from thermocomp.models.ace_monotone import MonotoneACE
 from thermocomp.models.base import ThermalRegressor

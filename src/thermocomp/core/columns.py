@@ -1,0 +1,87 @@
+"""Tables that a model is replayed through: anything that gives a column by its name."""
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.instants import seconds
+
+FloatArray = NDArray[np.float64]
+
+
+class Columns(Protocol):
+    """A table that gives a column by its name: a DataFrame, or a dict of arrays."""
+
+    def __getitem__(self, name: str, /) -> Any:
+        """Return a column."""
+
+    def __contains__(self, name: object, /) -> bool:
+        """Return whether there is a column of that name."""
+
+    def __iter__(self) -> Iterator[Any]:
+        """Return the names."""
+
+
+def read_column(table: Columns, name: str, owner: str) -> NDArray[Any]:
+    """Return a column; raise `InputError` if there is none of that name."""
+    try:
+        return np.asarray(table[name])
+    except (KeyError, ValueError, IndexError, TypeError) as e:
+        raise InputError(f"{owner}: the table has no column {name!r}; give a DataFrame, or a dict of columns") from e
+
+
+def read_numbers(table: Columns, name: str, owner: str) -> FloatArray:
+    """Return a column of numbers; raise `InputError` if it is none."""
+    values = read_column(table, name, owner)
+    try:
+        if values.dtype.kind in "mM":
+            raise TypeError("found times")
+        return values.astype(np.float64)
+    except (TypeError, ValueError) as e:
+        raise InputError(f"{owner}: column {name!r} holds something that is no number: {e}") from e
+
+
+def count_rows(table: Columns) -> int:
+    """Return the number of rows of a table of which no column is needed."""
+    return max((np.size(table[name]) for name in table), default=0)
+
+
+def read_clock(table: Columns, time: ArrayLike | str | None, owner: str, *, needed: bool) -> FloatArray | None:
+    """Return the time of the rows of a table [s]; None if there is none.
+
+    Parameters
+    ----------
+    table : mapping of str to array-like
+    time : str or array-like or None
+        Of a column, or its name; None: the column ``time_s``, if there is one.
+    owner : str
+        Who asks, for messages.
+    needed : bool
+        There must be one.
+
+    Raises
+    ------
+    InputError
+        It is missing, or something else than times.
+    """
+    if time is None and "time_s" in table:
+        time = "time_s"
+    if time is None:
+        if needed:
+            raise InputError(
+                f"{owner} has a memory: give the time of the rows [s] by time=, the name of a "
+                "column or an array, or as a column time_s"
+            )
+        return None
+    given = read_column(table, time, owner) if isinstance(time, str) else np.asarray(time)
+    try:
+        clock = seconds(given)
+    except (TypeError, ValueError) as e:
+        named = f"the time in column {time!r}" if isinstance(time, str) else "the time"
+        raise InputError(f"{owner}: {named} must be numbers [s] or datetimes: {e}") from e
+    if not np.isfinite(clock).all():
+        raise InputError(f"{owner}: the time must be finite numbers")
+    return clock
