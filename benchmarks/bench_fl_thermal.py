@@ -15,7 +15,7 @@ from thermocomp.assessment.compare import compare
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.files import recordings
 from thermocomp.recording import splits
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 
 PUBLISHED = {
     "least squares (published)": (9.25, 7.62, 11.86, 12.09, 5.24),

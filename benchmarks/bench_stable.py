@@ -15,7 +15,8 @@ import thermocomp as tc
 from thermocomp.assessment.compare import compare
 from thermocomp.assessment.results import Comparison
 from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 METHODS = ("ols", "partial-f", "mra", "dynamic")
 #: sets of five with which what was accepted has to stay so

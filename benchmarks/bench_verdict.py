@@ -24,7 +24,8 @@ from thermocomp.models.methods import METHODS, deployable
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD, Start
 
 FloatArray = NDArray[np.float64]

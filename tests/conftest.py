@@ -12,7 +12,8 @@ from smallmachine import small_machine
 from thermocomp.adapters.linuxcnc import rs274
 from thermocomp.api.revision import job as jobs
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -25,8 +25,8 @@ from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.recording.quality import check
-from thermocomp.recording.samples import stack
 from thermocomp.recording.splits import leave_one_cycle_out
+from thermocomp.recording.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 
 # %%

@@ -24,7 +24,7 @@ from thermocomp.files.profiles import from_recording
 from thermocomp.models.position import PositionOptions, fit_position
 from thermocomp.models.positionoptions import fill_options
 from thermocomp.models.training import train
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.experiments import simulate
 from thermocomp.simulation.volume import VolumetricTruth

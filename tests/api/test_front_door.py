@@ -24,7 +24,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.models.methods import METHODS
 from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 
 FAST = ("ols", "partial-f")
 

@@ -8,7 +8,8 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.assessment import study
-from thermocomp.assessment.compare import ALL, compare, judge, n_pieces
+from thermocomp.assessment.compare import ALL, compare, n_pieces
+from thermocomp.assessment.judge import judge
 from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import Robustness, pool_robustness, stress
 from thermocomp.core.correction import Limits
@@ -24,7 +25,8 @@ from thermocomp.models.training import train
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 
 METHOD_NAMES = sorted(METHODS)

@@ -14,7 +14,8 @@ from thermocomp.core.validity import Validity
 from thermocomp.files import modelfile
 from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 
 def with_room(start: str = "2024-03-01T20:00:00") -> Recording:

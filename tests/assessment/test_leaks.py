@@ -17,7 +17,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD, Start
 
 

@@ -19,7 +19,8 @@ from thermocomp.files.recordings import read
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD
 
 

@@ -12,7 +12,8 @@ from thermocomp.assessment.results import Rules
 from thermocomp.core.exceptions import InputError
 from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD
 
 SIX = (1000.0, 2500.0, 1800.0, 3000.0, 1400.0, 2200.0)

@@ -12,8 +12,9 @@ from thermocomp.assessment import study
 from thermocomp.assessment.compare import compare
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.training import Trained, train
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
 from thermocomp.recording.splits import Judging, leave_one_cycle_out
+from thermocomp.recording.stacking import stack
 
 
 @pytest.fixture(scope="module")

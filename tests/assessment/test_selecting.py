@@ -13,7 +13,8 @@ from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.selection import subsetsearch
 from thermocomp.models.selection.subsets import best_subsets
 from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 METHODS = ("grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")
 SETTINGS = Settings(max_sensors=3, models=["ols"])

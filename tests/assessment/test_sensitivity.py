@@ -18,7 +18,8 @@ from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import lstsq
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

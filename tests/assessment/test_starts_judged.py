@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from smallmachine import small_machine
 
 from thermocomp.assessment import study
-from thermocomp.assessment.compare import judge
+from thermocomp.assessment.judge import judge
 from thermocomp.assessment.replay import replay, replay_compensated
 from thermocomp.assessment.robustness import stress
 from thermocomp.core.correction import Limits
@@ -23,8 +23,8 @@ from thermocomp.iso230 import part3
 from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle, find_cycles
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
 from thermocomp.recording.splits import Split, by_rows, by_time, leave_one_cycle_out
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start
 
 TARGET = "z_um"

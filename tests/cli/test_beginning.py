@@ -16,7 +16,7 @@ from thermocomp.files import modelfile, recordings
 from thermocomp.models.training import train
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 
 ROW = 300
 

@@ -24,7 +24,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.files import modelfile
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 from thermocomp.runtime.compensator import TOGETHER, Compensator
 
 FloatArray = NDArray[np.float64]

@@ -22,7 +22,7 @@ from thermocomp.iso230.thermaltest import Pair, ThermalCurve, ThermalTest, evalu
 from thermocomp.models.training import train
 from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 
 FloatArray = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from thermocomp.models.mlp_sklearn import SklearnNet
 from thermocomp.models.ppr import ProjectionPursuit
 from thermocomp.models.timed import TimedRegressor
 from thermocomp.recording import splits
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 #: those that would take long as they are
 QUICK: dict[str, Any] = {

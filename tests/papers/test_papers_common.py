@@ -14,7 +14,8 @@ from thermocomp.papers import common, pictures
 from thermocomp.papers.common import Errors
 from thermocomp.papers.study import Claims, Ours, Part, Study, StudyTable
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 
 FloatArray = NDArray[np.float64]
 

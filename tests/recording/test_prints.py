@@ -19,7 +19,8 @@ from thermocomp.datasets import virtual
 from thermocomp.files.recordings import read
 from thermocomp.recording.cycles import make_single_cycle
 from thermocomp.recording.fingerprints import LENGTH, fingerprint, overlap, repeats
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 
 FloatArray = NDArray[np.float64]
 

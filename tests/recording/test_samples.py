@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import FIRST_READING, Zeroing
-from thermocomp.recording import samples as stacking
+from thermocomp.recording import stacking
 from thermocomp.recording.cycles import Cycle, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples

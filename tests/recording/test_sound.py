@@ -10,8 +10,8 @@ from thermocomp.assessment.compare import compare
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
 from thermocomp.recording.sound import drop_unsound
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start
 
 

@@ -12,7 +12,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.recording import splits
 from thermocomp.recording.cycles import Cycle
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD
 
 

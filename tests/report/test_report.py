@@ -20,7 +20,8 @@ from thermocomp.cli.output import show_comparison
 from thermocomp.files import modelfile
 from thermocomp.recording import splits
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.report import figures, html
 from thermocomp.report.summary import cautions, summarise, verdict
 

@@ -16,9 +16,10 @@ from thermocomp.files import recordings as files
 from thermocomp.recording import splits
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
 from thermocomp.recording.sound import drop_unsound
 from thermocomp.recording.splits import Judging
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start
 
 FloatArray = NDArray[np.float64]

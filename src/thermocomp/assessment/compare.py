@@ -1,6 +1,6 @@
 """Compare methods on unseen blocks: train, replay, judge."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -8,25 +8,22 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from thermocomp.assessment import do_no_harm, metrics
-from thermocomp.assessment.coverage import find_validity
+from thermocomp.assessment import do_no_harm
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
+from thermocomp.assessment.judge import cap_alike_units, drop_unreadable, judge, refuse_method
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
 from thermocomp.assessment.refit import refit_accepted
-from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Comparison, Rules
-from thermocomp.assessment.robustness import pool_robustness, stress
+from thermocomp.assessment.robustness import pool_robustness
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
-from thermocomp.core.learned import Learned
-from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
-from thermocomp.recording.splits import MIN_ROWS, Judging, Split, join_short_cycles, name_cycles
+from thermocomp.recording.splits import MIN_ROWS, Judging, Split, join_short_cycles
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -205,168 +202,6 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
     return sum(len(names) * len(own.splits) + choices * len(_inners(names, own, rules)) for own in by_target)
 
 
-def drop_unreadable(samples: Samples, target: int, judging: Judging) -> Judging:
-    """Return a judgement without the blocks in which a target has too few readings to say anything.
-
-    Parameters
-    ----------
-    samples : Samples
-    target : int
-        Index into ``samples.targets``.
-    judging : Judging
-
-    Returns
-    -------
-    Judging
-        With all blocks if there are too few readings in each of them.
-    """
-    known = np.isfinite(samples.deviations[:, target])
-    kept = tuple(s for s in judging.splits if np.count_nonzero(s.judge & known) >= MIN_ROWS)
-    return replace(judging, splits=kept) if kept else judging
-
-
-def judge(
-    name: str,
-    model: ErrorModel,
-    samples: Samples,
-    split: Split,
-    *,
-    learned: Learned | None = None,
-    rules: Rules = Rules(),
-    fit_s: float = 0.0,
-    robustness: bool = True,
-    limits: Limits | None = Limits(),
-) -> Assessment:
-    """Judge a frozen model on a block: what a compensator with it would have left there.
-
-    The verdict is taken, in each part that is judged, on the worse of what would run and the model alone: a model does
-    not pass because limits clip what it says.
-
-    Parameters
-    ----------
-    name : str
-        What to call the model.
-    model : ErrorModel
-    samples : Samples
-        With all of the model's inputs, and its target.
-    split : Split
-        Only its block is looked at.
-    learned : Learned, optional
-        What the model is held against; what it learned itself if not given.
-    rules : Rules
-        What was stated before judging.
-    fit_s : float
-        The fit took [s].
-    robustness : bool
-        Also replay with noise and lost sensors.
-    limits : Limits or None
-        Of the compensator; None: the model alone is judged.
-
-    Returns
-    -------
-    Assessment
-
-    """
-    target = [c.name for c in samples.targets].index(model.target)
-    rows = split.judge & np.isfinite(samples.deviations[:, target])
-    if not rows.any():
-        return _failed(samples, name, target, split, f"{model.target} has no number in {split.block} to judge against")
-    measured = samples.deviations[rows, target]
-    if learned is None and model.provenance is not None:
-        learned = model.provenance.learned
-    stressed = stress(model, samples, measured, rows) if robustness else None
-    ran = replay_compensated(model, samples, rows, limits or Limits())
-    predicted = ran.deviation if limits is None else ran.compensated
-    if not np.isfinite(metrics.rms(measured, ran.deviation)):
-        return _failed(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
-    return Assessment(
-        model=name,
-        target=model.target,
-        block=split.block,
-        measured=measured,
-        predicted=predicted,
-        row=samples.row[rows],
-        test=samples.test[rows],
-        cycle=samples.cycle[rows],
-        verdict=_verdict(model, samples, split, learned, rules, rows, measured, (predicted, ran.deviation)),
-        sensors=model.sensors,
-        n_sensors=(len(model.sensors), len(model.sensors)),
-        fit_s=fit_s,
-        n_effective=effective_sample_size(measured - predicted),
-        robustness=stressed.robustness if stressed else None,
-        frozen=model,
-        alone=ran.deviation,
-        limits=None if limits is None else ran.limits,
-        rejected=0 if limits is None else int(ran.rejected.sum()),
-        turned_away="" if limits is None else ran.why,
-    )
-
-
-def _verdict(
-    model: ErrorModel,
-    samples: Samples,
-    split: Split,
-    learned: Learned | None,
-    rules: Rules,
-    rows: BoolArray,
-    measured: FloatArray,
-    both: tuple[FloatArray, FloatArray],
-) -> do_no_harm.Verdict:
-    """Return the verdict on `rows`, by the worse of what would run and the model alone, in each part that is judged."""
-    target = [c.name for c in samples.targets].index(model.target)
-    segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
-    against = learned or samples.learned(target, rows)
-    return do_no_harm.Verdict(
-        units=tuple(
-            _worse(
-                do_no_harm.measure(
-                    unit,
-                    measured[mine],
-                    run_or_alone[mine],
-                    against,
-                    unit=model.unit,
-                    margin=rules.margin,
-                    stretch=split.stretch,
-                )
-                for run_or_alone in both
-            )
-            for unit, mine in segments
-            if mine.sum() >= MIN_ROWS
-        ),
-        unit=model.unit,
-        caps=_caps(split, learned, samples, target),
-        refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
-        stated=rules.margin,
-    )
-
-
-def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return what is worse of a unit, by what would run or by the model alone: limits make no model pass."""
-    ran, alone = both
-    rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
-    return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
-
-
-def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return that the units are too alike to count as several, if they are."""
-    covered = find_validity(samples, judging)
-    needed = do_no_harm.MIN_UNITS
-    if covered.independent >= needed or covered.units < needed:
-        return ()
-    return (f"only {covered.independent} of {covered.units} units are not alike, at least {needed} are needed",)
-
-
-def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) -> tuple[str, ...]:
-    """Return what keeps a model from being accepted, whatever its errors."""
-    others = {c.name for k, c in enumerate(samples.targets) if k != target}
-    found = [text for channel, text in samples.trouble if channel not in others]
-    if split.stretch:
-        found.append("judged on one stretch that goes on from what was learned")
-    if learned is None:
-        found.append("the model does not say what it learned, so that it cannot be held against that")
-    return tuple(found)
-
-
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
     """Cut an assessment into its thermal cycles; what needs a replay of its own (robustness) stays with the whole."""
     found = []
@@ -419,36 +254,7 @@ def _assess_method(
             limits=limits,
         )
     except FitError as e:  # also of one that can be fitted, and fails on what noise makes of its inputs
-        return _failed(samples, name, target, split, str(e))
-
-
-def _failed(samples: Samples, name: str, target: int, split: Split, why: str) -> Assessment:
-    """Return the assessment of a method that gave no prediction: refused, and said why."""
-    rows = split.judge & np.isfinite(samples.deviations[:, target])
-    measured = samples.deviations[rows, target]
-    return Assessment(
-        model=name,
-        target=samples.targets[target].name,
-        block=split.block,
-        measured=measured,
-        predicted=np.zeros_like(measured),
-        row=samples.row[rows],
-        test=samples.test[rows],
-        cycle=samples.cycle[rows],
-        verdict=do_no_harm.Verdict((), refusal=why),
-        sensors=(),
-        fit_s=0.0,
-        n_effective=float("nan"),
-        failure=why,
-    )
-
-
-def _segments(samples: Samples, rows: BoolArray) -> Iterator[tuple[str, BoolArray]]:
-    cycle = samples.cycle[rows]
-    for block in join_short_cycles(cycle, samples.test[rows]):
-        mine, name = np.isin(cycle, block), name_cycles(samples, block)
-        whole = mine.sum() == np.isin(samples.cycle, block).sum()
-        yield name if whole else f"part of {name}", mine
+        return refuse_method(samples, name, target, split, str(e))
 
 
 def _together(parts: Sequence[Assessment]) -> Assessment:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment import coverage
-from thermocomp.assessment.compare import cap_alike_units, compare, judge, split_by_cycle
+from thermocomp.assessment.compare import compare, split_by_cycle
+from thermocomp.assessment.judge import cap_alike_units, judge
 from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.refit import stress_written
 from thermocomp.assessment.replay import are_absolute
@@ -23,9 +24,10 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
 from thermocomp.recording.sound import drop_unsound
 from thermocomp.recording.splits import Judging, Split, join_short_cycles, name_cycles
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start, find_starts
 
 BoolArray = NDArray[np.bool_]

@@ -11,7 +11,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import stack
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start, find_starts
 
 FloatArray = NDArray[np.float64]

@@ -30,7 +30,8 @@ from thermocomp.models.positionoptions import (
 from thermocomp.models.training import Trained, train
 from thermocomp.recording.profiles import QUANTITY, Profiles, Slopes
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD
 
 FloatArray = NDArray[np.float64]

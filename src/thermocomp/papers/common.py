@@ -20,7 +20,8 @@ from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.training import train
 from thermocomp.papers.study import BoolArray, FloatArray, StudyTable
 from thermocomp.recording.recording import Recording
-from thermocomp.recording.samples import Samples, stack
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import COLD
 
 _Item = TypeVar("_Item")
@@ -84,7 +85,7 @@ def stacked(
     ----------
     recordings : sequence of Recording
     targets, inputs : sequence of str
-        See `thermocomp.recording.samples.stack`.
+        See `thermocomp.recording.stacking.stack`.
     rezero : bool
         True: temperatures are counted from the start of each test; False: as read.
 
