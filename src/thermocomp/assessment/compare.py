@@ -1,6 +1,6 @@
 """Compare methods on unseen blocks: train, replay, judge."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -107,13 +107,8 @@ def compare(
     recommended: list[Recommendation] = []
     finished = 0
     for k, target in enumerate(samples.targets):
-        mine: dict[str, list[Assessment]] = {}
-        for (of, name, _), a in zip(pieces, done, strict=False):
-            if of == k:
-                mine.setdefault(name, []).append(a)
-        # a method that was judged on some of the blocks only is left out
-        mine = {p[0].model: p for p in mine.values() if len(p) == len(by_target[k].splits)}
-        if not mine:
+        parts = [(name, a) for (of, name, _), a in zip(pieces, done, strict=False) if of == k]
+        if not (mine := _complete(parts, len(by_target[k].splits))):
             continue
         finished += len(mine)
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
@@ -130,6 +125,14 @@ def compare(
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
     )
+
+
+def _complete(parts: Iterable[tuple[str, Assessment]], blocks: int) -> dict[str, list[Assessment]]:
+    """Return the assessments by model; a method that was judged on some of the blocks only is left out."""
+    found: dict[str, list[Assessment]] = {}
+    for name, a in parts:
+        found.setdefault(name, []).append(a)
+    return {p[0].model: p for p in found.values() if len(p) == blocks}
 
 
 def _concluded(
