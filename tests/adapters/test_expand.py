@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from thermocomp.adapters.linuxcnc.expansion import expand as expanding
 from thermocomp.adapters.linuxcnc.expansion.expand import expand
 from thermocomp.adapters.linuxcnc.expansion.origins import SYSTEMS
 from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
@@ -51,6 +52,9 @@ START = "G17 G40 G80 G90 G94"
         # a work coordinate system that is chosen, whichever is in force; none that is not
         *((f"G21 {code}\nG0 X1\nM2\n", ["G21", code, "G0 X1", "M2"]) for code in SYSTEMS.values()),
         ("G21\nG0 X1\nM2\n", ["G21", "G0 X1", "M2"]),
+        # the origin of the system in force, whichever it is
+        ("G21\nG0 X1\nG10 L20 P0 X0\nX3\nM2\n", ["G21", "G0 X1", "G10 L20 P0 X0", "G0 X3", "M2"]),
+        ("G21 G55\nG0 X1\nG10 L2 P2 X7\nM2\n", ["G21", "G55", "G0 X1", "G10 L2 P2 X7", "M2"]),
         # an offset of nothing, twice
         ("G92.1\nG52 X0 Y0 Z0\nG21\nG0 X1\nM2\n", ["G92.1", "G21", "G0 X1", "M2"]),
         # radii, if the program says which
@@ -344,6 +348,12 @@ block = st.one_of(
 def test_random_programs_expand_and_stay_as_they_are_when_expanded_again(plain: Plain, blocks: list[str]) -> None:
     first = plain("G21 G64\nG0 X0 Y0 Z5\n" + "\n".join(blocks) + "\nM2\n")
     assert plain("\n".join(first[1:]) + "\n") == first
+
+
+def test_a_loop_that_moves_for_ever_is_refused(plain: Plain, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(expanding, "MOST", 5000)
+    with pytest.raises(ProgramError, match=r"line [2-5]: more than 5,000 plain lines come out: does a loop never end"):
+        plain("G21\no1 while [1]\nG0 X1\nX0\no1 endwhile\nM2\n")
 
 
 def test_the_radii_of_a_subprogram_are_refused(tmp_path: Path) -> None:

@@ -118,6 +118,7 @@ AGREE = [
     ("words beside G80", "G99 G81 X5. Y5. Z-3. R2.\nG80 Z50.\nX1.\nG80 X2. Y3.\n"),
     ("machine coordinates, always rapid", "G1 X5.\nG53 Z0.\nX6.\nG90 G0 G53 X0. Y0.\nG53 G49 Z-1.\nX0. Y0.\n"),
     ("additional systems", "G54.1 P2 X1. Y1.\nG54.1 P1 X1.\nG55 Y0.\nG54.1 P2 X2. Y2.\nG154 P3 X0.\n"),
+    ("systems of a Haas", "G110 X1.\nG54 X2.\nG112 X2.\nG154 P1 X3.\n"),
     ("local offset", "G52 X5. Y-2.\nX0. Y0.\nG1 Z-1.\nG52 Z3.\nZ0.\nG52 X0. Y0. Z0.\nX1. Y1. Z5.\n"),
     ("place named by G92", "G92 X100. Z50.\nX0. Z40.\nG1 X5.\nG92.1 X0. Y0. Z0.\nX1. Y1. Z60.\n"),
     ("origin by G10", "G10 L2 P1 X3. Y4.\nX0. Y0.\nG10 L20 P2 Z-300.\nG54.1 P2 X1. Y1. Z10.\n"),

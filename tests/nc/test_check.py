@@ -45,7 +45,7 @@ def test_what_is_right_passes(line: str, becomes: str, after: Vector) -> None:
         ("G2 X10 I5\n", "G3 X10 I5\n", NONE, "makes another arc"),
         ("G2 X10 I5\n", "G1 X10\n", NONE, "makes another arc"),
         ("G2 X10 I5\n", "G2 X10 I5 J0.01\n", NONE, "makes another arc"),
-        ("G1 X5\n", "G1 X5 Z\n", NONE, "what it becomes cannot be read"),
+        ("G1 X5\n", "G1 X5 Z\n", NONE, "would become 'G1 X5 Z', which cannot be read"),
         ("G1 X5\n", f"G1 X5{' ' * LONGEST}Y0\n", NONE, "a line of 24[0-9] characters"),
         ("G1 X5\n", "G1 X5\n", (float("nan"), 0.0, 0.0), "moves X by"),
         ("G99 G81 X1 Z-2 R2\n", "G99 G81 X1 Z-2 R2.01\n", NONE, "moves Z by"),

@@ -173,7 +173,9 @@ def _revise(job: Job, phase: Phase) -> Done:
                 blank = _write(job, source, folder, drafts[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
             if lines is not None and 0 < e.line <= len(lines):
-                raise ProgramError(lines[e.line - 1] or 1, f"(line {e.line} when expanded) {e.reason}") from e
+                line = lines[e.line - 1] or 1
+                where = f"(line {e.line} when expanded) " if line != e.line else ""
+                raise ProgramError(line, where + e.reason) from e
             raise
         took = time.perf_counter() - begin
         run = course.run()

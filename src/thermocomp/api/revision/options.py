@@ -304,7 +304,7 @@ class Controller:
         Rotations of work coordinate systems that are stored in the controller, such as "G54=12 deg"; none if there are
         none. They turn a correction of X and Y.
     no_g92 : bool
-        No G92 or G52 is in force when the program starts.
+        No G92 or G52 is in force when the program starts, nor put away by G92.2: the method offset would erase it.
     integers : str
         What a length without a decimal point is: whole millimetres or inches; the least increment; or a reason to
         refuse the program. If not given, whole for linuxcnc, refuse for fanuc.

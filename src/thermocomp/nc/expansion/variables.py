@@ -61,7 +61,8 @@ class Variables:
             if key not in _LOCAL and key not in _COMMON:
                 raise InputError(
                     f"{assignment.target} is set, and only #1 to #33 and #100 to #199 are the program's own: the "
-                    "others stay in the control; use one of those"
+                    "others stay in the control, and in plain lines nobody would set them; use one of those, or leave "
+                    "--expand away where no loop or subprogram needs it"
                 )
             if squeezed_is_empty(assignment.value):
                 raise InputError(f"{assignment.target} is made empty (#0), which is not followed; give it a value")

@@ -116,6 +116,10 @@ _LINUXCNC_G: Final = (
 _NO_SCALING = "scaling is not supported; write the coordinates out"
 _NO_MIRROR = "mirroring is not supported; write the coordinates out"
 _NO_POLAR = "polar coordinates are not supported; write X and Y"
+#: a Haas's codes for the first of them
+HAAS_SYSTEMS: Final = {f"G{109 + n}": n for n in range(1, 21)}
+#: codes of the additional work coordinate systems
+ADDITIONAL_SYSTEMS: Final = frozenset({"G54.1", "G154", *HAAS_SYSTEMS})
 _NO_POCKET = "cycles of the control that mill or place holes are not followed; write the moves out in the CAM system"
 _WRITTEN = "--expand writes it into the program"
 _NO_TCP = "with tool centre point control the axes do not follow the words alone; not supported"
@@ -157,7 +161,10 @@ _FANUC_G: Final = (
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "no G92"),
     Code("G103", "look ahead", "limits how far the control looks ahead"),
-    Code("G154", "system", "one of the additional work coordinate systems of a Haas"),
+    *(
+        Code(code, "system", "one of the additional work coordinate systems of a Haas")
+        for code in ("G154", *HAAS_SYSTEMS)
+    ),
     Code("G187", "high speed", "smoothness"),
     *(Code(f"G{n}", "motion", "pocket or bolt holes of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
 )

@@ -1,7 +1,7 @@
 """Codes that change offsets: work coordinate systems, G10, G52, G92, tool lengths. The tool stays where it is."""
 
 from thermocomp.nc.interpreter.block import Block, Known, Point
-from thermocomp.nc.interpreter.codes import ROTARY
+from thermocomp.nc.interpreter.codes import HAAS_SYSTEMS, ROTARY
 from thermocomp.nc.interpreter.offsets import EXTERNAL, LAST, mark_axes
 from thermocomp.nc.interpreter.state import InterpreterState
 from thermocomp.nc.interpreter.words import BlockWords
@@ -11,7 +11,7 @@ _LENGTH_CERTAIN: Known = (True, True, True)
 
 
 def select_system(state: InterpreterState, words: BlockWords) -> None:
-    """G54 to G59.3, and Fanuc's G54.1 P."""
+    """G54 to G59.3, Fanuc's G54.1 P, a Haas's G154 P and G110 to G129."""
     code = words.groups["system"]
     if code in ("G54.1", "G154"):
         number = words.whole("P", least=1)
@@ -19,7 +19,7 @@ def select_system(state: InterpreterState, words: BlockWords) -> None:
             raise words.error(f"{code} needs P, the number of the coordinate system")
         system = 100 + number
     else:
-        system = _SYSTEMS[code]
+        system = _SYSTEMS[code] if code in _SYSTEMS else 100 + HAAS_SYSTEMS[code]
     state.renamed(state.offsets.select(system))
     state.placed()
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.machine import Machine
 from thermocomp.nc.interpreter.block import PLANES, Block, Move, Point
+from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS
 from thermocomp.nc.planner.corners import Corners, find_overlap_speeds
 from thermocomp.nc.planner.segment import Segment, Segments, Vector
 
@@ -29,9 +30,7 @@ HALTS = frozenset(
     | {
         "G68",
         "G69",
-        "G154",
         "G54",
-        "G54.1",
         "G55",
         "G56",
         "G57",
@@ -47,6 +46,7 @@ HALTS = frozenset(
     }
     | {"M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M19", "M30", "M60", "M61", "M64", "M65", "M66"}
     | {"M98", "M99"}
+    | ADDITIONAL_SYSTEMS
 )
 
 

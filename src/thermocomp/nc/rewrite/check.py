@@ -52,7 +52,8 @@ class Check:
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]
         except ProgramError as e:
-            raise ProgramError(block.line.number, f"what it becomes cannot be read: {e.reason}") from e
+            text = change.texts[-1].strip()
+            raise ProgramError(block.line.number, f"would become {text!r}, which cannot be read: {e.reason}") from e
         if len(moves) != len(block.moves):
             raise _fault(block, change, f"makes {len(moves)} moves instead of {len(block.moves)}")
         for k, (was, now) in enumerate(zip(block.moves, moves, strict=True)):

@@ -24,6 +24,8 @@ _DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
 _WRITTEN, _PROVED = (1, 2), (3, 4)
 #: lines after which it is told how many are written
 _OFTEN = 1000
+#: lines that are written at most
+MOST = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,8 @@ def expand(
                 sources.append(line)
                 if not len(sources) % _OFTEN:
                     progress(len(sources))
+                if len(sources) > MOST:
+                    raise ProgramError(line, f"more than {MOST:,} plain lines come out: does a loop never end?")
         for seed in _PROVED:
             left: tuple[dict[int, float], dict[int, float]] = ({}, {})
             stored = around.controller(seed)

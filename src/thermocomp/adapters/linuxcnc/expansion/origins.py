@@ -11,6 +11,7 @@ SYSTEMS = {1: "G54", 2: "G55", 3: "G56", 4: "G57", 5: "G58", 6: "G59", 7: "G59.1
 #: how the interpreter remarks that an origin is set
 G10 = "interpreter: setting coordinate system origin"
 PLAIN_G10 = re.compile(r"(?:N\d+)?G10L2P[1-9](?:[XYZABCR][-+]?(?:\d+\.?\d*|\.\d+))+")
+_ACTIVE = re.compile(r"G10(?!\d).*P0+(?![\d.]*[1-9])")
 DEPENDS = "depends on what is stored in the machine"
 
 Sides = tuple[Side, Side]
@@ -18,7 +19,13 @@ Refuse = Callable[[str], ProgramError]
 
 
 def chosen_system(
-    sides: Sides, words: Words, refuse: Refuse, a: Canonical, b: Canonical, angles: tuple[float, float] | None
+    sides: Sides,
+    words: Words,
+    refuse: Refuse,
+    a: Canonical,
+    b: Canonical,
+    angles: tuple[float, float] | None,
+    source: str,
 ) -> list[tuple[str, str]]:
     """Return (kind, text) where a work coordinate system is chosen, or its origin or rotation set.
 
@@ -30,6 +37,8 @@ def chosen_system(
         The calls ``g5x`` of both runs.
     angles : tuple of float or None
         Rotations told with them [deg].
+    source : str
+        Line of the program.
     """
     index, chosen = int(a.values[0]), sides[0].frame.system
     if index != int(b.values[0]):
@@ -57,7 +66,9 @@ def chosen_system(
         if not agree(first.frame.rotation, second.frame.rotation):
             raise refuse(f"the rotation of the work coordinate system {DEPENDS}")
         fixed.append(f"R{format_number(first.frame.rotation)}")
-    result = [("g10", f"G10 {way} P{index} {' '.join(some)}") for way, some in (("L2", fixed), ("L20", here)) if some]
+    # P0 is the system in force, whichever that is; what is chosen here may not be what the machine stands in
+    place = 0 if _ACTIVE.search(_bare(source)) else index
+    result = [("g10", f"G10 {way} P{place} {' '.join(some)}") for way, some in (("L2", fixed), ("L20", here)) if some]
     if index != chosen or not result:
         result.append(("g5x", SYSTEMS[index]))
     return result
@@ -73,9 +84,12 @@ def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
     source : str
         Line of the program.
     """
-    text = re.sub(r"\([^)]*\)|;.*|\s", "", source).upper()
+    text = _bare(source)
     if not PLAIN_G10.fullmatch(text):
-        raise refuse("an origin of a work coordinate system that is not in force is set by more than plain numbers")
+        raise refuse(
+            "an origin of a work coordinate system that is not in force is set by more than plain numbers; choose that "
+            "system before (G54 ...), or write the numbers"
+        )
     index = int(text[text.index("P") + 1])
     for letter, value in re.findall(r"([XYZABC])([-+]?[\d.]+)", text):
         axis = AXES.index(letter)
@@ -87,6 +101,10 @@ def plain_g10(sides: Sides, words: Words, refuse: Refuse, source: str) -> str:
         for side in sides:
             side.rotations[index] = float(value)
     return re.sub(r"(?<=[\d.])(?=[A-Z])", " ", re.sub(r"^N\d+", "", text))
+
+
+def _bare(source: str) -> str:
+    return re.sub(r"\([^)]*\)|;.*|\s", "", source).upper()
 
 
 def shift(sides: Sides, words: Words, refuse: Refuse, old: tuple[Place, Place], source: str) -> str:

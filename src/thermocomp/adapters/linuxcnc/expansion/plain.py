@@ -84,7 +84,11 @@ class Writer:
         line = self.line if first.file or first.line < 1 else first.line
         if first.kind != second.kind or first.line != second.line:
             self.line = line if first.file or second.file else min(line, second.line)
-            raise self.refuse(f"what is run {DEPENDS}", first.file)
+            raise self.refuse(
+                f"what is run {DEPENDS}: a branch or a loop asks for a parameter, an origin or a place that the "
+                "program has not set; set it before",
+                first.file,
+            )
         merged = False
         if before is not None:
             texts, merged = self.release(*before, first, second)
@@ -134,7 +138,8 @@ class Writer:
                 return [], True
             merged = a.kind == "rotation" and close
             angles = (a.values[0], b.values[0]) if merged else None
-            return chosen_system(self.sides, self.words, self.refuse, held, other, angles), merged
+            source = "" if held.file else self.source(held.line)
+            return chosen_system(self.sides, self.words, self.refuse, held, other, angles, source), merged
         if kind == "path":
             merged = a.kind == "naive" and close
             if held.values != other.values or (merged and a.values != b.values):
@@ -292,7 +297,8 @@ class Writer:
                     yield "G90"
                 return
         raise self.refuse(
-            f"where {', '.join(AXES[i] for i in moved)} goes {DEPENDS} (origins, tools, G98 or G99, where it stands)"
+            f"where {', '.join(AXES[i] for i in moved)} goes {DEPENDS} (origins, tools, parameters, G98 or "
+            "G99, where it stands): let the program set it before"
         )
 
     def arc(self, a: Canonical, b: Canonical, known: list[bool]) -> Iterator[str]:

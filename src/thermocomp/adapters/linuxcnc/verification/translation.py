@@ -11,7 +11,7 @@ from typing import Final
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import PLANES, Block, Point, Setup, system_name
-from thermocomp.nc.interpreter.codes import CYCLES
+from thermocomp.nc.interpreter.codes import ADDITIONAL_SYSTEMS, CYCLES
 from thermocomp.nc.interpreter.cycles import KEPT
 from thermocomp.nc.interpreter.interpret import Follower
 from thermocomp.nc.parser.tokens import read_lines
@@ -180,7 +180,7 @@ class Translator:
 
     def _check(self, block: Block, codes: set[str]) -> None:
         known = {*_SAME, *_SAME_M, *_LEFT_OUT, *_MOTION, *(f"M{n}" for n in self._setup.harmless)}
-        known |= {*_ONCE, "G20", "G21", "G41", "G42", "G43", "G49", "G54.1", "G68", "G69", "G154"}
+        known |= {*_ONCE, "G20", "G21", "G41", "G42", "G43", "G49", "G68", "G69", *ADDITIONAL_SYSTEMS}
         if strange := sorted(codes - known):
             raise _cannot(block, f"{strange[0]} has no counterpart in LinuxCNC")
         if block.kind == "probe":
@@ -206,7 +206,7 @@ class Translator:
         return [f"G43 H{self._length}"] if self._length else ["G49"]
 
     def _system(self, block: Block, codes: set[str]) -> list[str]:
-        if not {"G54.1", "G154"} & codes:
+        if not ADDITIONAL_SYSTEMS & codes:
             return []
         system = block.modal.system
         if system not in self.systems:
