@@ -53,7 +53,7 @@ START = "G17 G40 G80 G90 G94"
         *((f"G21 {code}\nG0 X1\nM2\n", ["G21", code, "G0 X1", "M2"]) for code in SYSTEMS.values()),
         ("G21\nG0 X1\nM2\n", ["G21", "G0 X1", "M2"]),
         # the origin of the system in force, whichever it is
-        ("G21\nG0 X1\nG10 L20 P0 X0\nX3\nM2\n", ["G21", "G0 X1", "G10 L20 P0 X0", "G0 X3", "M2"]),
+        ("G21\nG0 X1 Y2\nG10 L20 P0 X0 Y0\nX3\nM2\n", ["G21", "G0 X1 Y2", "G10 L20 P0 X0 Y0", "G0 X3 Y0", "M2"]),
         ("G21 G55\nG0 X1\nG10 L2 P2 X7\nM2\n", ["G21", "G55", "G0 X1", "G10 L2 P2 X7", "M2"]),
         # an offset of nothing, twice
         ("G92.1\nG52 X0 Y0 Z0\nG21\nG0 X1\nM2\n", ["G92.1", "G21", "G0 X1", "M2"]),

@@ -34,6 +34,12 @@ def tried(path: Path, folder: Path, drift: Steady, way: str, every: float | None
     "coordinates",
     None,
 )
+# X0 in G91 moves nothing, before a cycle as well
+@example(
+    "G21 G90\nF100 S1000 M3\nG1 X0\nM3 G17 G91 G98 G84 X0.000000 Z-0.125 R0.0 L2\nX0.000000\nG80\nM2\n",
+    "coordinates",
+    None,
+)
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_random_program_keeps_the_law_or_is_refused(
     tmp_path_factory: pytest.TempPathFactory, text: str, way: str, every: float | None

@@ -156,12 +156,13 @@ class Coordinates(CorrectionMethod):
         for i in self.named(block):
             if i == axis:
                 continue
+            moves = abs(block.end[i] - block.start[i]) > STILL
             if block.modal.absolute:
-                if not self.before[i] or abs(block.end[i] - block.start[i]) > STILL:
+                if moves or not self.before[i]:
                     new[i] = goal[i]
                 shifts[AXES[i]] = new[i]
                 self.fixed[i] = self.doubtful[i] = False
-            elif repeats == 1 and not self.fixed[i] and not self.doubtful[i]:
+            elif moves and repeats == 1 and not self.fixed[i] and not self.doubtful[i]:
                 new[i] = goal[i]
                 shifts[AXES[i]] = round(new[i] - old[i], frame.digits)
         if block.line.optional and tuple(new) != old:
