@@ -34,8 +34,8 @@ def test_bare_mm_is_a_displacement() -> None:
 
 
 def test_unknown_unit_names_the_nearest() -> None:
-    with pytest.raises(UnitError, match=r"unknown unit 'degc'.*did you mean .*degC"):
-        find_unit("degc")
+    with pytest.raises(UnitError, match=r"unknown unit 'degcc'.*did you mean .*degC"):
+        find_unit("degcc")
 
 
 def test_wrong_quantity_says_what_it_measures() -> None:

@@ -66,8 +66,8 @@ def test_bad_text_is_told_with_file_line_and_column(tmp_path: Path, text: str, p
 @pytest.mark.parametrize(
     ("heading", "parts"),
     [
-        ("t1 [degX]", ["'t1 [degX]'", "column 2", "'degX'", "did you mean degF or degC", 'role = "ignore"']),
-        ("drift (microns)", ["'microns'", "micron"]),
+        ("t1 [degX]", ["'t1 [degX]'", "column 2", "'degX'", "did you mean deg", 'role = "ignore"']),
+        ("drift (micrrons)", ["'micrrons'", "did you mean um"]),
     ],
 )
 def test_a_mistyped_unit_is_told_with_the_nearest(tmp_path: Path, heading: str, parts: list[str]) -> None:
@@ -127,7 +127,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["rec.xls", "rec", "rec.csv.gz"])
 def test_another_ending_is_told_with_those_that_are_read(tmp_path: Path, name: str) -> None:
-    with pytest.raises(RecordingError, match=r"are not read; save it as one of \.csv, .*\.xlsx, \.parquet"):
+    with pytest.raises(RecordingError, match=r"are not read; save it as one of \.csv, .*\.xlsx, \.ods, \.parquet"):
         read(tmp_path / name)
 
 

@@ -40,7 +40,7 @@ def test_numbers_may_be_written_without_a_point(tmp_path: Path) -> None:
         ("[read]\ndelimeter = ';'\n", ["table [read]", "'delimeter'", "did you mean 'delimiter'"]),
         ('[time]\nstart = "1.3.2024 08:00"\n', ["[time]: start = '1.3.2024 08:00'", '"2024-03-01T08:00:00"']),
         ("[time]\nstart = 2024-03-01T08:00:00\n", ["table [time]", "'start'", "valid string"]),
-        ("[time]\nzzzzz = 1\n", ["table [time]", "'zzzzz'", "Known are column, unit, format, start"]),
+        ("[time]\nzzzzz = 1\n", ["table [time]", "'zzzzz'", "Known are column, unit, format, start, date"]),
         ("[columns.z]\nscale = 'two'\n", ["table [columns.z]", "'scale' = 'two'", "valid number"]),
         ("[columns.z]\nzero = 'last'\n", ["table [columns.z]", "'zero' = 'last'", "first"]),
         ("[columns.z]\nrole = 'temprature'\n", ["table [columns.z]", "'role'", "'temperature'"]),
@@ -66,9 +66,9 @@ def test_a_wrong_mapping_is_told_by_file_table_and_key(tmp_path: Path, text: str
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("[columns.z]\nunit = 'degc'\n", ["[columns.z]", "'degc'", "degC"]),
+        ("[columns.z]\nunit = 'degcc'\n", ["[columns.z]", "'degcc'", "degC"]),
         ("[columns.z]\nunit = 'mm'\nrole = 'temperature'\n", ["[columns.z]", "not temperature", "degC"]),
-        ("[time]\nunit = 'sek'\n", ["[time]", "'sek'", "sec"]),
+        ("[time]\nunit = 'sekk'\n", ["[time]", "'sekk'", " s"]),
         ("[time]\nunit = 'mm'\n", ["[time]", "not time"]),
     ],
 )

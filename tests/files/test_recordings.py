@@ -298,7 +298,7 @@ def test_a_workbook_reads_like_a_text_file(tmp_path: Path) -> None:
     assert recording.time.tolist() == [0.0, 60.0]
     np.testing.assert_array_equal(recording.table["t1_C"], [20.5, np.nan])
     assert recording.start == "2024-05-01T10:00:00"
-    assert recording.notes == ("only the first sheet 'test' of 2 is read",)
+    assert recording.notes == ("sheet 'test' of 'test', 'more' is read",)
 
 
 def test_a_parquet_file_may_have_its_timestamps_as_index(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
-from thermocomp.core.units import Unit, find_unit
+from thermocomp.core.units import SPELLINGS, Unit, find_unit
 
 # What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
 SUFFIXES = {
@@ -15,6 +15,12 @@ SUFFIXES = {
     "mm_min": "mm/min",
     "m_min": "m/min",
 }
+#: what may stand behind a name without brackets, as in "T1 °C", "T1 in °C", "T1 / °C" and "T1, °C": no letter alone
+_BEHIND = re.compile(
+    r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|deg ?|Grad )[CF]|℃"
+    r"|(?:\d[\d.,/]* ?)?(?:[µμu]m|mm)|[µμ]rad|rpm|(?:U|1|r|tr|rev)/min|min(?:-1|\^-1|⁻¹))"
+    r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
+)
 # In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
 _NOT_IN_BRACKETS = ("", "1")
 _FREQUENCIES = ("Hz", "1/s")
@@ -58,7 +64,7 @@ def understand(heading: str) -> Meaning | None:
     found = BRACKETS.fullmatch(heading)
     if found:
         base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
-        turning = any(word in base.casefold() for word in ("spindle", "speed"))
+        turning = any(word in base.casefold() for word in ("spindle", "speed", "spindel", "drehzahl", "broche"))
         if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
             return None
         symbol = SUFFIXES.get(symbol, symbol)
@@ -66,15 +72,20 @@ def understand(heading: str) -> Meaning | None:
             meant = find_unit(symbol)
         except UnitError:
             # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-            if get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
+            words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
+            if words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
                 raise
             return None
     else:
         ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
-        if not ends:
+        behind = _BEHIND.fullmatch(heading)
+        if ends:
+            suffix = max(ends, key=len)
+            base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
+        elif behind:
+            base, meant = behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
+        else:
             return None
-        suffix = max(ends, key=len)
-        base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
     if meant.quantity == "displacement" and _is_position(base, meant.symbol):
         meant = find_unit(meant.symbol, "position")
     # one word, so that the name can go into a formula or a controller

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
@@ -80,37 +80,43 @@ _UNITS = [
 
 #: spellings met in files
 _ALIASES = {
-    "sec": "s",
-    "seconds": "s",
-    "minutes": "min",
-    "hours": "h",
-    "hr": "h",
-    "day": "d",
-    "days": "d",
     "C": "degC",
     "°C": "degC",
-    "celsius": "degC",
-    "kelvin": "K",
     "F": "degF",
     "°F": "degF",
-    "µm": "um",
-    "μm": "um",
-    "micron": "um",
-    "inch": "in",
     "um/m": "urad",
-    "µm/m": "urad",
-    "mm/s²": "mm/s2",
-    "m/s²": "m/s2",
-    "mm/s^2": "mm/s2",
-    "m/s^2": "m/s2",
-    "µrad": "urad",
-    "μrad": "urad",
-    "rpm": "1/min",
-    "r/min": "1/min",
-    "min-1": "1/min",
     "Hz": "1/s",
     "": "1",
 }
+#: words met in files, in several languages, in small letters
+_WORDS = {
+    word: unit
+    for unit, words in {
+        "s": "sec secs second seconds sek sekunde sekunden seg seconde secondes secondi",
+        "min": "mins minute minutes minuten minuti minutos",
+        "h": "hr hrs hour hours std stunde stunden heure heures ore horas",
+        "d": "day days tag tage jour jours",
+        "ms": "msec millisecond milliseconds millisekunden",
+        "degC": "celsius grad_c grad_celsius deg_c degc deg._c degree_c degrees_c degree_celsius degrees_celsius oc",
+        "K": "kelvin",
+        "degF": "fahrenheit deg_f degf degrees_f degree_f",
+        "nm": "nanometer nanometers",
+        "um": "micron microns micrometer micrometers micrometre micrometres mikrometer mikron mkm",
+        "mm": "millimeter millimeters millimetre millimetres",
+        "in": "inch inches zoll",
+        "1/min": "rpm r/min rev/min revs/min u/min u_/_min upm umdr/min /min min-1 min^-1 1/minute tr/min giri/min",
+        "1/s": "rps rev/s u/s s-1 s^-1",
+        "mm/s2": "mm/s^2",
+        "m/s2": "m/s^2",
+    }.items()
+    for word in words.split()
+}
+#: all spellings of words
+SPELLINGS = tuple(_WORDS)
+#: signs that stand for others, or are what a wrong encoding makes of them
+_SIGNS = str.maketrans({"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "·": "*"})
+#: a count of a unit, such as 0.001 mm, 1/1000 mm, 10 um
+_COUNT = re.compile(r"(\d+(?:[.,]\d+)?)(?:/(\d+))? ?([^\d\s/].*)")
 
 #: a number and its unit, such as 12.5 mm, 1e-3urad or 6000 1/min
 _MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?|(?<=\s)1/.*?)\s*")
@@ -140,7 +146,13 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     """
     if quantity is not None and quantity not in HOUSE_UNITS:
         raise UnitError(f"unknown quantity {quantity!r}; known are {', '.join(HOUSE_UNITS)}")
-    name = _ALIASES.get(symbol, symbol)
+    name = _name(symbol)
+    counted = _COUNT.fullmatch(name)
+    if counted is not None:
+        base = find_unit(counted[3], quantity)
+        factor = float(counted[1].replace(",", ".")) / float(counted[2] or 1)
+        if not base.shift and factor:
+            return replace(base, symbol=symbol, scale=base.scale * factor)
     if quantity is not None:
         found = _BY_KEY.get((name, quantity))
         if found is not None:
@@ -152,10 +164,19 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
         measures = " or ".join(dict.fromkeys(u.quantity for u in fitting))
         usable = ", ".join(u.symbol for u in _UNITS if u.quantity == quantity)
         raise UnitError(f"unit {symbol!r} measures {measures}, not {quantity}; for {quantity} use one of {usable}")
-    known = list(dict.fromkeys([u.symbol for u in _UNITS] + [a for a in _ALIASES if a]))
-    near = get_close_matches(symbol, known, n=3, cutoff=0.5)
-    hint = f"; did you mean {' or '.join(near)}?" if near else "."
+    known = list(dict.fromkeys([u.symbol for u in _UNITS] + [a for a in (*_ALIASES, *_WORDS) if a]))
+    near = get_close_matches(symbol, known, n=9, cutoff=0.5)
+    meant = list(dict.fromkeys(_ALIASES.get(n) or _WORDS.get(n, n) for n in near))[:3]
+    hint = f"; did you mean {' or '.join(meant)}?" if meant else "."
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")
+
+
+def _name(symbol: str) -> str:
+    """Return the symbol under which a unit is kept, of one of its spellings."""
+    plain = " ".join(symbol.removeprefix("Â").replace("℃", "°C").replace("℉", "°F").translate(_SIGNS).split())
+    plain = plain.replace("° ", "°")
+    word = plain.casefold().removesuffix(".").replace(" ", "_")
+    return _ALIASES.get(plain) or _WORDS.get(word, plain)
 
 
 def read_with_unit(text: object, quantity: str) -> float | None:

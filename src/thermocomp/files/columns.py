@@ -11,13 +11,24 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, Meaning, understand
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
-from thermocomp.files.mapping import ColumnMap, Mapping
+from thermocomp.files.mapping import ColumnMap, Mapping, Place
 
 FloatArray = NDArray[np.float64]
 
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
-_TIMES = ("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed")
+#: headings of a time column, without their unit, in several languages
+_TIMES = (
+    *("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed", "zeit", "zeitstempel", "messzeit"),
+    *("laufzeit", "temps", "horodatage", "tempo", "tiempo", "timestamps", "time stamp", "date time", "elapsed time"),
+    *("date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit", "datum und uhrzeit", "date/heure", "fecha/hora"),
+    *("data/ora", "date and time", "date & time", "datumzeit"),
+)
+#: those that hold a number only if they say in which unit
+_NEEDS_UNIT = ("t", "elapsed")
+#: headings of a date, and of the time of day beside it
+_DATES = ("date", "datum", "fecha", "data", "tag", "day")
+_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day")
 
 
 @dataclass(frozen=True)
@@ -115,12 +126,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     UnitError
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
-    for k, heading in enumerate(headings):
-        if heading and heading in headings[:k]:
-            first = list(headings).index(heading) + 1
-            raise RecordingError(
-                f"{source}: columns {first} and {k + 1} are both named {heading!r}; rename one of them"
-            )
+    _refuse_twins(headings, mapping, source)
     meanings = _understand_all(headings, mapping, source)
     time, date, notes = _find_time(headings, meanings, mapping, source)
     cycle = _find_cycle(headings, mapping, source)
@@ -128,10 +134,11 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     tables: dict[int, str] = {}
     ignored = {k for k in (time, date, cycle) if k is not None}
     for name, rule in mapping.columns.items():
-        heading = rule.column or name
-        if rule.role == "ignore" and heading not in headings:
+        place = rule.column or name
+        if rule.role == "ignore" and isinstance(place, str) and place not in headings:
             continue
-        index = _position(heading, headings, f"[columns.{name}]", source)
+        index = _position(place, headings, f"[columns.{name}]", source)
+        heading = headings[index]
         ignored.add(index)
         if rule.role == "ignore":
             continue
@@ -212,13 +219,13 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:
     """Understand every heading; a mistyped unit matters only where the mapping does not speak of the column."""
-    mapped = {rule.column or name for name, rule in mapping.columns.items()} | {mapping.time.column}
+    mapped = _mapped(mapping) | {mapping.time.column}
     meanings: list[Meaning | None] = []
     for k, heading in enumerate(headings, start=1):
         try:
             meanings.append(understand(heading))
         except UnitError as e:
-            if heading not in mapped and not mapping.read.only_mapped:
+            if mapped.isdisjoint((heading, k)) and not mapping.read.only_mapped:
                 raise UnitError(
                     f"{source}: heading {heading!r} of column {k}: {e}. Correct it, or leave the column out by a "
                     f'mapping with [columns."{heading}"] role = "ignore"'
@@ -232,15 +239,18 @@ def _find_time(
 ) -> tuple[int, int | None, list[str]]:
     """Find the time column, and the column of dates where the time column holds only a time of day."""
     if mapping.time.column:
-        return _position(mapping.time.column, headings, "[time]", source), None, []
+        date = _position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
+        return _position(mapping.time.column, headings, "[time]", source), date, []
     timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
     plain = {h.strip().casefold(): k for k, h in enumerate(headings)}
     named = [k for k, m in timed.items() if m.base.casefold() in _TIMES]
     if named:
         return named[0], None, []
-    if "date" in plain and "time" in plain:
-        return plain["time"], plain["date"], []
-    bare = [plain[name] for name in _TIMES if name in plain and name not in ("t", "elapsed")]
+    date = next((plain[name] for name in _DATES if name in plain), None)
+    clock = next((plain[name] for name in _CLOCKS if name in plain), None)
+    if date is not None and clock is not None:
+        return clock, date, []
+    bare = [plain[name] for name in (*_TIMES, "datum") if name in plain and name not in _NEEDS_UNIT]
     if bare:
         return bare[0], None, []
     if len(timed) == 1:
@@ -274,11 +284,32 @@ def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int |
     for name, rule in mapping.columns.items():
         if rule.role == "cycle":
             return _position(rule.column or name, headings, f"[columns.{name}]", source)
-    mapped = {rule.column or name for name, rule in mapping.columns.items()}
+    mapped = _mapped(mapping)
     return next((k for k, h in enumerate(headings) if h.casefold() == "cycle" and h not in mapped), None)
 
 
-def _position(heading: str, headings: Sequence[str], table: str, source: str) -> int:
+def _mapped(mapping: Mapping) -> set[Place]:
+    return {rule.column or name for name, rule in mapping.columns.items()}
+
+
+def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str) -> None:
+    """Refuse columns of one heading, unless the mapping names them by number."""
+    numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
+    for k, heading in enumerate(headings):
+        first = list(headings).index(heading)
+        alone = mapping.read.only_mapped and heading not in numbered
+        if heading and first < k and not alone and not numbered.issuperset((first + 1, k + 1)):
+            raise RecordingError(
+                f"{source}: columns {first + 1} and {k + 1} are both named {heading!r}; rename one of them, or name "
+                f"both by number in a mapping, such as [columns.NAME] column = {k + 1}"
+            )
+
+
+def _position(heading: Place, headings: Sequence[str], table: str, source: str) -> int:
+    if isinstance(heading, int):
+        if 1 <= heading <= len(headings):
+            return heading - 1
+        raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {heading}")
     if heading in headings:
         return list(headings).index(heading)
     near = get_close_matches(heading, headings, n=3, cutoff=0.5)

@@ -15,6 +15,8 @@ from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.tomlfile import read_toml
 
+#: a column by its heading, or by its number from 1
+Place = str | int
 Role = Literal[
     "temperature",
     "displacement",
@@ -34,8 +36,8 @@ class TimeColumn:
 
     Parameters
     ----------
-    column : str
-        Its heading; empty: found by its heading (``time_s``, ``timestamp`` ...).
+    column : str or int
+        Its heading, or its number from 1; empty: found by its heading (``time_s``, ``timestamp`` ...).
     unit : str
         A unit of time, or ``timestamp`` for dates with a time of day; empty: from the heading and the cells.
     format : str
@@ -43,12 +45,15 @@ class TimeColumn:
     start : str
         ISO timestamp of the first row, for files that hold only relative times: it tells the days, and which
         file goes on from another.
+    date : str or int
+        Column of the dates where `column` holds the time of day alone.
     """
 
-    column: str = ""
+    column: Place = ""
     unit: str = ""
     format: str = ""
     start: str = ""
+    date: Place = ""
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,8 @@ class ColumnMap:
 
     Parameters
     ----------
-    column : str
-        Its heading in the file; empty: NAME itself.
+    column : str or int
+        Its heading in the file, or its number from 1, for headings that come twice; empty: NAME itself.
     unit : str
         Unit of the scaled value; empty: the house unit of the role, or the unit in the heading.
     role : str, optional
@@ -75,7 +80,7 @@ class ColumnMap:
         Where the sensor sits, in words.
     """
 
-    column: str = ""
+    column: Place = ""
     unit: str = ""
     role: Role | None = None
     scale: float = 1.0
@@ -109,6 +114,10 @@ class ReadOptions:
         Numbers that stand for a missing value in every column.
     only_mapped : bool
         True: columns that have no table ``[columns.NAME]`` are left out.
+    heading : int
+        Line or row of the headings, from 1; 0: it is looked for.
+    sheet : str
+        Of a workbook; empty: the only one, or the only one that holds a table with a time.
     """
 
     delimiter: str = ""
@@ -117,6 +126,8 @@ class ReadOptions:
     comment: str = "#"
     missing: tuple[float, ...] = ()
     only_mapped: bool = False
+    heading: int = 0
+    sheet: str = ""
 
 
 @dataclass(frozen=True)
@@ -125,13 +136,13 @@ class CycleRule:
 
     Parameters
     ----------
-    column : str
+    column : str or int
         Column of labels; empty: a column named ``cycle``, else the spindle speed.
     min_run_s, min_stop_s : float
         Shorter runs and stops of the spindle do not split [s].
     """
 
-    column: str = ""
+    column: Place = ""
     min_run_s: float = 300.0
     min_stop_s: float = 300.0
 

@@ -18,15 +18,16 @@ from thermocomp.core.machine import Channel
 from thermocomp.files.columns import ColumnPlan, plan, why_left_out
 from thermocomp.files.draft import draft
 from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet, open_xlsx
+from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet
 from thermocomp.files.textfile import open_csv
 from thermocomp.files.times import read_times
+from thermocomp.files.workbook import open_workbook
 from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
 
-ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".parquet")
+ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".ods", ".parquet")
 
 
 def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
@@ -38,7 +39,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     Parameters
     ----------
     path : str or Path
-        A file ending in .csv, .tsv, .txt, .xlsx or .parquet.
+        A file ending in .csv, .tsv, .txt, .xlsx, .ods or .parquet.
     mapping : Mapping, optional
         What the columns are, where their headings do not say; see `thermocomp.files.mapping.read_mapping`.
 
@@ -275,8 +276,8 @@ def _open(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
     try:
         with path.open("rb") as f:
             sha256 = hashlib.file_digest(f, "sha256").hexdigest()
-        if ending == ".xlsx":
-            return open_xlsx(path), sha256
+        if ending in (".xlsx", ".ods"):
+            return open_workbook(path, options), sha256
         if ending == ".parquet":
             return open_parquet(path), sha256
         return open_csv(path, options), sha256

@@ -1,6 +1,5 @@
-"""Raw tables, their cells not yet understood: XLSX and Parquet, and what all kinds of files share."""
+"""Raw tables, their cells not yet understood: Parquet, and what all kinds of files share."""
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,33 +94,6 @@ class FrameTable:
     def place(self, row: int) -> str:
         """Say in which row of the sheet or file, counted from 1, a row stands."""
         return f"row {self.rows[row]}"
-
-
-def open_xlsx(path: Path) -> FrameTable:
-    """Open the first sheet of a workbook.
-
-    Raises
-    ------
-    RecordingError
-        It is not a workbook, or holds no recording.
-    """
-    try:
-        with pd.ExcelFile(path, engine="openpyxl") as book:
-            sheets = [str(s) for s in book.sheet_names]
-            cells = pd.read_excel(book, sheet_name=sheets[0], header=None, dtype=object)
-    except ImportError as e:
-        raise MissingExtraError("study", "openpyxl") from e
-    except (ValueError, KeyError, zipfile.BadZipFile) as e:
-        raise RecordingError(f"{path}: is not a workbook in the XLSX format ({e}); save it anew as .xlsx") from e
-    notes = [f"only the first sheet {sheets[0]!r} of {len(sheets)} is read"] if len(sheets) > 1 else []
-    if cells.empty:
-        raise RecordingError(f"{path}: sheet {sheets[0]!r} is empty; a recording has a heading row and rows of numbers")
-    remark = cells[0].map(lambda c: isinstance(c, str) and c.lstrip().startswith("#"))
-    content = cells[~remark.astype(bool) & cells.notna().any(axis=1)]
-    headings = ["" if pd.isna(c) else str(c).strip() for c in content.iloc[0]] if len(content) else []
-    check_headings(path, headings, n_rows=len(content) - 1)
-    rows = [int(k) + 1 for k in content.index[1:]]
-    return FrameTable(str(path), tuple(headings), content.iloc[1:].reset_index(drop=True), rows, notes=tuple(notes))
 
 
 def open_parquet(path: Path) -> FrameTable:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.tables import EMBEDDED, MISSING_TEXT, check_headings, is_float, not_numbers, refuse_cell
 
@@ -21,6 +22,7 @@ _SAMPLE_LINES = 100
 _CHUNK = 100_000  # rows that are text in memory at a time
 _BOM = b"\xef\xbb\xbf"
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
+_SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 # pandas before 3.1 may read the last digit wrong unless told
 _PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
@@ -143,17 +145,19 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     _refuse_binary(path)
     comment = options.comment.encode()
     skipped: list[int] = []
-    first = [line for _, line in islice(_content(path, comment, []), _SAMPLE_LINES)]
+    top = options.heading - 1
+    first = list(islice((c for c in _content(path, comment, []) if c[0] >= top), _SAMPLE_LINES))
     if not first:
         raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
-    sample = [line.decode("latin-1") for line in first]
-    delimiter = options.delimiter or _sniff_delimiter(sample)
+    sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
+    delimiter, layout = _find_table(sample, options.delimiter or _separator(path))
     ending = delimiter.encode()
-    width, is_utf8, n_rows = _cells(first[0], delimiter), True, -1
+    heading, begin = first[layout.heading][1], 1 + max(layout)
+    width, is_utf8, n_rows = _cells(heading, delimiter), True, -begin
     for number, line in _content(path, comment, skipped):
         is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
-        n_rows += 1
-        if n_rows == 0:  # the heading line
+        n_rows += number >= top
+        if n_rows <= 0:  # what stands above the rows
             skipped.append(number)
             continue
         cells = _cells(line, delimiter)
@@ -163,12 +167,14 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
             raise RecordingError(_ragged(path, number + 1, cells, width, line, delimiter))
     encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
     try:
-        headings = [h.strip() for h in _split(first[0].decode(encoding), delimiter)]
+        headings = [h.strip() for h in _split(heading.decode(encoding), delimiter)]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
     headings += [""] * (width - len(headings))
     check_headings(path, headings, n_rows)
-    rows = tuple(tuple(_split(line, delimiter)) for line in sample[1:])
+    if layout.units > layout.heading:
+        headings = join_units(headings, _split(first[layout.units][1].decode(encoding), delimiter))
+    rows = tuple(tuple(_split(line, delimiter)) for line in sample[begin:])
     return CsvTable(
         path=path,
         headings=tuple(headings),
@@ -179,6 +185,7 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
         skipped=tuple(skipped),
         n_rows=n_rows,
         embedded=_embedded(path),
+        notes=tell_layout([number + 1 for number, _ in first], layout, "line"),
     )
 
 
@@ -194,7 +201,8 @@ def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[i
                     "Macintoshes; save the file with the line ends of Unix or Windows"
                 )
             text = line.lstrip()
-            if not text.strip(blank) or (comment and text.startswith(comment)):
+            remark = (comment and text.startswith(comment)) or (number == 0 and _SEPARATOR.fullmatch(raw))
+            if remark or not text.strip(blank):
                 skipped.append(number)
             else:
                 yield number, line
@@ -221,18 +229,28 @@ def _refuse_binary(path: Path) -> None:
         )
 
 
-def _sniff_delimiter(lines: Sequence[str]) -> str:
-    """Choose the delimiter under which the heading has several cells and most rows as many as it."""
-    best, best_fit = ",", (0.0, 0)
-    for delimiter in ("\t", ";", "|", ",", " "):
-        width = len(_split(lines[0], delimiter))
-        if width < 2 or (delimiter == " " and best_fit > (0, 0)):
+def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout]:
+    """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
+    best, best_layout, best_fit = delimiter or ",", Layout(0, 0), (False, 0.0, 0)
+    for tried in delimiter or "\t;|, ":
+        if tried == " " and best_fit > (False, 0.0, 0) and not delimiter:
             continue  # white space stands inside headings and timestamps too: the last resort
-        rows = [len(_split(line, delimiter)) in (width, width + 1) for line in lines[1:]]
-        fit = (sum(rows) / len(rows) if rows else 1.0, width)
-        if fit > best_fit and (fit[0] > 0 or delimiter != " "):
-            best, best_fit = delimiter, fit
-    return best
+        rows = [_split(line, tried) for line in lines]
+        found = find_layout(rows)
+        layout = found or Layout(0, 0)
+        width = len(rows[layout.heading])
+        fits = [len(row) in (width, width + 1) for row in rows[1 + max(layout) :]]
+        fit = (found is not None, sum(fits) / len(fits) if fits else 1.0, width)
+        if delimiter or (width > 1 and fit > best_fit and (fit[1] > 0 or tried != " ")):
+            best, best_layout, best_fit = tried, layout, fit
+    return best, best_layout
+
+
+def _separator(path: Path) -> str:
+    """Return the delimiter that a spreadsheet writes into the first line of a file (``sep=;``), if it does."""
+    with path.open("rb") as f:
+        found = _SEPARATOR.fullmatch(f.readline(16))
+    return found[1].decode() if found else ""
 
 
 def _sniff_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
