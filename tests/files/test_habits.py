@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.files.mapping import ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.recordings import read
 from thermocomp.recording.recording import Recording
@@ -122,6 +122,21 @@ def test_dates_that_can_be_read_in_two_ways_are_asked_for(tmp_path: Path) -> Non
     with pytest.raises(RecordingError, match="say how it is written in a mapping"):
         read(path)
     same(read(path, Mapping(TimeColumn("Clock", format="%m/%d/%Y %H:%M:%S", date="Day"))))
+
+
+def test_what_a_channel_cannot_have_is_missing_and_listed(tmp_path: Path) -> None:
+    path = tmp_path / "outliers.csv"
+    rows = numbers()
+    rows[4] = (*rows[4][:4], 2500.0)
+    rows[5] = (*rows[5][:4], -1200.0)
+    path.write_text(HEAD + text(rows), encoding="utf-8")
+    valid = Mapping(columns={"z_um": ColumnMap(5, "um", valid=(-500.0, 500.0))})
+    recording = read(path, valid)
+    assert np.flatnonzero(recording.table["z_um"].isna()).tolist() == [4, 5]
+    (note,) = (n for n in recording.notes if n.startswith("z_um"))
+    assert note == "z_um: not within -500 to 500 um, taken as missing, in 2 of 12 cells: line 6, line 7"
+    with pytest.raises(InputError, match=r"\[columns.z_um\]: valid = \[5.0, 5.0\]: the first must be below the second"):
+        Mapping(columns={"z_um": ColumnMap(5, "um", valid=(5.0, 5.0))})
 
 
 # -- workbooks -----------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """What the columns of a recording are: understood by their headings' units, or by a mapping."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
@@ -15,6 +15,8 @@ from thermocomp.files.mapping import ColumnMap, Mapping, Place
 
 FloatArray = NDArray[np.float64]
 
+#: places of cells that are listed
+_MOST_TOLD = 40
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
 #: headings of a time column, without their unit, in several languages
@@ -51,8 +53,10 @@ class Column:
     unit: Unit
     rule: ColumnMap
 
-    def convert(self, raw: FloatArray, missing: Sequence[float] = ()) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return the values in the house unit, nan where missing, and notes on what was replaced."""
+    def convert(
+        self, raw: FloatArray, missing: Sequence[float] = (), place: Callable[[int], str] = "row {}".format
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """Return the values in the house unit, nan where missing, and notes on what was replaced, and where."""
         notes = []
         codes = np.array([*self.rule.missing, *missing])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
@@ -69,8 +73,19 @@ class Column:
         elif self.rule.zero:
             values = values - self.rule.zero
         # Multiplying only where needed keeps the digits of the file, and its memory.
-        for factor in (self.rule.scale, self.unit.scale):
-            values = values if factor == 1 else values * factor
+        values = values if self.rule.scale == 1 else values * self.rule.scale
+        if self.rule.valid is not None:
+            low, high = self.rule.valid
+            beyond = np.flatnonzero((values < low) | (values > high))
+            if beyond.size:
+                values = np.array(values)
+                values[beyond] = np.nan
+                where = ", ".join(place(int(k)) for k in beyond[:_MOST_TOLD]) + " ..." * (beyond.size > _MOST_TOLD)
+                notes.append(
+                    f"{self.channel.name}: not within {low:g} to {high:g} {self.unit.symbol}, taken as missing, in "
+                    f"{beyond.size} of {len(raw)} cells: {where}"
+                )
+        values = values if self.unit.scale == 1 else values * self.unit.scale
         return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
 
 

@@ -78,6 +78,8 @@ class ColumnMap:
         Numbers in the file that stand for a missing value.
     place : str
         Where the sensor sits, in words.
+    valid : tuple of float, optional
+        Lowest and highest value that the channel can have, in `unit` after `scale` and `zero`; others are missing.
     """
 
     column: Place = ""
@@ -87,6 +89,7 @@ class ColumnMap:
     zero: float | Literal["first"] = 0.0
     missing: tuple[float, ...] = ()
     place: str = ""
+    valid: tuple[float, float] | None = None
 
     @property
     def conversion(self) -> Unit | None:
@@ -174,6 +177,8 @@ class Mapping:
             _unit_in(table, column.unit, column.role if column.role in HOUSE_UNITS else None)
             if column.scale == 0 or not math.isfinite(column.scale):
                 raise InputError(f"{table}: scale = {column.scale}: must be a number other than 0")
+            if column.valid is not None and not column.valid[0] < column.valid[1]:
+                raise InputError(f"{table}: valid = {list(column.valid)}: the first must be below the second")
         if len(self.read.delimiter) > 1:
             raise InputError(f"[read]: delimiter = {self.read.delimiter!r}: must be one character")
         for name in ("min_run_s", "min_stop_s"):

@@ -145,7 +145,7 @@ def read_rows(
     data = {}
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
-        data[column.channel.name], found = column.convert(raw, mapping.read.missing)
+        data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
         notes.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
