@@ -1,5 +1,6 @@
 """Files that cannot be used, and the one sentence each of them earns."""
 
+import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -123,6 +124,23 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
     with pytest.raises(RecordingError, match=r"folder\.csv: cannot be read: Is a directory"):
         read(tmp_path / "folder.csv")
+
+
+def test_a_pipe_is_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(RecordingError, match=r"pipe\.csv: is a pipe or a device and no file"):
+        read(tmp_path / "pipe.csv")
+
+
+def test_a_line_has_bounds(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time_s,t1_C\n0,20\n10," + "1" * 5_000_000 + "\n")
+    with pytest.raises(RecordingError, match=r"line 3 has more than 4,000,000 bytes"):
+        read(path)
+    for cell in ("1" * 200_000, '"' + "1" * 200_000 + '"'):
+        with pytest.raises(RecordingError, match=r"line 3, column 't1_C'|infinite|no time|cannot be read"):
+            read(_csv(tmp_path, f"time_s,t1_C\n0,20\n10,{cell}x\n"))
+    with pytest.raises(InputError):
+        read(_csv(tmp_path, f'time_s,"{"a" * 200_000}"\n0,20\n'))
 
 
 @pytest.mark.parametrize("name", ["rec.xls", "rec", "rec.csv.gz"])

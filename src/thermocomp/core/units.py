@@ -171,6 +171,13 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")
 
 
+def is_unit(symbol: str) -> bool:
+    """Return whether `find_unit` knows a unit."""
+    name = _name(symbol)
+    counted = _COUNT.fullmatch(name)
+    return any(u.symbol in (name, counted and _name(counted[3])) for u in _UNITS)
+
+
 def _name(symbol: str) -> str:
     """Return the symbol under which a unit is kept, of one of its spellings."""
     plain = " ".join(symbol.removeprefix("Â").replace("℃", "°C").replace("℉", "°F").translate(_SIGNS).split())

@@ -1,5 +1,6 @@
 """What the columns of a recording are: understood by their headings' units, or by a mapping."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -310,8 +311,9 @@ def _mapped(mapping: Mapping) -> set[Place]:
 def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str) -> None:
     """Refuse columns of one heading, unless the mapping names them by number."""
     numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
+    firsts: dict[str, int] = {}
     for k, heading in enumerate(headings):
-        first = list(headings).index(heading)
+        first = firsts.setdefault(heading, k)
         alone = mapping.read.only_mapped and heading not in numbered
         if heading and first < k and not alone and not numbered.issuperset((first + 1, k + 1)):
             raise RecordingError(
@@ -355,7 +357,8 @@ def _aliases(columns: Sequence[Column], headings: Sequence[str], meanings: Seque
     for c in columns:
         aliases.setdefault(headings[c.index], c.channel.name)
     bases = [(m.base, c.channel.name) for c in columns if (m := meanings[c.index]) is not None]
+    counts = Counter(base for base, _ in bases)
     for base, name in bases:
-        if [b for b, _ in bases].count(base) == 1:
+        if counts[base] == 1:
             aliases.setdefault(base, name)
     return {alias: name for alias, name in aliases.items() if alias not in names}

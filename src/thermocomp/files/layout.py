@@ -5,9 +5,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from thermocomp.core.exceptions import UnitError
 from thermocomp.core.headings import BRACKETS
-from thermocomp.core.units import find_unit
+from thermocomp.core.units import is_unit
 from thermocomp.files.tables import MISSING_TEXT
 
 #: numbers and times, in all their habits
@@ -115,15 +114,7 @@ def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
 def _is_units(row: Sequence[str]) -> bool:
     """Return whether most of a row's filled cells are units."""
     filled = [cell.strip().strip("[]()") for cell in row if cell.strip() not in _NO_UNIT]
-    return bool(filled) and 2 * sum(map(_is_unit, filled)) > len(filled)
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        find_unit(text)
-    except UnitError:
-        return False
-    return True
+    return bool(filled) and 2 * sum(map(is_unit, filled)) > len(filled)
 
 
 def _is_value(cell: str) -> bool:

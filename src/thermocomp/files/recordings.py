@@ -274,6 +274,8 @@ def _open(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
             f"{path}: files ending in {ending or 'nothing'!r} are not read; save it as one of {', '.join(ENDINGS)}"
         )
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise RecordingError(f"{path}: is a pipe or a device and no file; write what comes from it into a file")
         with path.open("rb") as f:
             sha256 = hashlib.file_digest(f, "sha256").hexdigest()
         if ending in (".xlsx", ".ods"):

@@ -18,6 +18,8 @@ from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.tables import EMBEDDED, MISSING_TEXT, check_headings, is_float, not_numbers, refuse_cell
 
+#: bytes of a line that are read at most
+MOST_LINE = 4_000_000
 _SAMPLE_LINES = 100
 _CHUNK = 100_000  # rows that are text in memory at a time
 _BOM = b"\xef\xbb\xbf"
@@ -194,6 +196,11 @@ def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[i
     blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
     with path.open("rb") as f:
         for number, raw in enumerate(f):
+            if len(raw) > MOST_LINE:
+                raise RecordingError(
+                    f"{path}: line {number + 1} has more than {MOST_LINE:,} bytes; a row that long is no row of a "
+                    "recording: save a table with so many columns as Parquet"
+                )
             line = raw.removeprefix(_BOM) if number == 0 else raw
             if line.count(b"\r") > line.endswith(b"\r\n"):  # pandas would count lines otherwise than we do
                 raise RecordingError(
@@ -267,7 +274,10 @@ def _sniff_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
 def _split(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
-    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
+    try:
+        return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:  # a cell is larger than the reader takes: no number and no name is
+        return line.rstrip("\r\n").split(delimiter)
 
 
 def _cells(line: bytes, delimiter: str) -> int:
