@@ -177,7 +177,9 @@ def test_a_step_of_one_channel_is_told_wherever_it_is(row: int, pick: int, up: b
     assert [(f.channel, f.kind) for f in found] == [(name, "step")]
     assert found[0].rows is None
     told = float(found[0].text.split("by ")[1].split()[0])
-    assert told == pytest.approx(height, abs=0.25 if name.endswith("_C") else 1.0)
+    # what the channel itself does there, as where the spindle's speed changes, cannot be told from the step
+    own = float(recording.table[name].diff()[row - 1 : row + 2].abs().max())
+    assert told == pytest.approx(height, abs=own + (0.25 if name.endswith("_C") else 1.0))
     rows = int(found[0].text.split("row ")[1].split()[0])
     assert abs(rows - row) <= 1
 
