@@ -9,7 +9,7 @@ from smallmachine import small_machine
 
 from thermocomp.cli import progress
 from thermocomp.cli.app import run
-from thermocomp.files import recordings as reader
+from thermocomp.files import mending
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_an_unexpected_error_is_one_line_and_verbose_tells_where(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("by [zero]")
 
-    monkeypatch.setattr(reader, "read_all", broken)
+    monkeypatch.setattr(mending, "read_or_offer", broken)
     assert run(["check", stuck, "--json"]) == 3
     said = capsys.readouterr()
     assert "unexpected: ZeroDivisionError: by [zero]" in said.err

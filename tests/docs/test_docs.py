@@ -19,6 +19,7 @@ from numpydoc.validate import validate  # type: ignore[import-untyped]
 from thermocomp.cli.app import app
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.files.recordings import read
+from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -46,6 +47,7 @@ NOUNS = {
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]
 TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
+STEPS = (Cut, Shift, Rezero, Swap, Resample)
 # Written by Sphinx itself, or not a page.
 _MADE = ("_build", "_templates", "auto_examples", "auto_papers", "papers", "reference", "tutorial")
 
@@ -91,13 +93,19 @@ def test_every_module_is_in_the_reference() -> None:
 
 
 def test_every_mapping_key_is_described_and_no_other() -> None:
-    assert {f.name for f in fields(Mapping)} == {table.partition(".")[0] for table in TABLES}
-    sections = re.split(r"^``\[(\S+)\]``\n\^+\n", _page("mapping.rst"), flags=re.MULTILINE)
+    assert {f.name for f in fields(Mapping)} == {"clean", *(table.partition(".")[0] for table in TABLES)}
+    sections = re.split(r"^``\[(\S+?)\]``\n\^+\n", _page("mapping.rst"), flags=re.MULTILINE)
     described = {
         t: re.findall(r"^``(\w+)``$", text, re.MULTILINE)
         for t, text in zip(sections[1::2], sections[2::2], strict=True)
     }
+    del described["[clean]"]
     assert described == {table: [f.name for f in fields(cls)] for table, cls in TABLES.items()}
+    _, _, section = _page("mapping.rst").partition("``[[clean]]``")
+    keys = re.findall(r"``(\w+)``", " ".join(re.findall(r"^``.*``$", section, re.MULTILINE)))
+    assert sorted(keys) == sorted({f.name for step in STEPS for f in fields(step)})
+    for step in STEPS:
+        assert f'``"{step.do}"``:' in section
 
 
 def test_every_page_is_in_a_table_of_contents() -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
-from thermocomp.files.recordings import read, read_all
+from thermocomp.files.recordings import read
 from thermocomp.recording.cycles import Cycle, make_single_cycle
 from thermocomp.recording.quality import check
 
@@ -275,14 +275,6 @@ def test_cycles_come_from_a_column_or_the_speed_or_are_one(tmp_path: Path) -> No
     long_stops = Mapping(columns={"cycle": ColumnMap(role="ignore")}, cycles=CycleRule(min_stop_s=2000.0))
     assert len(read(path, long_stops).cycles) == 1
     assert read(plain).cycles == make_single_cycle(2)
-
-
-def test_several_files_are_several_tests(tmp_path: Path) -> None:
-    paths = [_csv(tmp_path, f"time_s,a\n0,{k}\n", f"{k}.csv") for k in range(2)]
-
-    recordings = read_all(paths, Mapping(columns={"a": ColumnMap(role="temperature")}))
-
-    assert [(r.name, r.table["a"].iloc[0]) for r in recordings] == [("0", 0.0), ("1", 1.0)]
 
 
 def test_a_workbook_reads_like_a_text_file(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 from thermocomp.files import mapping as mappings
-from thermocomp.files import recordings as files
+from thermocomp.files.mending import read_or_offer
 from thermocomp.recording import splits
 from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
@@ -38,7 +38,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Parameters
     ----------
     path : str or Path
-        A file ending in .csv, .tsv, .txt, .xlsx or .parquet.
+        A file ending in .csv, .tsv, .txt, .xlsx, .ods or .parquet.
     mapping : str, Path or Mapping, optional
         What the columns are, where their headings do not say: a TOML file, or what was read of one.
 
@@ -49,7 +49,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Raises
     ------
     RecordingError, UnitError
-        See `thermocomp.files.recordings.read`.
+        See `thermocomp.files.recordings.read`; a note of the error offers a mapping, where one would help.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     1    60.0     20.6   2.1
     2   120.0     21.1   3.8
     """
-    return files.read(path, mappings.read_mapping(mapping) if isinstance(mapping, str | Path) else mapping)
+    return read_or_offer(path, mappings.read_mapping(mapping) if isinstance(mapping, str | Path) else mapping)
 
 
 def recordings_of(given: Given, mapping: str | Path | mappings.Mapping | None = None) -> list[Recording]:

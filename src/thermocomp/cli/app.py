@@ -33,6 +33,7 @@ COMMANDS = {
     "demo": "Do the main job on the virtual machine: record, fit, judge on unseen cycles, report.",
     "simulate": "Record an experiment on a virtual machine.",
     "check": "Tell what recordings hold and what is wrong with them; of more than three files, a line each.",
+    "map": "Write how a logger's file is to be read and cleaned, asking what cannot be seen.",
     "select": "Choose the few temperature sensors that a model needs.",
     "fit": "Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.",
     "assess": "Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.",
@@ -75,7 +76,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
             code = app([str(STDIN) if word == "-" else word for word in words])
         loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
-        return _unusable(str(e))
+        return _unusable(str(e), getattr(e, "__notes__", ()))
     except OSError as e:  # a folder that may not be written to, a full disk
         return _unusable(f"{e.filename or ''}: {e.strerror or e}".removeprefix(": "))
     except SystemExit as e:
@@ -95,10 +96,11 @@ def main() -> None:
     sys.exit(run())
 
 
-def _unusable(message: str) -> int:
-    text = "\n".join(replace_unprintable(line) for line in message.split("\n"))
+def _unusable(message: str, notes: Sequence[str] = ()) -> int:
+    lines = "\n".join((message, *notes)).split("\n")
+    text = "\n".join(replace_unprintable(line) for line in lines)
     Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
-    _tell_programs(message)
+    _tell_programs(message, notes)
     return 2
 
 
@@ -114,9 +116,9 @@ def _fault(error: Exception) -> int:
     return FAULT
 
 
-def _tell_programs(message: str) -> None:
+def _tell_programs(message: str, notes: Sequence[str] = ()) -> None:
     if "--json" in jsonoutput.called_with:
-        jsonoutput.print_json({"error": message})
+        jsonoutput.print_json({"error": message, **({"notes": list(notes)} if notes else {})})
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def check(
     """
     if output is not None:
         refuse_existing([output], overwrite, recordings, ".html")
-    tests = read_recordings(recordings, mapping)
+    tests = read_recordings(recordings, mapping, tell=False)
     from thermocomp.cli import checked
     from thermocomp.recording.quality import check as findings_of
 

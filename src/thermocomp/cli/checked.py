@@ -97,7 +97,13 @@ def _show(r: Recording, found: Sequence[Finding], content: dict[str, Any], conso
         for f in mine[:_FULL]:
             where = f"{escape(f.channel)} " if f.channel else ""
             console.print(f"{marked(_graded(f.severity))} [bold]{where}[/]{escape(f.text)}")
+            if f.remedy is not None:
+                console.print(f"  [dim]in a mapping: {escape(records.remedy(f.remedy))}[/]")
         if rest := [f.channel for f in mine[_FULL:]]:
             console.print(f"{marked(_graded(kind[0]))} {kind[1]}, {len(rest)} more: [bold]{escape(', '.join(rest))}[/]")
+    if any(f.remedy is not None for f in found):
+        console.print(
+            "[dim]thermocomp map FILE writes these lines into a mapping, one after the other, asking first[/]"
+        )
     if not found:
         console.print("[green]nothing wrong found[/]")

@@ -172,16 +172,22 @@ class Selector(Settings):  # noqa: D101 - that of Settings, which the help is ma
     holm: bool = False
 
 
-def read_recordings(paths: list[Path], mapping: Path | None) -> "list[Recording]":
-    """Read the recordings named on the command line; ``-`` is a CSV file on standard input."""
+def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = True) -> "list[Recording]":
+    """Read the recordings named on the command line; ``-`` is a CSV file on standard input.
+
+    What a mapping changes in the values is told on stderr, unless `tell` is False: then it is shown elsewhere.
+    """
     if not paths:
         raise InputError("no recording given: name at least one CSV, XLSX or Parquet file")
     from thermocomp.files import mapping as mappings
-    from thermocomp.files import recordings as reader
+    from thermocomp.files.mending import read_or_offer
 
     columns = mappings.read_mapping(mapping) if mapping is not None else None
-    found = _read_all(paths, lambda named: reader.read_all(named, columns))
+    found = _read_all(paths, lambda named: [read_or_offer(p, columns) for p in named])
     loudness.tell_read(found)
+    for r in found if tell and not loudness.quiet else ():
+        for change in r.changed:
+            _stderr.print(f"[dim]note[/] {escape(f'{r.name}: {change}')}", soft_wrap=True)
     return found
 
 

@@ -1,7 +1,11 @@
 """The one exception tree: whatever thermocomp raises on purpose is a `ThermocompError`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from typing import Any
+
+#: what would mend an input: a part of a mapping file, as its TOML is read
+Remedy = Mapping[str, Any]
 
 
 class ThermocompError(Exception):
@@ -9,7 +13,18 @@ class ThermocompError(Exception):
 
 
 class InputError(ThermocompError):
-    """Something handed in cannot be used: a file, a column, an option, a channel name."""
+    """Something handed in cannot be used: a file, a column, an option, a channel name.
+
+    Parameters
+    ----------
+    message : str
+    remedies : sequence of Remedy
+        What could mend it, the likeliest first; several where it can be read in several ways.
+    """
+
+    def __init__(self, message: str = "", remedies: Iterable[Remedy] = ()) -> None:
+        super().__init__(message)
+        self.remedies = tuple(remedies)
 
 
 class SettingError(InputError, ValueError):

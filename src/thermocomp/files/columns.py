@@ -244,7 +244,8 @@ def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> l
             if mapped.isdisjoint((heading, k)) and not mapping.read.only_mapped:
                 raise UnitError(
                     f"{source}: heading {heading!r} of column {k}: {e}. Correct it, or leave the column out by a "
-                    f'mapping with [columns."{heading}"] role = "ignore"'
+                    f'mapping with [columns."{heading}"] role = "ignore"',
+                    [{"columns": {heading: {"role": "ignore"}}}],
                 ) from e
             meanings.append(None)
     return meanings
@@ -318,8 +319,19 @@ def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str) -> Non
         if heading and first < k and not alone and not numbered.issuperset((first + 1, k + 1)):
             raise RecordingError(
                 f"{source}: columns {first + 1} and {k + 1} are both named {heading!r}; rename one of them, or name "
-                f"both by number in a mapping, such as [columns.NAME] column = {k + 1}"
+                f"both by number in a mapping, such as [columns.NAME] column = {k + 1}",
+                [{"columns": _numbered(heading, first + 1, k + 1)}],
             )
+
+
+def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
+    """Return tables for columns of one heading, by their numbers."""
+    meaning = understand(heading)
+    if meaning is None:
+        return {f"{'_'.join(heading.split())}_{k}": {"column": place} for k, place in enumerate(places, start=1)}
+    suffix = meaning.name.removeprefix("_".join(meaning.base.split()))
+    base = meaning.name.removesuffix(suffix)
+    return {f"{base}_{k}{suffix}": {"column": place} for k, place in enumerate(places, start=1)}
 
 
 def _position(heading: Place, headings: Sequence[str], table: str, source: str) -> int:
@@ -346,7 +358,8 @@ def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str
         if other is not column:
             raise RecordingError(
                 f"{source}: columns {headings[other.index]!r} and {headings[column.index]!r} would both become channel "
-                f"{column.channel.name!r}; rename one of them, or map it"
+                f"{column.channel.name!r}; rename one of them, or map it",
+                [{"columns": {f"{column.channel.name}_2": {"column": headings[column.index]}}}],
             )
 
 

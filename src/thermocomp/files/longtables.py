@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.files.mapping import Mapping
-from thermocomp.files.recordings import Rows, make_recording, read_rows
+from thermocomp.files.recordings import make_recording, read_rows
 from thermocomp.recording.profiles import QUANTITY, Profiles
+from thermocomp.recording.rows import Rows
 
 FloatArray = NDArray[np.float64]
 
@@ -99,7 +100,7 @@ def read_long(
             f"{rows.source}: {rows.place(row)}: a new state begins at the time of the one before; correct the time, or "
             "the column of states"
         )
-    return Profiles(target, unit, axis, points, values, make_recording(rows, time - time[0], table, labels))
+    return Profiles(target, unit, axis, points, values, make_recording(rows, time, table, labels))
 
 
 def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:

@@ -7,16 +7,20 @@ from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
+from pydantic_core import ErrorDetails
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.tomlfile import read_toml
+from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
 
 #: a column by its heading, or by its number from 1
 Place = str | int
+#: a table ``[[clean]]``
+CleaningStep = Annotated[Cut | Shift | Rezero | Swap | Resample, Field(discriminator="do")]
 Role = Literal[
     "temperature",
     "displacement",
@@ -119,6 +123,8 @@ class ReadOptions:
         True: columns that have no table ``[columns.NAME]`` are left out.
     heading : int
         Line or row of the headings, from 1; 0: it is looked for.
+    skip : tuple of int or pair of int
+        Lines or rows that are passed over, from 1, as errors name them; a pair is a stretch, both ends included.
     sheet : str
         Of a workbook; empty: the only one, or the only one that holds a table with a time.
     """
@@ -130,7 +136,12 @@ class ReadOptions:
     missing: tuple[float, ...] = ()
     only_mapped: bool = False
     heading: int = 0
+    skip: tuple[int | tuple[int, int], ...] = ()
     sheet: str = ""
+
+    def skips(self, place: int) -> bool:
+        """Return whether a line or row, counted from 1, is passed over."""
+        return any(place == s if isinstance(s, int) else s[0] <= place <= s[1] for s in self.skip)
 
 
 @dataclass(frozen=True)
@@ -161,12 +172,15 @@ class Mapping:
         By channel name.
     read : ReadOptions
     cycles : CycleRule
+    clean : tuple of Step
+        What is changed in the values that were read, in this order; see `thermocomp.recording.cleaning`.
     """
 
     time: TimeColumn = TimeColumn()
     columns: AbstractMapping[str, ColumnMap] = field(default_factory=dict)
     read: ReadOptions = ReadOptions()
     cycles: CycleRule = CycleRule()
+    clean: tuple[CleaningStep, ...] = ()
 
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
@@ -197,6 +211,7 @@ class Mapping:
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
 ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
 
+_STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
 _TABLES: dict[str, type] = {"time": TimeColumn, "columns": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
 
 
@@ -238,20 +253,37 @@ def read_mapping(path: str | Path) -> Mapping:
         role = "temperature"
         missing = [-180.0]
     """
-    source = Path(path)
-    content = read_toml(source, "mapping file")
+    return check_content(read_toml(path, "mapping file"), str(path))
+
+
+def check_content(content: dict[str, Any], owner: str) -> Mapping:
+    """Return the mapping that TOML holds.
+
+    Parameters
+    ----------
+    content : dict
+    owner : str
+        The file, for messages.
+
+    Raises
+    ------
+    InputError, UnitError
+        See `read_mapping`.
+    """
     try:
         return ADAPTER.validate_python(content)
     except ValidationError as e:
-        raise InputError(f"{source}: {_explain(e)}") from e
+        raise InputError(f"{owner}: {_explain(e)}") from e
     except InputError as e:
-        raise type(e)(f"{source}: {e}") from e
+        raise type(e)(f"{owner}: {e}") from e
 
 
 def _explain(failure: ValidationError) -> str:
     """Say table, key and the nearest known key of pydantic's first error."""
     errors = failure.errors()
     error = errors[0]
+    if error["loc"][:1] == ("clean",):
+        return _explain_step(error)
     depth = 3 if error["loc"][0] == "columns" else 2
     loc = [str(part) for part in error["loc"][:depth]]  # what follows are members of a union, which no user wrote
     inside = _TABLES.get(loc[0]) if len(loc) == depth else None
@@ -260,7 +292,28 @@ def _explain(failure: ValidationError) -> str:
     if error["type"] != "unexpected_keyword_argument":
         reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
         return f"{table}: key {key!r} = {error['input']!r}: {reasons}"
-    known = [f.name for f in fields(inside or Mapping)]
+    return _unknown_key(table, key, inside or Mapping)
+
+
+def _explain_step(error: ErrorDetails) -> str:
+    """Say what is wrong with a table ``[[clean]]``."""
+    loc = error["loc"]
+    table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
+    if len(loc) < 4:
+        steps = ", ".join(repr(do) for do in _STEPS)
+        return (
+            f"{table}: must be a table with do = one of {steps}"
+            if "tag" in error["type"]
+            else f"{table}: {error['msg']}"
+        )
+    key = str(loc[3])
+    if error["type"] == "unexpected_keyword_argument":
+        return _unknown_key(table, key, _STEPS[str(loc[2])])
+    return f"{table}: key {key!r} = {error['input']!r}: {error['msg']}"
+
+
+def _unknown_key(table: str, key: str, inside: type) -> str:
+    known = [f.name for f in fields(inside)]
     near = get_close_matches(key, known, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return f"{table}: unknown key {key!r}; {hint}Known are {', '.join(known)}"

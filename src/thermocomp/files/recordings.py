@@ -1,8 +1,9 @@
 """Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,18 +13,20 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.headings import understand
-from thermocomp.core.machine import Channel
 from thermocomp.files.columns import ColumnPlan, plan, why_left_out
 from thermocomp.files.draft import draft
-from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet
+from thermocomp.files.guesses import guess
+from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
+from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet, skip_row
 from thermocomp.files.textfile import open_csv
 from thermocomp.files.times import read_times
 from thermocomp.files.workbook import open_workbook
+from thermocomp.recording.cleaning import clean
 from thermocomp.recording.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.rows import Rows
 
 FloatArray = NDArray[np.float64]
 
@@ -59,49 +62,6 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     return make_recording(rows, rows.time, rows.table, rows.labels)
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """What a file holds, row by row, in house units.
-
-    Parameters
-    ----------
-    source : str
-        The file.
-    sha256 : str
-        Hash of it.
-    time : ndarray of shape (n_rows,)
-        Seconds since the first row [s].
-    start : str
-        ISO timestamp of the first row, if known.
-    table : DataFrame of shape (n_rows, n_channels)
-    channels : tuple of Channel
-        One per column of `table`.
-    labels : list of object or None
-        Thermal cycle of each row, if the file says.
-    extra : mapping of str to list of object
-        Cells of further columns that were asked for and are there.
-    rule : CycleRule
-    aliases : mapping of str to str
-        Headings and names without unit to channel names.
-    notes : tuple of str
-    place : callable
-        Says where a row stands in the file, such as ``line 7``.
-    """
-
-    source: str
-    sha256: str
-    time: FloatArray
-    start: str
-    table: pd.DataFrame
-    channels: tuple[Channel, ...]
-    labels: list[Any] | None
-    extra: dict[str, list[Any]]
-    rule: CycleRule
-    aliases: dict[str, str]
-    notes: tuple[str, ...]
-    place: Callable[[int], str]
-
-
 def read_rows(
     path: str | Path, mapping: Mapping | None = None, *, rising: bool = True, extra: Sequence[str] = ()
 ) -> Rows:
@@ -127,10 +87,14 @@ def read_rows(
     """
     source = Path(path)
     mapping = mapping or Mapping()
-    table, sha256 = _open(source, mapping.read)
+    table, sha256 = _opened(source, mapping.read)
     if table.embedded:
         mapping = mapping.over(_described(table.embedded, source))
-    columns = plan(table.headings, mapping, str(source))
+    try:
+        columns = plan(table.headings, mapping, str(source))
+    except (RecordingError, UnitError) as e:
+        e.remedies = e.remedies or guess(table, mapping)
+        raise
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns] + ([] if is_stamp else [columns.time])
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
@@ -142,18 +106,18 @@ def read_rows(
     time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     if not is_stamp and not columns.time_unit:
         notes.append(f"{table.headings[columns.time]!r} has no unit and is taken as seconds")
-    data = {}
+    data, changed = {}, list[str]()
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
         data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
-        notes.extend(found)
+        changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric)
     texts_only = [table.headings[k] for k in left_out if k not in numeric]
     if texts_only:
         notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
-    return Rows(
+    rows = Rows(
         source=str(source),
         sha256=sha256,
         time=time,
@@ -162,11 +126,14 @@ def read_rows(
         channels=tuple(c.channel for c in columns.columns),
         labels=_labels(cells, columns, table, source),
         extra={h: cells[k].tolist() for h, k in more.items()},
-        rule=mapping.cycles,
+        min_run=mapping.cycles.min_run_s,
+        min_stop=mapping.cycles.min_stop_s,
         aliases=columns.aliases,
         notes=tuple(notes),
+        changed=tuple(changed),
         place=table.place,
     )
+    return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
 
 
 def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Sequence[Any] | None) -> Recording:
@@ -187,30 +154,22 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
     -------
     Recording
     """
+    origin = float(time[0])
     recording = Recording(
         name=Path(rows.source).stem,
-        time=time,
+        time=time - origin if origin else time,
         table=table,
         channels=tuple(c for c in rows.channels if c.name in table.columns),
         cycles=make_single_cycle(len(time)),
         source=rows.source,
         sha256=rows.sha256,
-        start=rows.start,
+        start=_later(rows.start, origin),
+        origin=origin,
         aliases=rows.aliases,
-        notes=rows.notes,
+        notes=(*rows.notes, *rows.changed),
+        changed=rows.changed,
     )
-    return recording.with_cycles(_cycles(recording, labels, rows.rule))
-
-
-def read_all(paths: Sequence[str | Path], mapping: Mapping | None = None) -> list[Recording]:
-    """Read several files, each a test of its own, all by the same mapping.
-
-    Raises
-    ------
-    InputError
-        See `read`.
-    """
-    return [read(path, mapping) for path in paths]
+    return recording.with_cycles(_cycles(recording, labels, rows))
 
 
 def write(recording: Recording, path: str | Path, *, overwrite: bool = False) -> None:
@@ -266,7 +225,18 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
             out.to_parquet(started, index=False)
 
 
-def _open(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
+def open_table(path: str | Path, options: ReadOptions) -> FileTable:
+    """Open a file without understanding what its columns are.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read as a table.
+    """
+    return _opened(Path(path), options)[0]
+
+
+def _opened(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
     """Return the raw table and the SHA-256 of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -303,6 +273,22 @@ def _described(text: str, source: Path) -> Mapping:
         raise type(e)(f"{source}: {e}") from e
 
 
+def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
+    """Let columns that count from their first value do so where that was cut."""
+    table = rows.table
+    for name in (c.channel.name for c in columns.columns if c.rule.zero == "first"):
+        x = table[name].to_numpy(dtype=np.float64)
+        there = np.flatnonzero(np.isfinite(x))
+        if there.size and x[there[0]]:
+            table = table.assign(**{name: x - x[there[0]]})
+    return replace(rows, table=table)
+
+
+def _later(start: str, seconds: float) -> str:
+    """Return a timestamp some seconds later."""
+    return (datetime.fromisoformat(start) + timedelta(seconds=seconds)).isoformat() if start and seconds else start
+
+
 def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: Path) -> list[Any] | None:
     if columns.cycle is None:
         return None
@@ -311,12 +297,13 @@ def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: 
         row = int(np.flatnonzero(labels.isna())[0])
         raise RecordingError(
             f"{source}: {table.place(row)}, column {table.headings[columns.cycle]!r}: the cycle's label is missing; "
-            "every row belongs to a cycle"
+            "every row belongs to a cycle",
+            [skip_row(table, row)],
         )
     return list(labels.tolist())
 
 
-def _cycles(recording: Recording, labels: Sequence[Any] | None, rule: CycleRule) -> Sequence[Cycle]:
+def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> Sequence[Cycle]:
     if labels is not None:
         try:
             return split_by_labels(labels)
@@ -326,4 +313,4 @@ def _cycles(recording: Recording, labels: Sequence[Any] | None, rule: CycleRule)
     if speed is None:
         return make_single_cycle(len(recording))
     values = recording.table[speed.name].to_numpy()
-    return find_cycles(recording.time, values, min_run=rule.min_run_s, min_stop=rule.min_stop_s)
+    return find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)

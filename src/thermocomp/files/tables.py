@@ -8,7 +8,7 @@ from typing import Any, NoReturn, Protocol
 import numpy as np
 import pandas as pd
 
-from thermocomp.core.exceptions import MissingExtraError, RecordingError
+from thermocomp.core.exceptions import MissingExtraError, RecordingError, Remedy
 
 #: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
@@ -168,8 +168,14 @@ def refuse_cell(
     """
     raise RecordingError(
         f"{source}: {table.place(row)}, column {table.headings[column]!r}: {str(cell)!r} is not a number; correct the "
-        'cell, leave it empty for a missing value, or leave the column out by a mapping with role = "ignore"'
+        'cell, leave it empty for a missing value, or leave the column out by a mapping with role = "ignore"',
+        [skip_row(table, row), {"columns": {table.headings[column]: {"role": "ignore"}}}],
     ) from cause
+
+
+def skip_row(table: FileTable, row: int) -> Remedy:
+    """Return what of a mapping passes over a row."""
+    return {"read": {"skip": [int(table.place(row).split()[-1])]}}
 
 
 def not_numbers(cells: "pd.Series[Any]") -> "pd.Series[bool]":

@@ -148,7 +148,7 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     comment = options.comment.encode()
     skipped: list[int] = []
     top = options.heading - 1
-    first = list(islice((c for c in _content(path, comment, []) if c[0] >= top), _SAMPLE_LINES))
+    first = list(islice((c for c in _content(path, comment, [], options) if c[0] >= top), _SAMPLE_LINES))
     if not first:
         raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
     sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
@@ -156,7 +156,7 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     ending = delimiter.encode()
     heading, begin = first[layout.heading][1], 1 + max(layout)
     width, is_utf8, n_rows = _cells(heading, delimiter), True, -begin
-    for number, line in _content(path, comment, skipped):
+    for number, line in _content(path, comment, skipped, options):
         is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
         n_rows += number >= top
         if n_rows <= 0:  # what stands above the rows
@@ -166,7 +166,8 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
         if cells != width:
-            raise RecordingError(_ragged(path, number + 1, cells, width, line, delimiter))
+            text = _ragged(path, number + 1, cells, width, line, delimiter)
+            raise RecordingError(text, [{"read": {"skip": [number + 1]}}])
     encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
     try:
         headings = [h.strip() for h in _split(heading.decode(encoding), delimiter)]
@@ -191,7 +192,7 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     )
 
 
-def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
+def _content(path: Path, comment: bytes, skipped: list[int], options: ReadOptions) -> Iterator[tuple[int, bytes]]:
     """Yield number and text of each line that is neither blank nor a comment; tell the others in `skipped`."""
     blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
     with path.open("rb") as f:
@@ -209,7 +210,7 @@ def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[i
                 )
             text = line.lstrip()
             remark = (comment and text.startswith(comment)) or (number == 0 and _SEPARATOR.fullmatch(raw))
-            if remark or not text.strip(blank):
+            if remark or not text.strip(blank) or (options.skip and options.skips(number + 1)):
                 skipped.append(number)
             else:
                 yield number, line

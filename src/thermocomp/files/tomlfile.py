@@ -26,12 +26,24 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     InputError
         No such file, no text, or not TOML; the message names the file.
     """
+    try:
+        return tomllib.loads(read_text(path, what))
+    except tomllib.TOMLDecodeError as e:
+        raise InputError(f"{path}: not valid TOML: {e}") from e
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """Read the text of a file of settings.
+
+    Raises
+    ------
+    InputError
+        No such file, or no text.
+    """
     source = Path(path)
     try:
-        return tomllib.loads(source.read_text(encoding="utf-8-sig"))
+        return source.read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
         raise InputError(f"{source}: no such {what}") from e
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(f"{source}: cannot be read as a {what}: {e}") from e
-    except tomllib.TOMLDecodeError as e:
-        raise InputError(f"{source}: not valid TOML: {e}") from e

@@ -91,7 +91,8 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     if len(likely) > 1:
         raise RecordingError(
             f"{path}: the sheets {', '.join(map(repr, likely))} all hold a table; say which in a mapping, such as "
-            f'[read] sheet = "{likely[0]}"'
+            f'[read] sheet = "{likely[0]}"',
+            [{"read": {"sheet": name}} for name in likely],
         )
     name = likely[0] if likely else first
     return name, (f"sheet {name!r} of {names} is read",)
@@ -105,7 +106,7 @@ def _table(path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], o
     """Return the table of a sheet: its heading row, and the rows below it."""
     places, content, cells = list[int](), list[Row](), 0
     for place, row in enumerate(rows, 1):
-        if not _holds_cells(row) or (place < options.heading):
+        if not _holds_cells(row) or place < options.heading or options.skips(place):
             continue
         cells += len(row)
         if len(row) > MOST_COLUMNS or cells > MOST_CELLS:

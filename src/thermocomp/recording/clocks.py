@@ -84,7 +84,9 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
         others = len(groups[quantity]) - len(names)
         who = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
         rest = f"; the other {others} {quantity}s do not answer clearly" if others else ""
-        yield Finding("trouble", names[0] if len(names) == 1 else "", "clock", _text(who, shift) + rest)
+        moved = {"clean": [{"do": "shift", "channels": names, "by_s": -shift}]}
+        channel = names[0] if len(names) == 1 else ""
+        yield Finding("trouble", channel, "clock", _text(who, shift) + rest, remedy=moved)
 
 
 def _usable(signals: Sequence[Signal], quantity: str) -> list[Signal]:

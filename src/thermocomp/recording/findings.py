@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
 
 FloatArray = NDArray[np.float64]
@@ -36,6 +37,8 @@ class Finding:
         The rows it concerns, where the others are sound; None if it concerns the whole channel or recording.
     row : int, optional
         Where a lasting trouble begins, or a gap: a place for a mark in a figure.
+    remedy : Remedy, optional
+        What of a mapping would mend it, with the recording's names of channels and its times; None: nothing of it.
     """
 
     severity: Severity
@@ -44,6 +47,7 @@ class Finding:
     text: str
     rows: IntArray | None = field(default=None, compare=False, repr=False)
     row: int | None = field(default=None, compare=False, repr=False)
+    remedy: Remedy | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,29 @@ def runs(x: NDArray[np.generic]) -> tuple[IntArray, IntArray]:
     """Return start and length of each stretch of equal values."""
     starts = np.concatenate([[0], np.flatnonzero(x[1:] != x[:-1]) + 1])
     return starts, np.diff(starts, append=len(x))
+
+
+def cut(name: str, rows: IntArray, time: FloatArray, reason: str) -> Remedy:
+    """Return the cleaning step that takes values of a channel out.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+    rows : ndarray of int
+    time : ndarray of shape (n_rows,)
+        [s]
+    reason : str
+    """
+    ordered = np.unique(rows)
+    parts = np.split(ordered, np.flatnonzero(np.diff(ordered) > 1) + 1)
+    times = [float(time[p[0]]) if len(p) == 1 else [float(time[p[0]]), float(time[p[-1]])] for p in parts if len(p)]
+    return {"clean": [{"do": "cut", "channels": [name], "times": times, "reason": reason}]}
+
+
+def column(name: str, **keys: object) -> Remedy:
+    """Return what a mapping says of the column of a channel."""
+    return {"columns": {name: keys}}
 
 
 def at_row(row: int, time: FloatArray) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recording.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row
+from thermocomp.recording.findings import BoolArray, Finding, FloatArray, IntArray, Signal, at_row, cut
 
 #: smallest step that is told, by quantity [degC, um, urad]
 LEAST = {"temperature": 1.5, "displacement": 5.0, "angle": 20.0}
@@ -155,14 +155,17 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
             f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
             "that no other channel shares and that comes back: delete these values"
         )
-        return Finding("trouble", channel.name, "step", text, np.arange(first - 1, last))
+        rows = np.arange(first - 1, last)
+        return Finding("trouble", channel.name, "step", text, rows, remedy=cut(channel.name, rows, time, "step"))
     more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
     text = (
         f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "
         "or probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract "
         "the step behind it, or leave the channel out"
     )
-    return Finding("trouble", channel.name, "step", text, row=row)
+    times = sorted(float(time[mine.after[j]]) for j in lone)
+    zeroed = [{"do": "rezero", "channels": [channel.name], "at": t, "reason": "step"} for t in times]
+    return Finding("trouble", channel.name, "step", text, row=row, remedy={"clean": zeroed})
 
 
 def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) -> bool:
@@ -185,4 +188,6 @@ def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
         f"changes places with {b.channel.name} at {at_row(row, time)}: each goes on where the other was. Swap the two "
         "columns back from there on, or leave both out"
     )
-    return Finding("trouble", a.channel.name, "swapped", text, row=row)
+    names = sorted([a.channel.name, b.channel.name])  # both tell the same step
+    back = {"do": "swap", "channels": names, "at": float(time[row])}
+    return Finding("trouble", a.channel.name, "swapped", text, row=row, remedy={"clean": [back]})

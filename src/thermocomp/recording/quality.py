@@ -17,7 +17,9 @@ from thermocomp.recording.findings import (
     Severity,
     Signal,
     at_row,
+    column,
     count,
+    cut,
     runs,
     speed_changes,
 )
@@ -108,7 +110,7 @@ def _together(
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
     yield from suspects.time_unit(time, of["temperature"])
-    yield from suspects.zeros([*of["displacement"], *of["angle"]])
+    yield from suspects.zeros([*of["displacement"], *of["angle"]], time)
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))
     yield from leaps
@@ -124,7 +126,8 @@ def _duplicates(recording: Recording) -> Iterator[Finding]:
             other = prints.setdefault(hash(values.tobytes()), channel.name)
             if other != channel.name:
                 text = f"has the same value as {other} in every row; leave one of them out"
-                yield Finding("warning", channel.name, "duplicate channel", text)
+                gone = column(channel.name, role="ignore")
+                yield Finding("warning", channel.name, "duplicate channel", text, remedy=gone)
 
 
 def _probed(recording: Recording) -> set[str]:
@@ -174,14 +177,19 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
         "sensor"
     )
     every = wild.size == np.isfinite(values).sum()
-    return Finding("trouble", channel.name, "implausible", text, None if every else wild)
+    if every:
+        return Finding("trouble", channel.name, "implausible", text)
+    return Finding(
+        "trouble", channel.name, "implausible", text, wild, remedy=cut(channel.name, wild, time, "implausible")
+    )
 
 
 def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
     sensed = channel.quantity in _SENSED
     advice = "check whether the sensor is connected, or leave the channel out" if sensed else "it tells models nothing"
     text = f"is {x[0]:g} {channel.unit} in all {len(x)} rows; {advice}"
-    return Finding("trouble" if sensed else "info", channel.name, "constant", text)
+    gone = column(channel.name, role="ignore")
+    return Finding("trouble" if sensed else "info", channel.name, "constant", text, remedy=gone)
 
 
 def _sampling(time: FloatArray) -> Iterator[Finding]:
@@ -213,7 +221,9 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
             f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); "
             "resample for methods that need one interval"
         )
-        yield Finding("warning", "", "irregular sampling", text)
+        # so that every interval has a row
+        even = {"clean": [{"do": "resample", "every_s": float(np.ceil(kept.max()))}]}
+        yield Finding("warning", "", "irregular sampling", text, remedy=even)
 
 
 def _no_cycle(recording: Recording) -> Iterator[Finding]:
@@ -267,7 +277,9 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
             f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, hold {codes}, a "
             f"code for a missing value; mark it by a mapping, missing = [{codes}]"
         )
-    return Finding("trouble", channel.name, "missing-value code", text, None if every else np.flatnonzero(coded))
+    said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
+    rows = None if every else np.flatnonzero(coded)
+    return Finding("trouble", channel.name, "missing-value code", text, rows, remedy=column(channel.name, **said))
 
 
 def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -> Iterator[Finding]:
@@ -277,7 +289,8 @@ def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -
     if not n:
         return
     if n == len(values):
-        yield Finding("trouble", name, "missing values", "has no value at all; leave the channel out")
+        text = "has no value at all; leave the channel out"
+        yield Finding("trouble", name, "missing values", text, remedy=column(name, role="ignore"))
         return
     if probed:
         text = f"has {len(values) - n} values in {len(values)} rows, as others have: probing cycles"

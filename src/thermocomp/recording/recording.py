@@ -44,10 +44,14 @@ class Recording:
         Hash of that file.
     start : str
         ISO timestamp of the first row; empty if the file has only relative times.
+    origin : float
+        Time between the first row of the file and that of the recording, where the first rows were cut [s].
     aliases : mapping of str to str
         Other names a channel answers to: the file's own heading, the name without its unit.
     notes : tuple of str
         What the reader did that a user should know.
+    changed : tuple of str
+        Those of the notes that say what a mapping has changed in the values.
 
     Examples
     --------
@@ -69,8 +73,10 @@ class Recording:
     source: str = ""
     sha256: str = ""
     start: str = ""
+    origin: float = 0.0
     aliases: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.table):

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from thermocomp.recording.findings import BoolArray, Finding, FloatArray, Signal, at_row, count
+from thermocomp.recording.findings import BoolArray, Finding, FloatArray, Signal, at_row, count, cut
 
 #: most rows of one spike; what stays away longer is told as two steps
 LONGEST = 10
@@ -59,6 +59,7 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
         f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
         f"{at_row(int(rows[top]), time)} (usual noise {off:.2g}); delete the values or look for a loose contact",
         rows[hits],
+        remedy=cut(signal.channel.name, rows[hits], time, "spike"),
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from thermocomp.recording.findings import BoolArray, Finding, FloatArray, Severity, Signal, at_row, runs
+from thermocomp.recording.findings import BoolArray, Finding, FloatArray, Severity, Signal, at_row, cut, runs
 
 #: rows that a value must stand still for
 SHORTEST = 30
@@ -50,7 +50,9 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
         )
         # the first value of each stretch may have been measured
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
-        yield Finding(severity, channel.name, "stuck", text, concerned)
+        yield Finding(
+            severity, channel.name, "stuck", text, concerned, remedy=cut(channel.name, concerned, time, "stuck")
+        )
     if coarse:
         text = f"moves in steps of {step:g} {channel.unit} over a span of {span:.3g}; a finer resolution would help"
         yield Finding("info", channel.name, "quantised", text)

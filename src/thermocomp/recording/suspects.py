@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from thermocomp.recording.findings import Finding, FloatArray, Signal
+from thermocomp.recording.findings import Finding, FloatArray, Severity, Signal, column
 
 _ABSOLUTE = 273.15
 
@@ -66,7 +66,7 @@ def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: flo
         f"lies between {low:.4g} and {high:.4g} degC all the time, which no machine does; as {unit} its coldest would "
         f'be {coldest:.1f} degC. Say so in a mapping: unit = "{unit}"'
     )
-    return Finding("trouble", signal.channel.name, "unit", text)
+    return Finding("trouble", signal.channel.name, "unit", text, remedy=column(signal.channel.name, unit=unit))
 
 
 def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]) -> Iterator[Finding]:
@@ -95,7 +95,7 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
                 f"moves by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are these um, or nm? "
                 'Then say so in a mapping: unit = "um"'
             )
-            yield Finding("trouble", name, "unit", text)
+            yield Finding("trouble", name, "unit", text, remedy=column(name, unit="um"))
         if width >= 0.3 and not all_of_them:
             continue
         against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
@@ -103,7 +103,8 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
             f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these "
             'mm? Then say so in a mapping: unit = "mm"; else the probe does not touch'
         )
-        yield Finding("trouble" if warming >= 1 else "warning", name, "unit", text)
+        severity: Severity = "trouble" if warming >= 1 else "warning"
+        yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
 
 
 def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Finding]:
@@ -139,7 +140,7 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Find
         f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is as slow. Are the "
         'times ms? Then say so in a mapping: [time] unit = "ms"'
     )
-    yield Finding("trouble", "", "time unit", text)
+    yield Finding("trouble", "", "time unit", text, remedy={"time": {"unit": "ms"}})
 
 
 def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
@@ -157,7 +158,7 @@ def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
     return None
 
 
-def zeros(signals: Sequence[Signal]) -> Iterator[Finding]:
+def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
     """Yield displacements and tilts that do not start near their zero: a continued recording, or a probe not zeroed.
 
     The start is the value nearest to 0 among the first and the median of the first three. Far is over 2 um or 2 urad,
@@ -167,6 +168,8 @@ def zeros(signals: Sequence[Signal]) -> Iterator[Finding]:
     ----------
     signals : sequence of Signal
         Displacements and angles, without spikes.
+    time : ndarray of shape (n_rows,)
+        [s]
     """
     for s in signals:
         x = s.x
@@ -180,4 +183,6 @@ def zeros(signals: Sequence[Signal]) -> Iterator[Finding]:
                 "is the continuation of another, join them; else take its first value for zero in a mapping: "
                 'zero = "first"'
             )
-            yield Finding("warning", s.channel.name, "not zeroed", text, row=int(s.rows[0]))
+            row = int(s.rows[0])
+            zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(time[row]), "to": 0.0}
+            yield Finding("warning", s.channel.name, "not zeroed", text, row=row, remedy={"clean": [zeroed]})

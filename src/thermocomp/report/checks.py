@@ -40,6 +40,7 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     return page(
         "check.html",
         recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
+        remedy=records.remedy,
     )
 
 

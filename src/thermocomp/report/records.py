@@ -1,5 +1,6 @@
 """Results as plain numbers and words: what ``--json`` prints, and what tables look at."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
@@ -9,6 +10,7 @@ import numpy as np
 
 from thermocomp.assessment.position import CycleErrors, PositionStudy
 from thermocomp.assessment.results import Assessment
+from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.positionoptions import Setting
@@ -16,6 +18,8 @@ from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report.layout import Column
 
+#: values of a remedy that are shown
+_FEW = 6
 #: of channels: from where to where they went, and what is missing
 RANGE = (
     Column("smallest", "smallest", ".4g"),
@@ -44,10 +48,28 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
                 "text": f.text,
                 "row": f.row,
                 "rows": None if f.rows is None else stretches(f.rows),
+                "remedy": None if f.remedy is None else dict(f.remedy),
             }
             for f in found
         ],
     }
+
+
+def remedy(content: Remedy) -> str:
+    """Return a remedy as a line of words: the tables of a mapping and their keys."""
+    parts = []
+    for step in content.get("clean", ()):
+        parts.append(f"[[clean]] {_keys(step)}")
+    for name, said in content.get("columns", {}).items():
+        parts.append(f"[columns.{name}] {_keys(said)}")
+    parts += [f"[{key}] {_keys(said)}" for key, said in content.items() if key not in ("clean", "columns")]
+    return "; ".join(parts)
+
+
+def _keys(table: Remedy) -> str:
+    """Return keys and values as TOML has them; of many values the first."""
+    shown = {k: [*v[:_FEW], "..."] if isinstance(v, list) and len(v) > _FEW else v for k, v in table.items()}
+    return ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in shown.items())
 
 
 def _channel(r: Recording, c: Channel) -> dict[str, Any]:

@@ -1,0 +1,129 @@
+"""`thermocomp map`: a mapping for a file, by a few questions: what its columns are, and what has to be cleaned."""
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.markup import escape
+
+from thermocomp.cli.jsonoutput import print_json
+from thermocomp.cli.options import OptionalOutput
+from thermocomp.cli.terminal import console
+from thermocomp.core.exceptions import InputError, Remedy
+from thermocomp.core.shown import replace_unprintable
+from thermocomp.files.draft import draft, refuse_existing
+
+if TYPE_CHECKING:
+    from thermocomp.files.mending import Mended, Question
+
+_stderr = Console(stderr=True, highlight=False)
+
+
+def map(
+    recording: Path,
+    /,
+    *,
+    mapping: Path | None = None,
+    output: OptionalOutput = None,
+    yes: bool = False,
+    overwrite: bool = False,
+    json: bool = False,
+) -> int:
+    """Write how a logger's file is to be read and cleaned, asking what cannot be seen.
+
+    Parameters
+    ----------
+    recording : Path
+        CSV, XLSX, ODS or Parquet file.
+    mapping : Path
+        TOML file to begin with, such as that of another test of the same logger; its comments stay.
+    output : Path
+        TOML file to write; without it the mapping is printed.
+    yes : bool
+        Ask nothing: take the best guess, and mend what `check` calls trouble.
+    overwrite : bool
+        Write over an existing file.
+    json : bool
+        Print results for a machine instead of the mapping; nothing is asked then.
+
+    Returns
+    -------
+    int
+        0 nothing is left to be mended, 1 `check` still finds trouble, 2 unusable input.
+    """
+    if output is not None:
+        refuse_existing(
+            [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
+        )
+    from thermocomp.files.mending import mend, take_best
+    from thermocomp.files.tomlfile import read_text
+    from thermocomp.recording.quality import check
+
+    begun = "" if mapping is None else read_text(mapping, "mapping file")
+    mended = mend(recording, begun, take_best if yes or json else _ask)
+    left = [f for f in check(mended.recording) if f.severity == "trouble"]
+    if output is not None:
+        with draft(output) as started:
+            started.write_text(mended.text, encoding="utf-8")
+    if json:
+        print_json(_content(mended, output, [f"{f.channel} {f.text}".strip() for f in left]))
+        return 1 if left else 0
+    for note in mended.recording.notes:
+        _stderr.print(f"[dim]note[/] {escape(note)}", soft_wrap=True)
+    for f in left:
+        _stderr.print(f"[bold red]left[/] {escape(f'{f.channel} {f.text}'.strip())}", soft_wrap=True)
+    if output is None:
+        print(mended.text, end="")
+    else:
+        console.print(
+            f"Mapping file: {escape(str(output))}; give it with --mapping {escape(str(output))}", soft_wrap=True
+        )
+    return 1 if left else 0
+
+
+def _content(mended: "Mended", output: Path | None, left: Sequence[str]) -> dict[str, Any]:
+    from thermocomp.files.mending import to_toml
+
+    return {
+        "file": None if output is None else str(output),
+        "mapping": mended.text,
+        "decided": [
+            {"question": q.text, "severity": q.severity, "answer": None if answer is None else to_toml(answer)}
+            for q, answer in mended.decided
+        ],
+        "notes": list(mended.recording.notes),
+        "left": list(left),
+    }
+
+
+def _ask(question: "Question") -> Remedy | None:
+    """Put a question on the terminal; return the answer, or None for leaving it as it is."""
+    from thermocomp.files.mending import to_toml
+
+    _stderr.print(f"\n[bold]?[/] {escape(replace_unprintable(question.text))}", soft_wrap=True)
+    for k, option in enumerate(question.options, start=1):
+        _stderr.print(f"  [bold]{k}[/] {escape(to_toml(option).replace(chr(10), '; '))}", soft_wrap=True)
+    _stderr.print("  [bold]0[/] leave it as it is")
+    own = next((name for name in question.options[0].get("columns", ())), "")
+    more = ', or keys of your own, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""
+    best = 0 if question.severity in ("warning", "info") else 1
+    while True:
+        _stderr.print(f"  number{more} [{best}]: ", end="", markup=False, soft_wrap=True)
+        try:
+            said = input().strip()
+        except EOFError as e:
+            raise InputError("there is no answer to come on the input; --yes takes the best guess") from e
+        if not said:
+            said = str(best)
+        if said.isdigit() and int(said) <= len(question.options):
+            return question.options[int(said) - 1] if int(said) else None
+        try:
+            keys = tomllib.loads(f"keys = {{ {said} }}")["keys"] if own and "=" in said else {}
+        except tomllib.TOMLDecodeError:
+            keys = {}
+        if keys:
+            place = {k: v for k, v in question.options[0]["columns"][own].items() if k == "column"}
+            return {"columns": {own: {**place, **keys}}}
+        _stderr.print(f"  want a number from 0 to {len(question.options)}")

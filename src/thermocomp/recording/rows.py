@@ -1,0 +1,135 @@
+"""`Rows`: what a file holds, row by row, before it is a recording."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+
+FloatArray = NDArray[np.float64]
+
+#: a time as seconds since the first row of the file [s], or as a timestamp
+Instant = float | datetime | str
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a file holds, row by row, in house units.
+
+    Parameters
+    ----------
+    source : str
+        The file.
+    sha256 : str
+        Hash of it.
+    time : ndarray of shape (n_rows,)
+        Seconds since the first row of the file [s].
+    start : str
+        ISO timestamp of the first row of the file, if known.
+    table : DataFrame of shape (n_rows, n_channels)
+    channels : tuple of Channel
+        One per column of `table`.
+    labels : list of object or None
+        Thermal cycle of each row, if the file says.
+    place : callable
+        Says where a row stands in the file, such as ``line 7``.
+    extra : dict of str to list of object
+        Cells of further columns that were asked for and are there.
+    min_run, min_stop : float
+        Shorter runs and stops of the spindle do not split the test into thermal cycles [s].
+    aliases : mapping of str to str
+        Headings and names without unit to channel names.
+    notes : tuple of str
+        What the reader did.
+    changed : tuple of str
+        What a mapping has changed in the values.
+    """
+
+    source: str
+    sha256: str
+    time: FloatArray
+    start: str
+    table: pd.DataFrame
+    channels: tuple[Channel, ...]
+    labels: list[Any] | None
+    place: Callable[[int], str]
+    extra: dict[str, list[Any]] = field(default_factory=dict)
+    min_run: float = 300.0
+    min_stop: float = 300.0
+    aliases: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+
+    def kept(self, rows: NDArray[np.intp]) -> "Rows":
+        """Return some of the rows."""
+        numbers = rows.tolist()
+        return replace(
+            self,
+            time=self.time[rows],
+            table=self.table.iloc[rows].reset_index(drop=True),
+            labels=None if self.labels is None else [self.labels[k] for k in numbers],
+            place=lambda row: self.place(numbers[row]),
+            extra={name: [cells[k] for k in numbers] for name, cells in self.extra.items()},
+        )
+
+    def noted(self, *changes: str) -> "Rows":
+        """Return the same with more of what was changed."""
+        return replace(self, changed=(*self.changed, *changes))
+
+    def seconds(self, at: Instant, owner: str) -> float:
+        """Return an instant as seconds since the first row of the file [s].
+
+        Parameters
+        ----------
+        at : float, datetime or str
+        owner : str
+            What it belongs to, for messages.
+
+        Raises
+        ------
+        InputError
+            It is no timestamp, or the file has none.
+        """
+        if isinstance(at, int | float):
+            return float(at)
+        if not self.start:
+            raise InputError(
+                f"{self.source}: {owner}: {at}: the file has no timestamps; give seconds since its first row, or its "
+                "[time] start"
+            )
+        try:
+            stamp = at if isinstance(at, datetime) else datetime.fromisoformat(at)
+            return (stamp - datetime.fromisoformat(self.start)).total_seconds()
+        except (ValueError, TypeError) as e:
+            raise InputError(
+                f"{self.source}: {owner}: {at}: want seconds since the first row of the file, or a timestamp like that "
+                f"of the first row, {self.start}"
+            ) from e
+
+    def columns(self, names: Sequence[str], owner: str) -> list[str]:
+        """Return the names of channels, all of which are there.
+
+        Raises
+        ------
+        InputError
+            One is not; the message names the nearest.
+        """
+        known = [str(c) for c in self.table.columns]
+        for name in names:
+            if name not in known:
+                near = get_close_matches(name, known, n=3, cutoff=0.4)
+                hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(known)}"
+                raise InputError(f"{self.source}: {owner}: no channel is named {name!r}; {hint}")
+        return list(names)
+
+    def refuse_twins(self, owner: str) -> None:
+        """Raise `InputError` unless each row is later than the one before."""
+        if not (np.diff(self.time) > 0).all():
+            raise InputError(f"{self.source}: {owner}: needs a row per instant, and several rows have the same time")
