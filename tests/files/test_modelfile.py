@@ -76,7 +76,7 @@ def test_a_neighbour_and_a_folder_are_left_alone(tmp_path: Path) -> None:
     modelfile.write([model()], tmp_path / "model.json")
     assert (tmp_path / "model.json.part").read_text(encoding="utf-8") == "mine"
     (tmp_path / "folder").mkdir()
-    with pytest.raises(OSError, match="folder"):
+    with pytest.raises(InputError, match="is a folder; name a file"):
         modelfile.write([model()], tmp_path / "folder", overwrite=True)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "model.json", "model.json.part"]
 

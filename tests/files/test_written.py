@@ -99,7 +99,7 @@ def test_writing_leaves_other_files_alone(tmp_path: Path, ending: str, monkeypat
         raise OSError("the disk is full")
 
     monkeypatch.setattr(pd.DataFrame, f"to_{ending}", fail)
-    with pytest.raises(OSError, match="the disk is full"):
+    with pytest.raises(InputError, match=r"out\.(csv|parquet): cannot be written: the disk is full"):
         write(recording, path, overwrite=True)
     assert {p.name for p in tmp_path.iterdir()} == there | {path.name}
     assert path.read_bytes() == whole_one

@@ -47,11 +47,11 @@ class Evaluated:
             "positioning": [tables.positioning_content(r) for r in self.positioned],
         }
 
-    def report(self, path: str | Path) -> Path:
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page that ``thermocomp iso230 -o`` writes; return its path."""
         from thermocomp.report import iso230 as pages
 
-        pages.write(self.thermal, self.settlings, self.positioned, Path(path))
+        pages.write(self.thermal, self.settlings, self.positioned, Path(path), overwrite=overwrite)
         return Path(path)
 
 

@@ -140,11 +140,11 @@ class Compared(Result):
             return figures.overview(self.comparison).figure
         return _run(self.comparison.assessments, self.recordings, target, model)
 
-    def report(self, path: str | Path) -> Path:
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page that ``thermocomp compare -o`` writes; return its path."""
         from thermocomp.report import html
 
-        html.write(self.comparison, self.recordings, Path(path))
+        html.write(self.comparison, self.recordings, Path(path), overwrite=overwrite)
         return Path(path)
 
     def __str__(self) -> str:

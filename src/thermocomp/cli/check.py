@@ -7,7 +7,7 @@ from thermocomp.cli.options import (
     read_recordings,
 )
 from thermocomp.cli.terminal import console
-from thermocomp.files.draft import refuse_existing
+from thermocomp.core.draft import refuse_existing
 
 
 def check(
@@ -49,6 +49,6 @@ def check(
     if output is not None:
         from thermocomp.report import checks
 
-        checks.write(tests, findings, output)
+        checks.write(tests, findings, output, overwrite=overwrite)
     checked.show_check(tests, findings, output, console, as_json=json)
     return 1 if any(f.severity == "trouble" for found in findings for f in found) else 0

@@ -71,7 +71,7 @@ def compare(
     if output is not None:
         from thermocomp.report import html
 
-        html.write(comparison, ready.tests, output, samples)
+        html.write(comparison, ready.tests, output, samples, overwrite=overwrite)
     out.show_comparison(comparison, output, ready.trouble, console, as_json=json)
     if comparison.left:
         return STOPPED

@@ -11,8 +11,8 @@ from thermocomp.cli.options import (
 )
 from thermocomp.cli.simulate import simulate
 from thermocomp.cli.terminal import console
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
 
 
 def demo(

@@ -16,8 +16,8 @@ from thermocomp.cli.options import (
     tell_trouble,
 )
 from thermocomp.cli.terminal import console, print_table
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError, RecordingError
-from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.api.iso230 import Evaluated
@@ -118,7 +118,7 @@ def iso230(
         positioning=positioning,
     )
     if output is not None:
-        found.report(output)
+        found.report(output, overwrite=overwrite)
     if json:
         print_json({"trouble": trouble, **found.content()})
     else:

@@ -11,9 +11,9 @@ from rich.markup import escape
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput
 from thermocomp.cli.terminal import console
+from thermocomp.core.draft import refuse_existing, write_text
 from thermocomp.core.exceptions import InputError, Remedy
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.files.draft import draft, refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.files.mending import Mended, Question
@@ -65,8 +65,7 @@ def map(
     mended = mend(recording, begun, take_best if yes or json else _ask)
     left = [f for f in check(mended.recording) if f.severity == "trouble"]
     if output is not None:
-        with draft(output) as started:
-            started.write_text(mended.text, encoding="utf-8")
+        write_text(mended.text, output, overwrite=overwrite)
     if json:
         print_json(_content(mended, output, [f"{f.channel} {f.text}".strip() for f in left]))
         return 1 if left else 0

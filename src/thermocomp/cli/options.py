@@ -15,10 +15,10 @@ from thermocomp.assessment.choice import Settings
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
 from thermocomp.core.correction import Limits
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.scratch import scratch
 from thermocomp.core.zero import Zeroing
-from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import LeaveOne, Prepared

@@ -16,8 +16,8 @@ from thermocomp.cli.options import (
 )
 from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, marked, print_table
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
 from thermocomp.report.layout import Column, Layout, Toned
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def papers(
     if output is not None:
         from thermocomp.report import papers as pages
 
-        pages.write([study for study, _ in done], output, seed=seed)
+        pages.write([study for study, _ in done], output, seed=seed, overwrite=overwrite)
         if not json:
             console.print(f"Page: {output}", soft_wrap=True)
     if json:

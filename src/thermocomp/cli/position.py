@@ -14,8 +14,8 @@ from thermocomp.cli.options import (
     tell_trouble,
 )
 from thermocomp.cli.terminal import console
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
 
 Switch = Annotated[bool | None, Parameter(negative="--no-offset")]
 

@@ -66,6 +66,6 @@ def select(
     if output is not None:
         from thermocomp.report import html
 
-        html.write_choices(choices, ready.tests, output)
+        html.write_choices(choices, ready.tests, output, overwrite=overwrite)
     out.show_choices(choices, output, ready.trouble, console, as_json=json)
     return 0

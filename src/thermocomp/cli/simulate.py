@@ -10,8 +10,8 @@ from thermocomp.cli.options import (
 )
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
 
 
 def simulate(

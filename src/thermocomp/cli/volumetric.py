@@ -10,8 +10,8 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
 from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, print_table
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.draft import refuse_existing
 
 if TYPE_CHECKING:
     from thermocomp.assessment.volumetric import Volumetric
@@ -95,7 +95,7 @@ def volumetric(
     if output is not None:
         from thermocomp.report import volumetric as pages
 
-        pages.write(result, output)
+        pages.write(result, output, overwrite=overwrite)
     if json:
         print_json({"trouble": trouble, **volumetric_tables.content(result)})
     else:

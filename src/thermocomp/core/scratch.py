@@ -41,8 +41,12 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     try:
         yield path
     finally:
-        shutil.rmtree(path, ignore_errors=True)
-        os.close(lock)
+        _remove(path, lock)
+
+
+def is_scratch(name: str) -> bool:
+    """Return whether a folder of that name is one of these."""
+    return _NAME.fullmatch(name) is not None
 
 
 def _made(folder: Path) -> tuple[Path, int]:
@@ -54,6 +58,9 @@ def _made(folder: Path) -> tuple[Path, int]:
             lock = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
         except FileNotFoundError:  # taken for a dead one before it had its lock
             continue
+        except OSError:  # a full disk
+            path.rmdir()
+            raise
         if _locked(lock) and not (path / _LOCK).exists():  # or just after
             os.close(lock)
             continue
@@ -75,7 +82,7 @@ def _clear(folder: Path) -> None:
     """Remove the folders of dead runs."""
     found: list[Path] = []
     with suppress(OSError):
-        found = [p for p in folder.iterdir() if _NAME.fullmatch(p.name)]
+        found = [p for p in folder.iterdir() if is_scratch(p.name)]
     for path in found:
         try:
             lock = os.open(path / _LOCK, os.O_RDWR)
@@ -85,8 +92,24 @@ def _clear(folder: Path) -> None:
             continue
         except OSError:
             continue
-        try:
-            if _locked(lock, wait=False):
-                shutil.rmtree(path, ignore_errors=True)
-        finally:
+        if _locked(lock, wait=False):
+            _remove(path, lock)
+        else:
             os.close(lock)
+
+
+def _remove(path: Path, lock: int) -> None:
+    """Remove a folder, its lock last: one without a lock is empty, wherever this is killed."""
+    try:
+        with suppress(OSError):
+            for inside in path.iterdir():
+                if inside.is_dir() and not inside.is_symlink():
+                    shutil.rmtree(inside, ignore_errors=True)
+                elif inside.name != _LOCK:
+                    inside.unlink()
+    finally:
+        os.close(lock)  # Windows removes no file that is open
+    with suppress(OSError):
+        if [p.name for p in path.iterdir()] == [_LOCK]:
+            (path / _LOCK).unlink()
+            path.rmdir()

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from thermocomp.core.exceptions import InputError, ModelFileError
-from thermocomp.files.draft import draft
+from thermocomp.core.draft import write_text
+from thermocomp.core.exceptions import ModelFileError
 
 
 @dataclass(frozen=True)
@@ -105,13 +105,9 @@ def write(text: str, path: str | Path, *, overwrite: bool) -> None:
     Raises
     ------
     InputError
-        The file exists and `overwrite` is False.
+        See `thermocomp.core.draft.drafts`.
     """
-    target = Path(path)
-    if target.exists() and not overwrite:
-        raise InputError(f"{target}: exists already; choose another name or allow overwriting with --overwrite")
-    with draft(target) as started:
-        started.write_text(text, encoding="utf-8")
+    write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:

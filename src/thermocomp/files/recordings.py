@@ -13,10 +13,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.files.columns import ColumnPlan, plan, why_left_out
-from thermocomp.files.draft import draft
 from thermocomp.files.guesses import guess
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet, skip_row
@@ -188,15 +188,11 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     Raises
     ------
     InputError
-        The file exists and `overwrite` is False, its ending is another one, or its folder is not there.
+        Its ending is another one, or it cannot be there: see `thermocomp.core.draft.drafts`.
     """
     target = Path(path)
     if target.suffix not in (".csv", ".parquet"):
         raise InputError(f"{target}: a recording is written as .csv or .parquet")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target}: exists already; choose another name or allow overwriting with --overwrite")
-    if not target.parent.is_dir():
-        raise InputError(f"{target}: there is no folder {target.parent}; make it first")
     described: dict[str, ColumnMap] = {}
     headings = {}
     for c in recording.channels:
@@ -214,7 +210,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     embedded = Mapping(TimeColumn(column="time_s", unit="s", start=recording.start), described)
     needed = bool(described or recording.start)
     text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
-    with draft(target) as started:
+    with draft(target, overwrite=overwrite) as started:
         if target.suffix == ".csv":
             with started.open("x", encoding="utf-8", newline="") as f:
                 if text:

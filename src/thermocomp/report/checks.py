@@ -1,6 +1,5 @@
 """What `check` found in recordings, as one offline page: the channels drawn, the findings marked at their rows."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from thermocomp.core.draft import write_text
 from thermocomp.core.machine import Channel
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report import records
-from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, drawing, shorten_name, svg, thin_points
+from thermocomp.report.drawing import add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, POINTS, SHADE, FloatArray, thin_points
 from thermocomp.report.html import page
 from thermocomp.report.layout import Column, Layout
 
@@ -44,9 +45,19 @@ def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]
     )
 
 
-def write(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]], path: Path) -> None:
-    """Write the page; an existing file is replaced."""
-    path.write_text(render(recordings, findings), encoding="utf-8", errors="replace")
+def write(
+    recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]], path: Path, *, overwrite: bool = False
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    recordings, findings
+        See `render`.
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
+    """
+    write_text(render(recordings, findings), path, overwrite=overwrite)
 
 
 def draw(recording: Recording, findings: Sequence[Finding]) -> str:
@@ -69,9 +80,7 @@ def draw(recording: Recording, findings: Sequence[Finding]) -> str:
     for number, f in enumerate(findings, start=1):
         numbers.setdefault(f.channel, []).append((number, f))
     heights = [_PANELS[q] for q in shown]
-    with drawing(recording.name), warnings.catch_warnings():
-        # a name may hold letters that the font to measure it lacks; the browser has them
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
+    with drawing(recording.name):
         figure = Figure(figsize=(9.6, 0.8 + 1.15 * sum(heights)), layout="constrained")
         panels = figure.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
         for ax, (quantity, channels) in zip(panels, shown.items(), strict=True):
@@ -97,14 +106,15 @@ def _panel(
     ax.set_ylim(low, high)
     # those with a finding are named first
     ordered = sorted(channels, key=lambda c: c.name not in numbers)
-    handles, names = [], []
+    names: list[str | None] = [c.name for c in ordered]
+    if len(names) > _NAMED:
+        names[_NAMED - 1 :] = [f"and {len(names) - _NAMED + 1} more", *[None] * (len(names) - _NAMED)]
     labels: dict[float, list[tuple[int, Finding]]] = {}
     for k, c in enumerate(ordered):
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
         style = ("-", "--", ":", "-.")[k // len(COLOURS) % 4]
-        line = ax.plot(*thin_points(hours, values), style, color=COLOURS[k % len(COLOURS)], lw=1.0, zorder=3)[0]
-        handles.append(line)
-        names.append(shorten_name(c.name))
+        colour = COLOURS[k % len(COLOURS)]
+        ax.plot(*thin_points(hours, values), style, color=colour, lw=1.0, zorder=3, label=names[k])
         for number, f in numbers.get(c.name, ()):
             _mark(ax, hours, np.clip(values, low, high), f, "--")
             if (row := _first(f)) is not None:
@@ -117,9 +127,7 @@ def _panel(
         _label(ax, hour, mine)
     ax.set_ylabel(channels[0].unit)
     ax.set_title(quantity.replace("_", " "))
-    if len(names) > _NAMED:
-        handles, names = handles[:_NAMED], [*names[: _NAMED - 1], f"and {len(names) - _NAMED + 1} more"]
-    ax.legend(handles, names, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
+    add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
 
 
 def _limits(

@@ -1,18 +1,16 @@
 """Figures of the report, as SVG text. Each answers one question; the question stands in its docstring."""
 
-import io
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from thermocomp.assessment.results import Assessment, Comparison
+from thermocomp.core.shown import shorten
 from thermocomp.recording.recording import Recording
+from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
 
 FloatArray = NDArray[np.float64]
 
@@ -22,32 +20,9 @@ MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
 #: how a dot is filled
 FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
+#: characters of a name along an axis
+LONGEST = 28
 POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
-
-#: characters of a name in a figure
-_LONGEST = 28
-_STYLE = {
-    "svg.fonttype": "none",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.6,
-    "axes.titlesize": 9.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "lines.linewidth": 1.2,
-}
-
-
-class Drawn(str):
-    """A figure as SVG text, which carries the figure along."""
-
-    figure: Figure
 
 
 def measured(recording: Recording) -> str:
@@ -86,14 +61,16 @@ def measured(recording: Recording) -> str:
                     *thin_points(hours, recording.table[c.name].to_numpy()),
                     style,
                     color=colour,
-                    label=shorten_name(c.name),
+                    label=c.name,
                 )
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
                 short = max(len(c.name) for c in channels) < 8
                 columns = 2 if short and len(channels) > 8 else 1
-                ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, fontsize=7, handlelength=1.4)
+                add_legend(
+                    ax, loc="center left", bbox_to_anchor=(1.0, 0.5), ncols=columns, fontsize=7, handlelength=1.4
+                )
         rest[-1].set_xlabel("time [h]")
         rest[-1].margins(x=0)
         return svg(figure)
@@ -114,14 +91,14 @@ def overview(comparison: Comparison) -> Drawn:
                 if not a.failure:
                     face = FILLED[a.word]
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
-            ax.set_yticks(range(len(models)), models, fontsize=7)
+            name_ticks(ax.yaxis, models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
-            ax.set_ylabel(shorten_name(target), fontweight="bold")
+            ax.set_ylabel(shorten(target, LONGEST), fontweight="bold")
             ax.set_xscale("log")
         panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
         for word, face in FILLED.items():
             panels[0].plot([], [], "o", color=PREDICTED, mfc=face, label=word)
-        figure.legend(loc="outside upper right", ncols=4)
+        add_legend(figure, loc="outside upper right", ncols=4)
         panels[-1].xaxis.set_major_formatter("{x:g}")
         panels[-1].xaxis.set_minor_formatter("{x:g}")
         panels[-1].tick_params(axis="x", which="minor", labelsize=7)
@@ -166,7 +143,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             )
             harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
             mark = "  HARMFUL" if harmful else ""
-            name = shorten_name(block.block, 60)
+            name = shorten(block.block, 60)
             ax.set_title(
                 f"{name}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
                 fontsize=8,
@@ -174,9 +151,8 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             )
             ax.set_xlabel("time [h]")
         for ax in axes[:, 0]:
-            ax.set_ylabel(shorten_name(f"{assessment.target.removesuffix('_um')} [um]"))
-        handles, labels = axes.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+            ax.set_ylabel(f"{shorten(assessment.target.removesuffix('_um'), LONGEST)} [um]")
+        add_legend(figure, loc="outside upper left", ncols=3)
         return svg(figure)
 
 
@@ -198,7 +174,7 @@ def robustness(comparison: Comparison, model: str) -> str:
             name, worst = r.worst_lost
             if lost:
                 ax.annotate(
-                    shorten_name(name),
+                    name,
                     (worst, k),
                     xytext=(3, 5),
                     textcoords="offset points",
@@ -214,10 +190,10 @@ def robustness(comparison: Comparison, model: str) -> str:
         ax.set_xscale("log")
         ax.xaxis.set_major_formatter("{x:g}")
         ax.xaxis.set_minor_formatter("")
-        ax.set_yticks(range(len(found)), [a.target for a in found])
+        name_ticks(ax.yaxis, [a.target for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
         ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return svg(figure)
 
 
@@ -246,34 +222,3 @@ def thin_points(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[Flo
     first = np.arange(0, n, stretch)
     picked = np.unique(np.concatenate([first + parts.argmin(axis=1), first + parts.argmax(axis=1), [0, len(x) - 1]]))
     return x[picked], y[picked]
-
-
-def shorten_name(name: str, longest: int = _LONGEST) -> str:
-    """Return a name as a figure shows it: short, on one line, with no sign that starts a formula or hides a legend."""
-    text = "".join(c if c.isprintable() else " " for c in name)
-    text = text if len(text) <= longest else text[: longest - 3] + "..."
-    return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
-
-
-@contextmanager
-def drawing(salt: str) -> Iterator[None]:
-    """Draw in the house's style.
-
-    Parameters
-    ----------
-    salt : str
-        Keeps the ids of several figures on one page apart, and the page the same from run to run.
-    """
-    rc: Any = {**_STYLE, "svg.hashsalt": salt}
-    with mpl.rc_context(rc):
-        yield
-
-
-def svg(figure: Figure) -> Drawn:
-    """Return a figure as SVG text."""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    found = Drawn(text[text.index("<svg") :])
-    found.figure = figure
-    return found

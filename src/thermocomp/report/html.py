@@ -5,10 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
 
 from thermocomp import __version__
 from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.results import Comparison
+from thermocomp.core.draft import write_text
+from thermocomp.core.shown import replace_unprintable
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report import figures, selections
@@ -81,13 +84,30 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
     )
 
 
-def write_choices(choices: Sequence[Choice], recordings: Sequence[Recording], path: Path) -> None:
-    """Write a selection of sensors as a page; an existing file is replaced."""
-    path.write_text(render_choices(choices, recordings), encoding="utf-8")
+def write_choices(
+    choices: Sequence[Choice], recordings: Sequence[Recording], path: Path, *, overwrite: bool = False
+) -> None:
+    """Write a selection of sensors as a page.
+
+    Parameters
+    ----------
+    choices, recordings
+        See `render_choices`.
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
+    """
+    write_text(render_choices(choices, recordings), path, overwrite=overwrite)
 
 
-def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, samples: Samples | None = None) -> None:
-    """Write the report; an existing file is replaced.
+def write(
+    comparison: Comparison,
+    recordings: Sequence[Recording],
+    path: Path,
+    samples: Samples | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write the report.
 
     Parameters
     ----------
@@ -96,13 +116,20 @@ def write(comparison: Comparison, recordings: Sequence[Recording], path: Path, s
     path : Path
     samples : Samples, optional
         See `render`.
+    overwrite : bool
+        See `thermocomp.core.draft.drafts`.
     """
-    path.write_text(render(comparison, recordings, samples), encoding="utf-8")
+    write_text(render(comparison, recordings, samples), path, overwrite=overwrite)
 
 
 def page(template: str, **content: Any) -> str:
     """Return a page of a template; all of them name the version."""
     return environment().get_template(template).render(version=__version__, **content)
+
+
+def _shown(value: Any) -> Any:
+    """Return a value as a page shows it: words have no sign that cannot be printed, or that turns others around."""
+    return replace_unprintable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def environment() -> Environment:
@@ -111,6 +138,7 @@ def environment() -> Environment:
         loader=PackageLoader("thermocomp.report"),
         autoescape=select_autoescape(["html"]),
         undefined=StrictUndefined,
+        finalize=_shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from thermocomp.core.draft import write_text
 from thermocomp.iso230 import tables
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.settling import Settling
@@ -53,15 +54,21 @@ def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Seq
 
 
 def write(
-    thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Sequence[PositioningResult], path: Path
+    thermal: Sequence[ThermalTest],
+    settlings: Settlings,
+    positioned: Sequence[PositioningResult],
+    path: Path,
+    *,
+    overwrite: bool = False,
 ) -> None:
-    """Write the page; an existing file is replaced.
+    """Write the page.
 
     Parameters
     ----------
     thermal : sequence of ThermalTest
     settlings : sequence of (Recording, sequence of Settling)
     positioned : sequence of PositioningResult
-    path : Path
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
     """
-    path.write_text(render(thermal, settlings, positioned), encoding="utf-8")
+    write_text(render(thermal, settlings, positioned), path, overwrite=overwrite)

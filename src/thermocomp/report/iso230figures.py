@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from thermocomp.iso230.part2 import PositioningResult
 from thermocomp.iso230.settling import Settling
 from thermocomp.iso230.thermaltest import HOUR, ThermalCurve, ThermalTest
-from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, drawing, svg, thin_points
+from thermocomp.report.drawing import add_legend, drawing, name_ticks, svg
+from thermocomp.report.figures import COLOURS, MEASURED, NONE, PREDICTED, RESIDUAL, SHADE, thin_points
 
 FloatArray = NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def _draw(ax: Axes, test: ThermalTest, curves: Sequence[ThermalCurve]) -> None:
         _mark_t90(ax, c, colour)
     if any(c.after is not None for c in curves):
         ax.plot([], [], "--", color=MEASURED, label="with model")
-    ax.legend(**_BESIDE)
+    add_legend(ax, **_BESIDE)
 
 
 def _mark_t90(ax: Axes, curve: ThermalCurve, colour: str) -> None:
@@ -109,7 +110,7 @@ def _temperatures(ax: Axes, test: ThermalTest) -> None:
     ax.set_title("temperatures")
     ax.set_ylabel("degC")
     if 0 < len(channels) <= _NAMED:
-        ax.legend(**{**_BESIDE, "fontsize": 6 if len(channels) > 12 else 7, "labelspacing": 0.25})
+        add_legend(ax, **{**_BESIDE, "fontsize": 6 if len(channels) > 12 else 7, "labelspacing": 0.25})
 
 
 def _mark(ax: Axes, test: ThermalTest) -> None:
@@ -145,7 +146,7 @@ def profiles(test: ThermalTest, number: int) -> str:
             ax.set_xlabel(f"{targets.axis} [mm]")
             ax.set_title("measured, since the start of the test" if what == "course" else "what the model leaves")
         panels[0].set_ylabel(f"error of {targets.axis} [um]")
-        panels[-1].legend(**_BESIDE)
+        add_legend(panels[-1], **_BESIDE)
         return svg(figure)
 
 
@@ -166,7 +167,7 @@ def time_constants(settlings: Sequence[Settling]) -> str:
             ax.xaxis.set_minor_formatter("{x:g}")
             ax.tick_params(axis="x", which="minor", labelsize=7)
             ax.set_xlabel("min")
-        panels[0].set_yticks(range(len(names)), names, fontsize=7)
+        name_ticks(panels[0].yaxis, names, fontsize=7)
         panels[0].set_ylim(len(names) - 0.4, -0.6)
         for label, style in (
             ("t63 read from the curve", {"marker": "|", "ms": 9, "color": MEASURED}),
@@ -176,7 +177,7 @@ def time_constants(settlings: Sequence[Settling]) -> str:
             ("of two", {"marker": "D", "color": RESIDUAL, "mfc": "white"}),
         ):
             panels[0].plot([], [], ls="", label=label, **{"ms": 5, **style})
-        figure.legend(loc="outside upper right", ncols=5, fontsize=7.5, handletextpad=0.2, columnspacing=1.2)
+        add_legend(figure, loc="outside upper right", ncols=5, fontsize=7.5, handletextpad=0.2, columnspacing=1.2)
         return svg(figure)
 
 
@@ -212,7 +213,7 @@ def positioning(result: PositioningResult) -> str:
         ax.set_xlabel(f"target position{f' {result.test.axis}' if result.test.axis else ''} [mm]")
         ax.set_ylabel(f"deviation [{unit}]")
         ax.set_title(result.test.state)
-        ax.legend(loc="best", ncols=3)
+        add_legend(ax, loc="best", ncols=3)
         return svg(figure)
 
 

@@ -10,8 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from thermocomp import __version__
+from thermocomp.core.draft import write_text
 from thermocomp.papers.study import Figure, PlotCurve, Study, StudyTable
-from thermocomp.report.figures import COLOURS, POINTS, drawing, svg, thin_points
+from thermocomp.report.drawing import add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, POINTS, thin_points
 from thermocomp.report.html import environment
 
 #: a cell that is a number, alone or with what stands for none
@@ -110,9 +112,9 @@ def paint(figure: Figure, canvas: Canvas) -> None:
         ax.set_ylabel(panel.ylabel)
         labelled = sum(bool(c.label) for c in panel.curves)
         if labelled > 6:
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
         elif labelled:
-            ax.legend(loc="best")
+            add_legend(ax, loc="best")
 
 
 def size(figure: Figure) -> tuple[float, float]:
@@ -166,9 +168,17 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
     )
 
 
-def write(studies: Sequence[Study], path: Path, *, seed: int) -> None:
-    """Write studies as a page; an existing file is replaced."""
-    path.write_text(render(studies, seed=seed), encoding="utf-8")
+def write(studies: Sequence[Study], path: Path, *, seed: int, overwrite: bool = False) -> None:
+    """Write studies as a page.
+
+    Parameters
+    ----------
+    studies, seed
+        See `render`.
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
+    """
+    write_text(render(studies, seed=seed), path, overwrite=overwrite)
 
 
 def _is_number(cell: str) -> bool:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from thermocomp.nc.rewrite.course import Bound, Run
-from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL, drawing
+from thermocomp.report.drawing import add_legend, drawing, png
+from thermocomp.report.figures import COLOURS, MEASURED, RESIDUAL
 
 FloatArray = NDArray[np.float64]
 
@@ -60,22 +60,24 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
                 ax.axvline(moment / unit, color="#999", lw=0.8, ls=":")
         if len(tool_changes):
             panels[0].plot([], [], color="#999", lw=0.8, ls=":", label=_changes(len(tool_changes)))
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4)
-        figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize=10)
+        add_legend(figure, loc="outside lower left", ncols=4)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10)
         return figure
 
 
-def write(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str, path: Path) -> None:
-    """Write the picture as PNG.
+def render(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> bytes:
+    """Return the picture as PNG.
 
     Parameters
     ----------
     run, bounds, tool_changes, title
         See `draw`.
-    path : Path
-        An existing file is replaced.
+
+    Returns
+    -------
+    bytes
     """
-    draw(run, bounds, tool_changes, title).savefig(path, format="png", dpi=150, metadata={"Software": None})
+    return png(draw(run, bounds, tool_changes, title))
 
 
 def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:

@@ -10,8 +10,10 @@ from matplotlib.ticker import MaxNLocator
 
 from thermocomp.assessment.choice import Choice, Table
 from thermocomp.assessment.pareto import Budget
+from thermocomp.core.shown import shorten
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.report.figures import COLOURS, NONE, Drawn, drawing, shorten_name, svg
+from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
+from thermocomp.report.figures import COLOURS, LONGEST, NONE
 
 #: what is drawn of the other methods: the first of these that a table has, and the words beside it
 TOLD = {
@@ -61,11 +63,11 @@ def rows(table: Table, value: int, target: str) -> Drawn:
         ax.xaxis.set_major_formatter("{x:g}")
         ax.xaxis.set_minor_formatter("{x:g}")
         ax.tick_params(axis="x", which="minor", labelsize=7)
-        ax.set_yticks(range(len(left)), [shorten_name(w, 60) for w in words], fontsize=8)
+        name_ticks(ax.yaxis, words, longest=60, fontsize=8)
         ax.set_ylim(len(left) - 0.4, -0.6)
         ax.set_xlabel(f"1 - {heading}" if share else heading)
         ax.set_ylabel("number of sensors" if names == [0] and table.columns[0] == "sensors" else "")
-        title = f"{shorten_name(target)}: {table.title[0].lower()}{table.title[1:]}"
+        title = f"{shorten(target, LONGEST)}: {table.title[0].lower()}{table.title[1:]}"
         figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
         return svg(figure)
 
@@ -85,8 +87,8 @@ def grouping(g: CorrelationGrouping, target: str) -> Drawn:
             frame = Rectangle((start - 0.5, start - 0.5), len(members), len(members), fill=False, ec="black", lw=1.6)
             matrix.add_patch(frame)
             start += len(members)
-        matrix.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
-        matrix.set_yticks(range(len(names)), names, fontsize=7)
+        name_ticks(matrix.xaxis, names, longest=LONGEST, rotation=90, fontsize=7)
+        name_ticks(matrix.yaxis, names, longest=LONGEST, fontsize=7)
         for labels in (matrix.get_xticklabels(), matrix.get_yticklabels()):
             for i, label in zip(order, labels, strict=True):
                 label.set_fontweight("bold" if i in g.representatives_ else "normal")
@@ -97,10 +99,10 @@ def grouping(g: CorrelationGrouping, target: str) -> Drawn:
         curve.axhline(g.mse_, color=COLOURS[1], ls="--", label="best members of the groups")
         _log(curve)
         curve.set_xlabel("number of representatives")
-        curve.set_ylabel("smallest MSE$_p$ [um$^2$]")
-        curve.set_title(shorten_name(target))
+        curve.set_ylabel("smallest MSE_p [um²]")
+        curve.set_title(shorten(target, LONGEST))
         curve.xaxis.set_major_locator(MaxNLocator(integer=True))
-        curve.legend()
+        add_legend(curve)
         return svg(figure)
 
 
@@ -124,14 +126,14 @@ def budget(b: Budget) -> Drawn:
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
         _log(errors)
         errors.set_ylabel("RMS unseen [um]")
-        errors.set_title(f"{shorten_name(b.target)}: error against the number of temperature sensors")
-        errors.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        errors.set_title(f"{shorten(b.target, LONGEST)}: error against the number of temperature sensors")
+        add_legend(errors, loc="center left", bbox_to_anchor=(1.0, 0.5))
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
         repeats.set_yscale("log")
         repeats.set_ylabel("condition")
         chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
-        chosen.set_yticks(range(len(b.candidates)), b.candidates, fontsize=7)
+        name_ticks(chosen.yaxis, b.candidates, fontsize=7)
         chosen.grid(visible=False)
         for size, sensors in zip(sizes, b.sensors, strict=True):
             rows = [b.candidates.index(s) for s in sensors]
@@ -145,7 +147,7 @@ def budget(b: Budget) -> Drawn:
             ms=6,
             label="chosen without any\none block, and lighter:\nwithout some of them",
         )
-        chosen.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        add_legend(chosen, loc="center left", bbox_to_anchor=(1.0, 0.5))
         chosen.set_xlabel("number of temperature sensors")
         chosen.set_xticks(sizes, names)
         return svg(figure)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from thermocomp.assessment.volumetric import Volumetric
 from thermocomp.core.components import COMPONENTS
+from thermocomp.core.draft import write_text
 from thermocomp.report import volumetric_figures as figures
 from thermocomp.report import volumetric_space as space
 from thermocomp.report import volumetric_tables as tables
@@ -52,6 +53,13 @@ def render(study: Volumetric) -> str:
     )
 
 
-def write(study: Volumetric, path: Path) -> None:
-    """Write the page; an existing file is replaced."""
-    path.write_text(render(study), encoding="utf-8")
+def write(study: Volumetric, path: Path, *, overwrite: bool = False) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    study : Volumetric
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
+    """
+    write_text(render(study), path, overwrite=overwrite)

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment.volumetric import Moment, Volumetric
 from thermocomp.core.components import BY_CODE, COMPONENTS
-from thermocomp.report.figures import COLOURS, MEASURED, drawing, svg, thin_points
+from thermocomp.report.drawing import add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, MEASURED, thin_points
 from thermocomp.volumetric.kinematics import INDEX
 
 FloatArray = NDArray[np.float64]
@@ -54,7 +55,7 @@ def over_time(study: Volumetric) -> str:
         if tilted:
             axes[1].set_title("tilt of the tool")
         for ax in axes:
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
             ax.margins(x=0)
         axes[-1].set_xlabel("time [h]")
         return svg(figure)
@@ -87,8 +88,7 @@ def curves(study: Volumetric) -> str:
             row[0].set_ylabel("um" if kind[1] in "XYZ" else "urad")
         for name, ax in zip(axes_shown, grid[-1], strict=True):
             ax.set_xlabel(f"{name} [mm]")
-        handles = next(h for h in (ax.get_legend_handles_labels() for ax in grid.flat) if h[0])
-        figure.legend(*handles, loc="outside upper left", ncols=3)
+        add_legend(figure, loc="outside upper left", ncols=3)
         return svg(figure)
 
 
@@ -113,7 +113,7 @@ def scalars(study: Volumetric) -> str:
                 )
             ax.set_ylabel(unit)
             ax.margins(x=0)
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
         ax.set_xlabel("time [h]")
         return svg(figure)
 

@@ -16,7 +16,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from thermocomp.assessment.volumetric import Moment, Volumetric, lay_grid
-from thermocomp.report.figures import MEASURED, drawing, svg
+from thermocomp.report.drawing import drawing, svg
+from thermocomp.report.figures import MEASURED
 from thermocomp.report.volumetric_figures import SMALL, WIDTH, choose_moments
 
 FloatArray = NDArray[np.float64]

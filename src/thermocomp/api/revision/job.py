@@ -14,11 +14,9 @@ from thermocomp import __version__
 from thermocomp.adapters.linuxcnc.verification.verify import Ledger, Proof, prove
 from thermocomp.api.revision import headers
 from thermocomp.api.revision.expanded import write_expanded
+from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError, ProgramError
-from thermocomp.core.scratch import scratch
-from thermocomp.core.shown import replace_unprintable
 from thermocomp.files import jobstate, ncprogram
-from thermocomp.files.draft import publish
 from thermocomp.nc.parser.tokens import program_lines
 from thermocomp.nc.rewrite import diff, header
 from thermocomp.nc.rewrite.course import Bound, Course, Run
@@ -157,11 +155,12 @@ def revise(job: Job, phase: Phase) -> Done:
 
 def _revise(job: Job, phase: Phase) -> Done:
     paths = job.paths
-    with scratch(paths.program.parent) as folder:
-        drafts = {p: folder / f"{k}" for k, p in enumerate(paths.all())}
+    # the program comes last: where it is, all is
+    with drafts(paths.all()[::-1], overwrite=job.overwrite) as started:
+        folder = started[paths.program].parent
         source, lines = job.program, None
         if paths.expanded is not None:
-            source = drafts[paths.expanded]
+            source = started[paths.expanded]
             lines = _expand(job, source, phase)
         ledger, course = Ledger(), Course()
         watching = () if job.travel is None else (job.travel,)
@@ -170,7 +169,7 @@ def _revise(job: Job, phase: Phase) -> Done:
             if source.stat().st_size > LONG:
                 _rehearse(job, source, phase)
             with phase("revising") as tell:
-                blank = _write(job, source, folder, drafts[paths.table], (ledger, course, *watching), tell)
+                blank = _write(job, source, folder, started[paths.table], (ledger, course, *watching), tell)
         except ProgramError as e:
             if lines is not None and 0 < e.line <= len(lines):
                 line = lines[e.line - 1] or 1
@@ -191,18 +190,17 @@ def _revise(job: Job, phase: Phase) -> Done:
         filled = header.fill(
             _facts(job, bounds, proof), ending(blank[0]), len(blank), upper=job.revision.setup.controller == "fanuc"
         )
-        ncprogram.replace_lines(folder / PROGRAM, drafts[paths.program], dict(zip(blank, filled, strict=True)))
+        ncprogram.replace_lines(folder / PROGRAM, started[paths.program], dict(zip(blank, filled, strict=True)))
         ncprogram.replace_lines(
-            folder / DIFF, drafts[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
+            folder / DIFF, started[paths.diff], {f"+{b}": f"+{f}" for b, f in zip(blank, filled, strict=True)}
         )
-        drafts[paths.job].write_text(jobstate.dumps(job.drift.state(), job.when), encoding="utf-8")
+        started[paths.job].write_text(jobstate.dumps(job.drift.state(), job.when), encoding="utf-8")
         if paths.picture is not None:
             from thermocomp.report import revision as pictures
 
-            title = replace_unprintable(f"{job.program.name}, {job.begun}")
-            pictures.write(run, bounds, job.revision.tool_changes, title, drafts[paths.picture])
-        # the program comes last: where it is, all is
-        publish({path: drafts[path] for path in reversed(paths.all())}, overwrite=job.overwrite)
+            title = f"{job.program.name}, {job.begun}"
+            started[paths.picture].write_bytes(pictures.render(run, bounds, job.revision.tool_changes, title))
+        started.publish()
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 
@@ -260,7 +258,7 @@ def _write(
         ncprogram.open_to_read(source) as texts,
         ncprogram.open_to_write(folder / PROGRAM) as program,
         ncprogram.open_to_write(folder / DIFF) as written,
-        table.open("w", encoding="utf-8", newline="\n") as rows,
+        ncprogram.open_to_write(table) as rows,
     ):
         columns = (f"{what}_{'xyz'[k]}_um" for k in axes for what in ("drift", "correction"))
         rows.write(",".join(("line", "revised_line", "start_s", "end_s", *columns, "changed")) + "\n")

@@ -10,9 +10,9 @@ from thermocomp.adapters.linuxcnc.verification.verify import foresee_sentence
 from thermocomp.api.revision import headers
 from thermocomp.api.revision.job import ALL_THE_SAME, Job, Paths
 from thermocomp.api.revision.options import Controller, Drifting, Starting, Timing, Way
+from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
-from thermocomp.files.draft import refuse_existing
 from thermocomp.nc.interpreter.block import Setup
 from thermocomp.nc.parser.recognise import program_number
 from thermocomp.nc.parser.tokens import read_lines

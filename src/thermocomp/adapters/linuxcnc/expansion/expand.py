@@ -14,7 +14,9 @@ from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parame
 from thermocomp.adapters.linuxcnc.expansion.words import Side
 from thermocomp.adapters.linuxcnc.rs274 import Canonical, read
 from thermocomp.adapters.linuxcnc.stored import Stored, draw_controller
+from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, ProgramError
+from thermocomp.nc.rewrite.header import clean_comment
 
 _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
 _ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
@@ -24,6 +26,8 @@ _DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
 _WRITTEN, _PROVED = (1, 2), (3, 4)
 #: lines after which it is told how many are written
 _OFTEN = 1000
+#: of the program's name in a comment that old controls can read
+_NAME = 48
 #: lines that are written at most
 MOST = 2_000_000
 
@@ -141,17 +145,14 @@ def expand(
         The program does something that depends on what is stored in the machine, or that has no plain words; a file
         that was run has M19.
     InputError
-        `out` exists already, or the program is not there.
+        `out` exists already or cannot be written, or the program is not there.
     """
     if not path.is_file():
         raise InputError(f"{path} is not a file")
-    if out.exists():
-        raise InputError(f"{out} exists already; nothing is overwritten")
     systems = _start_systems(path, block_delete)
     around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds, systems)
-    part = out.with_name(out.name + ".part")
     acts = 0
-    try:
+    with draft(out, overwrite=False) as part:
         sources: array[int] = array("I")
         with part.open("w", encoding="ascii", newline="\n") as file:
             for text, line in _lines(path, around):
@@ -173,9 +174,6 @@ def expand(
                 compare_parameters(*left)
             except ProgramError as error:
                 raise ProgramError(error.line, f"it cannot be expanded: {error.reason}") from error
-        part.rename(out)
-    finally:
-        part.unlink(missing_ok=True)
     return Expansion(out, sources, acts)
 
 
@@ -184,8 +182,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     percent = _first(path) == "%"
     if percent:
         yield "%", 0
-    name = "".join(c if " " <= c <= "~" and c not in "()" else "?" for c in path.name)
-    yield f"(expanded from {name} by thermocomp)", 0
+    yield f"(expanded from {clean_comment(path.name)[:_NAME]} by thermocomp)", 0
     if around.diameters:
         yield "(cutter radius compensation is worked out for given tool diameters)", 0
     yield "G17 G40 G80 G90 G94", 0

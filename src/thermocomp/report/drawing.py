@@ -1,0 +1,139 @@
+"""What all figures share: the house's style, words that stay words, and how a figure becomes SVG or PNG.
+
+Words that people typed (names of channels, cycles, files, methods, places) are never read as formulas; what cannot be
+printed is replaced, and what is too long is cut, whatever draws it. So legends and names at ticks are made here, and
+nothing but `svg` and `png` saves a figure.
+"""
+
+import io
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from thermocomp.core.shown import shorten
+
+#: characters of a name beside what it names, and of a line by itself; lines of a text
+_NAME, _LINE, _LINES = 48, 130, 3
+
+#: no text is a formula
+_PLAIN: dict[Any, Any] = {"text.parse_math": False, "text.usetex": False}
+_STYLE = {
+    **_PLAIN,
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.2,
+}
+
+
+class Drawn(str):
+    """A figure as SVG text, which carries the figure along."""
+
+    figure: Figure
+
+
+@contextmanager
+def drawing(salt: str) -> Iterator[None]:
+    """Draw in the house's style, and no text as a formula.
+
+    Parameters
+    ----------
+    salt : str
+        Keeps the ids of several figures on one page apart, and the page the same from run to run.
+    """
+    rc: Any = {**_STYLE, "svg.hashsalt": ascii(salt)}
+    with mpl.rc_context(rc):
+        yield
+
+
+def add_legend(where: Axes | Figure, **how: Any) -> None:
+    """Add a legend of all that has a label; matplotlib's leaves out what begins with ``_``.
+
+    Parameters
+    ----------
+    where : Axes or Figure
+        A figure's legend has each label of its axes once.
+    **how
+        Of matplotlib's ``legend``.
+    """
+    if isinstance(where, Axes):
+        named = list(_labelled(where))
+    else:
+        first: dict[str, Artist] = {}
+        for ax in where.axes:
+            for handle, label in _labelled(ax):
+                first.setdefault(label, handle)
+        named = [(handle, label) for label, handle in first.items()]
+    labels = [shorten(label, _NAME) for _, label in named]
+    # with a blank before it matplotlib takes it
+    labels = [f" {label}" if label.startswith("_") else label for label in labels]
+    where.legend([handle for handle, _ in named], labels, **how)
+
+
+def _labelled(ax: Axes) -> Iterator[tuple[Artist, str]]:
+    """Yield what was given a label, with it; matplotlib labels the rest by their place."""
+    for k, artist in enumerate(ax.get_children()):
+        label: Any = artist.get_label()
+        if isinstance(label, str) and label not in ("", f"_child{k}", "_nolegend_"):
+            yield artist, label
+
+
+def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: Any) -> None:
+    """Write names at 0, 1, 2 ... of an axis.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+    names : sequence of str
+    longest : int
+        Characters that find room.
+    **how
+        Of the labels, such as ``fontsize``.
+    """
+    axis.set_ticks(range(len(names)), [shorten(name, longest) for name in names], **how)
+
+
+def svg(figure: Figure) -> Drawn:
+    """Return a figure as SVG text."""
+    buffer = io.StringIO()
+    _save(figure, buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    found = Drawn(text[text.index("<svg") :])
+    found.figure = figure
+    return found
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG."""
+    buffer = io.BytesIO()
+    _save(figure, buffer, format="png", dpi=150, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _save(figure: Figure, buffer: io.StringIO | io.BytesIO, **how: Any) -> None:
+    beside = {id(text) for ax in figure.axes for text in ax.texts}
+    for text in figure.findobj(Text):
+        longest = _NAME if id(text) in beside else _LINE
+        text.set_text("\n".join(shorten(line, longest) for line in text.get_text().split("\n", _LINES - 1)))
+    with warnings.catch_warnings(), mpl.rc_context(_PLAIN):
+        # a name may hold letters that the font to measure it lacks; the browser has them
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(buffer, **how)

@@ -1,0 +1,125 @@
+"""All that becomes a file, of every kind, in two versions: what the tests of the one writer write."""
+
+import atexit
+import io
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+from unittest import mock
+
+from driftmodels import lags
+from reviseruns import PLATE, judged
+from smallmachine import small_machine
+
+from thermocomp.cli.app import run
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
+from thermocomp.core.profile import SplineProfile
+from thermocomp.files import modelfile, positionfile, recordings
+from thermocomp.report import checks, html
+from thermocomp.report import iso230 as iso230pages
+from thermocomp.report import papers as paperpages
+from thermocomp.report import volumetric as volumetricpages
+
+_FANUC = (
+    "%\nO1234\nG21 G90 G17 G94\nT1 M6\nS4000 M3\nG0 G54 X0. Y0. Z50.\nG1 Z0. F30.\nM98 P100 L2\nX100.\n"
+    "G90 G0 Z50.\nM30\nO100\nG91 Z-1.\nG90 X100.\nM99\n%\n"
+)
+#: as long as a page with some figures
+_PAGE = "<p>0123456789</p>\n" * 10_000
+
+
+class Writer(NamedTuple):
+    """One kind."""
+
+    write: Callable[[Path, int], None]  #: into a folder, a version
+    names: tuple[str, ...]  #: of its files
+    last: str  #: the one that an error names
+
+
+def _page(module: object, name: str, write: Callable[[Path], None]) -> Writer:
+    """A page, whose making takes long: its text is there already."""
+
+    def go(folder: Path, version: int) -> None:
+        with mock.patch.object(module, name, return_value=f"{_PAGE}{version}"):
+            write(folder / "page.html")
+
+    return Writer(go, ("page.html",), "page.html")
+
+
+def _model(version: int) -> ErrorModel:
+    return judged(replace(lags("z_um"), intercept=float(version)))
+
+
+def _position_model(version: int) -> PositionModel:
+    profile = SplineProfile(axis="Y", knots=(0.0, 550.0), pieces=((0.0, 1.0, float(version), 0.2),))
+    return PositionModel(
+        target="EYY", unit="um", axis="Y", travel=(0.0, 550.0), reference_position=0.0, profile=profile, offset=None
+    )
+
+
+def _recording(ending: str) -> Writer:
+    tests = [small_machine(seed=k) for k in (0, 1)]
+    name = f"drift.{ending}"
+    return Writer(lambda f, v: recordings.write(tests[v], f / name, overwrite=True), (name,), name)
+
+
+@cache
+def _inputs(program: str, version: int) -> Path:
+    """A folder with a program and a model."""
+    inputs = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, inputs)
+    modelfile.write([_model(version)], inputs / "model.json")
+    (inputs / "part.ngc").write_text(program.replace("X100", f"X10{version}"), encoding="ascii")
+    return inputs
+
+
+def _revise(controller: str) -> Writer:
+    """A program with all that stands beside it; a Fanuc's is written out first."""
+    options = {"linuxcnc": [], "fanuc": ["--controller", "fanuc", "--expand"]}
+    ends = ["", ".diff", ".csv", ".job.json", ".png", *([".expanded"] if controller == "fanuc" else [])]
+    program = PLATE if controller == "linuxcnc" else _FANUC
+
+    def go(folder: Path, version: int) -> None:
+        inputs = _inputs(program, version)
+        words = ["revise", str(inputs / "part.ngc"), "--model", str(inputs / "model.json"), "--cold", "--unproved"]
+        more = [*options[controller], "--date", "2026-01-31", "--overwrite", "-o", str(folder / "out.ngc")]
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as told:
+            code = run([*words, *more])
+        if code:
+            raise InputError(told.getvalue())
+
+    return Writer(go, tuple(f"out.ngc{end}" for end in ends), "out.ngc")
+
+
+#: by the name of the kind
+WRITERS: dict[str, Writer] = {
+    "model": Writer(
+        lambda f, v: modelfile.write([_model(v)], f / "model.json", overwrite=True), ("model.json",), "model.json"
+    ),
+    "position model": Writer(
+        lambda f, v: positionfile.write([_position_model(v)], f / "position.json", overwrite=True),
+        ("position.json",),
+        "position.json",
+    ),
+    "csv": _recording("csv"),
+    "parquet": _recording("parquet"),
+    "check page": _page(checks, "render", lambda p: checks.write([], [], p, overwrite=True)),
+    "report": _page(html, "render", lambda p: html.write(None, [], p, overwrite=True)),  # type: ignore[arg-type]
+    "selection page": _page(html, "render_choices", lambda p: html.write_choices([], [], p, overwrite=True)),
+    "iso230 page": _page(iso230pages, "render", lambda p: iso230pages.write([], [], [], p, overwrite=True)),
+    "papers page": _page(paperpages, "render", lambda p: paperpages.write([], p, seed=0, overwrite=True)),
+    "volumetric page": _page(
+        volumetricpages,
+        "render",
+        lambda p: volumetricpages.write(None, p, overwrite=True),  # type: ignore[arg-type]
+    ),
+    "program": _revise("linuxcnc"),
+    "program written out": _revise("fanuc"),
+}
