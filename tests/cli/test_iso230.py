@@ -129,7 +129,7 @@ def test_refusals(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
         ([spindle, "--pairs", "x1:x9:9mm"], "no channel is named 'x9'"),
         ([spindle, "--pairs", "x1:y2:9mm"], "whose names begin with that letter"),
         ([spindle, "--ambient", "t_moon_C"], "no channel is named 't_moon_C'"),
-        ([spindle, "--model", str(model)], "no such file"),
+        ([spindle, "--model", str(model)], "no such model file"),
         (["--positioning", spindle], "no column 'position'"),
         ([str(tmp_path / "none.csv")], "no such file"),
         ([spindle, "-o", spindle], "is also an input"),

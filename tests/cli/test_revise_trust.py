@@ -38,12 +38,11 @@ def test_a_speed_outside_the_trained_range_widens_the_bound(
     assert outside["model_um"] > inside["model_um"] + 5
 
 
-def test_a_model_that_was_never_judged_gives_no_bound(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_model_that_was_never_judged_does_not_run(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([lags("z_um")], "unjudged.json")
-    axis, warnings = bound(["--model", "unjudged.json"], capsys)
-    assert axis["bound_um"] is None
-    assert any("never judged" in w for w in warnings)
-    assert "bound Z not known" in Path("out.ngc").read_text(encoding="ascii")
+    assert revise("--model", "unjudged.json") == 2
+    assert "model of z_um was never judged on cycles it has not seen and will not run" in said(capsys)
+    assert not Path("out.ngc").exists()
 
 
 def test_a_model_that_is_worse_than_the_drift_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -124,14 +124,22 @@ def test_bad_curves_are_refused(x: Any, y: Any, kind: Any, message: str) -> None
     [
         ({"curves": (LINE,)}, "3 variables but 1 curves"),
         ({"intercept": float("nan")}, "must be finite"),
-        (
-            {"variables": (Variable("a", ((0, float("inf")),)),), "curves": (LINE,)},
-            "variable a: weights must be finite",
-        ),
-        ({"variables": (Variable.single("t9", 9),), "curves": (LINE,)}, "t9 refers to an input beyond the 3"),
-        ({"variables": (Variable("none", ()),), "curves": (LINE,)}, "none refers"),
+        ({"variables": (Variable.single("t9", 9),), "curves": (LINE,)}, "t9: refers to an input beyond the 3"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         model(**change)
+
+
+@pytest.mark.parametrize(
+    ("name", "weights", "message"),
+    [
+        ("a", ((0, float("inf")),), "variable a: weights must be finite"),
+        ("none", (), "variable none: is of no input"),
+        ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is no name"),
+    ],
+)
+def test_what_is_no_variable_is_refused(name: str, weights: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Variable(name, weights)

@@ -297,8 +297,8 @@ def test_numbers_that_are_none() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"interval": 0.0}, "interval 0.0 s must be positive"),
-        ({"interval": np.inf}, "must be positive and finite"),
+        ({"interval": 0.0}, "interval must be from 0.001 to"),
+        ({"interval": np.inf}, "interval must be from 0.001 to"),
         ({"b": ((1.0,),)}, "equally many, for each of 2 inputs"),
         ({"b": ((1.0,), (1.0, 2.0))}, "equally many"),
         ({"b": ((), ())}, "equally many"),
@@ -316,7 +316,7 @@ def test_linear_numbers_that_do_not_fit(change: dict[str, object], message: str)
     ("change", "message"),
     [
         ({"k": 1}, "want a net of 5 inputs; found 6"),
-        ({"interval": -1.0}, "must be positive"),
+        ({"interval": -1.0}, "interval must be from 0.001 to"),
         ({"input_scaling": Affine((1.0,), (0.0,))}, "scaling of 1"),
         ({"output_scaling": Affine((1.0, 1.0), (0.0, 0.0))}, "want one output"),
         ({"net": replace(network().net, output="identity")}, "no bounds"),

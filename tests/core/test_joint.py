@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from driftmodels import judged
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.stack import Stack
 from thermocomp.core.terms import Variable
-from thermocomp.files import modelfile
+from thermocomp.files import jsonfile, modelfile
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
 from thermocomp.recording.stacking import stack
@@ -151,7 +152,7 @@ def test_round_trip_and_older_files() -> None:
     assert modelfile.loads(modelfile.dumps([m])) == (m,)
     body = json.loads(modelfile.dumps([replace(m, joint=None)]))["models"]
     older = [{k: v for k, v in body[0].items() if k not in ("joint", "validity")}]
-    assert modelfile.model_of(older[0], "older") == replace(m, joint=None)
+    assert modelfile.loads(jsonfile.pack(jsonfile.MODELS, older)) == (replace(m, joint=None),)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +243,7 @@ def test_size_in_the_file_is_limited() -> None:
 def test_the_online_step_says_it() -> None:
     m = model("clip")
     limits = Limits(magnitude=50.0, rate=1.0, dead_band=0.0, reading_age=60.0)
-    compensator = Compensator.of([m], limits)
+    compensator = Compensator.of([judged(m, 2.0)], limits)
     state = compensator.start()
     readings = [({"a": 2.0, "b": 4.0, "s": 1000.0}, ()), ({"a": 2.0, "b": 4.0, "s": 2000.0}, (TOGETHER,))]
     for k, (values, told) in enumerate(readings):

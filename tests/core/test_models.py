@@ -71,7 +71,7 @@ def test_a_fixed_reference_wins_over_the_first_reading() -> None:
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
 def test_a_trained_range_is_finite(bad: float) -> None:
     for low, high in ((-bad, 1.0), (0.0, bad)):
-        with pytest.raises(InputError, match=r"input t: trained range .* must be finite numbers"):
+        with pytest.raises(InputError, match=r"input t: (low|high) must be finite"):
             temperature("t", low, high)
 
 
@@ -231,7 +231,7 @@ def test_polynomial_refuses_numbers_that_do_not_fit(change: dict[str, object], m
 
 
 def test_lag_refuses_numbers_that_do_not_fit() -> None:
-    with pytest.raises(InputError, match="time constants must be positive"):
+    with pytest.raises(InputError, match="time_constants must be from 1e-06"):
         lag(0.0)
 
 

@@ -97,7 +97,7 @@ def test_only_a_number_near_zero_stands() -> None:
 @pytest.mark.parametrize("bad", [-1.0, math.nan, math.inf])
 def test_times_are_times(bad: float) -> None:
     for at_rest, otherwise in ((bad, 0.0), (0.0, bad)):
-        with pytest.raises(InputError, match="must be times in s"):
+        with pytest.raises(InputError, match=r"zero: (at_rest|otherwise) must be from 0"):
             Zeroing(at_rest, otherwise)
 
 

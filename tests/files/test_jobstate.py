@@ -19,7 +19,11 @@ NOON = datetime(2026, 11, 21, 12, 0, 0, 250000, tzinfo=UTC)
 
 @pytest.fixture
 def left() -> JobState:
-    stations = [Station("X", net("x_um")), Station("Y", ticking("y_um")), Station("Z", lags())]
+    stations = [
+        Station("X", net("x_um"), shadow=True),
+        Station("Y", ticking("y_um"), shadow=True),
+        Station("Z", lags(), shadow=True),
+    ]
     drift = Drift(stations, start.begin_cold(stations, {}))
     drift.advance(1234.5, 3210.0)
     drift.advance(0.3, 0.0)
@@ -61,7 +65,7 @@ def test_damage_is_refused(left: JobState, tmp_path: Path) -> None:
         jobstate.loads(text.replace('"version": 1', '"version": 2'))
     with pytest.raises(ModelFileError, match="a state file of a job but a model file"):
         jobstate.loads(modelfile.dumps([lags()]))
-    with pytest.raises(ModelFileError, match="no such file"):
+    with pytest.raises(ModelFileError, match="no such state file"):
         jobstate.read(tmp_path / "none.json")
 
 

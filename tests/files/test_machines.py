@@ -56,7 +56,7 @@ def written(folder: Path, text: str) -> Path:
 def drift(target: str, unit: str = "um", verdict: Word = "") -> Polynomial:
     judged = None
     if verdict:
-        judged = HonestError("made", 2.0, 2.0, 4.0, 1.0, 1.0, {"1": 2.0}, verdict, "worse than none", rules=RULES)
+        judged = HonestError("made", 2.0, 2.0, 4.0, 3.0, 3.0, {"1": 2.0}, verdict, "worse than none", rules=RULES)
     return Polynomial(
         target=target,
         unit=unit,
@@ -240,7 +240,7 @@ MM = 'write a length with its unit, such as "600 mm"'
             "components.EXX.profile: 1 mm stands behind 5 mm: positions must rise",
         ),
         (HEAD + 'C0Y = {profile = [["0 mm", "0 um"]]}', "components.C0Y.profile: squareness of Y to X does not depend"),
-        (HEAD + 'EXX = {model = "no.json"}', "no.json: no such file"),
+        (HEAD + 'EXX = {model = "no.json"}', "no.json: no such model file"),
     ],
 )
 def test_what_cannot_be_used_is_told_to_the_key(text: str, message: str, tmp_path: Path) -> None:

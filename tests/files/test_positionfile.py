@@ -1,7 +1,6 @@
 """Files of position models: bit-exact round trip; damaged files and files of another kind are refused."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from thermocomp.core.bounds import COEFFICIENT
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
@@ -20,7 +20,7 @@ from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.terms import Variable
 from thermocomp.files import jsonfile, modelfile, positionfile
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-COEFFICIENT, COEFFICIENT)
 T1 = Input("t1_C", "temperature", "degC", 20.1, True, -1 / 3, 12.7)
 HONEST = HonestError("leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "refused", "worse than none")
 
@@ -96,7 +96,7 @@ def test_files(tmp_path: Path) -> None:
     positionfile.write([model(spline())], path, overwrite=True)
     assert positionfile.read(path) == (model(spline()),)
     assert [p.name for p in tmp_path.iterdir()] == ["eyy.json"]
-    with pytest.raises(ModelFileError, match=r"none\.json: no such file"):
+    with pytest.raises(ModelFileError, match=r"none\.json: no such position model file"):
         positionfile.read(tmp_path / "none.json")
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ModelFileError, match="cannot be read as a position model file"):
@@ -124,7 +124,11 @@ def test_cut_anywhere_is_told_and_never_half_used() -> None:
     ("old", "new", "message"),
     [
         ("0.3333333333333333", "0.3333333333333334", "do not match its checksum.*'thermocomp position'"),
-        ('"version": 1', '"version": 2', "position model file version 2; this thermocomp reads version 1"),
+        (
+            '"version": 1',
+            '"version": 2',
+            "written by a newer thermocomp, version 2 of a position model file; this one reads version 1: update",
+        ),
         ("thermocomp-position-model", "something-else", "not a position model file: it has no"),
     ],
 )
@@ -154,18 +158,18 @@ def altered(change: dict[str, Any]) -> str:
     ("change", "message"),
     [
         ({"slopes": None}, "model 1: slopes: is missing"),
-        ({"slopes": 1}, "model 1: slopes: must be a list"),
-        ({"slopes": [{"family": "oracle"}]}, "model 1: slope 1: unknown family 'oracle'"),
+        ({"slopes": 1}, "model 1: slopes: Input should be a valid array, found 1"),
+        ({"slopes": [{"family": "oracle"}]}, "model 1: slopes.0: unknown family 'oracle'"),
         ({"offset": {"unit": "um/m"}}, "k_0 is in um/m, must be in um"),
         ({"offset": {"direct": []}}, "model 1: offset: .*1 signals but 0 direct"),
         ({"surprise": 1}, "model 1: surprise: "),
         ({"unit": "mm"}, "model 1: unit: "),
         ({"axis": "B"}, "axis 'B': expected X, Y or Z"),
         ({"travel": [550.0, 0.0]}, "travel .* must rise"),
-        ({"profile": {"kind": "wavelet"}}, 'model 1: profile: its "kind" is unknown; known are polynomial, spline'),
-        ({"profile": 3}, 'profile: its "kind" is unknown'),
-        ({"profile": {"scale": [0.0, 1.0, 1.0]}}, "profile: .*must be positive"),
-        ({"profile": {"low": [0.0]}}, r"profile: low\.1"),
+        ({"profile": {"kind": "wavelet"}}, "model 1: profile: unknown kind 'wavelet'; known are polynomial, spline"),
+        ({"profile": 3}, "model 1: profile: Input should be an object, found 3"),
+        ({"profile": {"scale": [0.0, 1.0, 1.0]}}, "profile: scale must be from 1e-06 to 1e\\+07, found 0"),
+        ({"profile": {"low": [0.0]}}, r"profile\.low\.1: is missing"),
     ],
 )
 def test_wrong_content_is_refused_with_its_place(change: dict[str, Any], message: str) -> None:
@@ -174,13 +178,7 @@ def test_wrong_content_is_refused_with_its_place(change: dict[str, Any], message
 
 
 def test_what_is_no_model_at_all() -> None:
-    for body, message in (([], "holds no model"), ([3], "model 1: is no table of keys")):
+    for body, message in (([], "holds no model"), ([3], "model 1: Input should be an object, found 3")):
         content = {"format": "thermocomp-position-model", "version": 1, "sha256": jsonfile.digest(body), "models": body}
         with pytest.raises(ModelFileError, match=message):
             positionfile.loads(json.dumps(content))
-
-
-def test_nan_is_never_written() -> None:
-    bad = replace(slope(), honest_error=replace(HONEST, rms=float("nan")))
-    with pytest.raises(ValueError, match="Out of range float"):
-        positionfile.dumps([replace(model(), slopes=(bad,))])

@@ -18,7 +18,7 @@ import thermocomp
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.scratch import is_scratch
-from thermocomp.files import recordings
+from thermocomp.files import mending
 
 PACKAGE = Path(thermocomp.__file__).parent
 #: blocks inside which files are written that become others, or that nobody keeps
@@ -265,13 +265,13 @@ def test_what_comes_into_being_during_the_work_is_not_replaced(
 ) -> None:
     ready(tmp_path, WRITERS["csv"])
     page = tmp_path / "check.html"
-    read = recordings.read_all
+    read = mending.read_or_offer
 
     def meanwhile(*arguments: Any) -> Any:
         page.write_text("precious")
         return read(*arguments)
 
-    monkeypatch.setattr(recordings, "read_all", meanwhile)
+    monkeypatch.setattr(mending, "read_or_offer", meanwhile)
     assert run(["check", str(tmp_path / "drift.csv"), "-o", str(page)]) == 2
     assert "check.html: exists already" in " ".join(capsys.readouterr().err.split())
     assert page.read_text() == "precious"

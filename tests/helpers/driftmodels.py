@@ -13,6 +13,7 @@ from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.terms import Variable
 
 SPEED = Input("spindle_rpm", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0)
+ACCEPTED = HonestError("test", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "worse than none on cycle 3", rules=RULES)
 ROOM = Input("t3_C", "temperature", "degC", 20.0, True, -5.0, 5.0)
 
 
@@ -64,8 +65,7 @@ def static(target: str = "z_um") -> Polynomial:
 
 def judged(model: ErrorModel, max_abs: float, verdict: Literal["accepted", "refused"] = "accepted") -> ErrorModel:
     """Return the model with an honest error."""
-    honest = HonestError("test", 1.0, 1.0, max_abs, 5.0, 5.0, {}, verdict, "worse than none on cycle 3", rules=RULES)
-    return replace(model, honest_error=honest)
+    return replace(model, honest_error=replace(ACCEPTED, max_abs=max_abs, verdict=verdict))
 
 
 def strict(model: ErrorModel) -> ErrorModel:
@@ -74,7 +74,7 @@ def strict(model: ErrorModel) -> ErrorModel:
 
 
 def growing(target: str, per_degree: float, unit: str = "um") -> Polynomial:
-    """So much a degree of one temperature, counted from the first reading."""
+    """So much a degree of one temperature, counted from the first reading; accepted."""
     return Polynomial(
         target=target,
         unit=unit,
@@ -82,4 +82,5 @@ def growing(target: str, per_degree: float, unit: str = "um") -> Polynomial:
         variables=(Variable.single("t", 0),),
         terms=((0,),),
         coefficients=(per_degree,),
+        honest_error=ACCEPTED,
     )

@@ -28,12 +28,14 @@ REMEMBERING: list[Callable[[], ErrorModel]] = [lags, ticking, net]
 
 
 def alone(model: ErrorModel, others: Inputs | None = None, **options: float) -> Drift:
-    station = [Station("Z", model)]
+    station = [Station("Z", model, shadow=True)]
     return Drift(station, start.begin_cold(station, others or {}), others, zero="cold", **options)
 
 
 def ladder(models: Sequence[ErrorModel], places: Sequence[float], axis: str = "Z") -> list[Station]:
-    return [Station(axis, replace(m, target=f"{axis}{p}"), "Z", p) for m, p in zip(models, places, strict=True)]
+    return [
+        Station(axis, replace(m, target=f"{axis}{p}"), "Z", p, shadow=True) for m, p in zip(models, places, strict=True)
+    ]
 
 
 def by_hand(model: ErrorModel, schedule: Sequence[tuple[float, float]]) -> float:
@@ -159,7 +161,7 @@ def test_a_speed_that_is_no_number_is_refused() -> None:
 
 def four() -> Drift:
     stations = ladder([lags(size=s) for s in (1.0, 1.3, 0.4, -0.5)], (0.0, 200.0, 400.0, 600.0))
-    both = [Station("X", ticking("x_um")), *stations]
+    both = [Station("X", ticking("x_um"), shadow=True), *stations]
     drift = Drift(both, start.begin_cold(both, {}), {})
     drift.advance(1800.0, 4000.0)
     return drift
@@ -275,7 +277,7 @@ def test_signals_that_are_refused(time: tuple[float, ...], values: tuple[float, 
 
 
 def test_the_drift_counts_from_the_stated_zero() -> None:
-    station = [Station("Z", lags())]
+    station = [Station("Z", lags(), shadow=True)]
     warm = start.begin_measured(station, {"Z": 7.0}, {})
     from_start, from_cold = Drift(station, warm), Drift(station, warm, zero="cold")
     assert from_start.deviation(ORIGIN)[2] == 0

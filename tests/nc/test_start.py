@@ -24,7 +24,7 @@ REMEMBERING: list[Callable[[], ErrorModel]] = [lags, ticking, net]
 
 
 def one(model: ErrorModel) -> list[Station]:
-    return [Station("Z", model)]
+    return [Station("Z", model, shadow=True)]
 
 
 @pytest.mark.parametrize("make", [*REMEMBERING, static])
@@ -88,7 +88,7 @@ def test_a_state_of_other_models_is_refused() -> None:
     with pytest.raises(InputError, match="another model of z_um"):
         start.carry_over(one(lags(size=1.1)), left)
     with pytest.raises(InputError, match="left the state of Z; this one has models of X"):
-        start.carry_over([Station("X", lags())], left)
+        start.carry_over([Station("X", lags(), shadow=True)], left)
     with pytest.raises(InputError, match="pause"):
         start.carry_over(stations, left, -1.0)
     short = JobState((replace(left.stations[0], memory=(1.0,)),), left.zero_known)
@@ -148,9 +148,9 @@ def test_a_measured_autoregressive_model_stood_still_before() -> None:
 
 def test_every_axis_and_station_is_measured_by_its_name() -> None:
     stations = [
-        Station("X", ticking("x_um")),
-        Station("Z", lags("z_at_0_um"), "Z", 0.0),
-        Station("Z", lags("z_at_200_um"), "Z", 200.0),
+        Station("X", ticking("x_um"), shadow=True),
+        Station("Z", lags("z_at_0_um"), "Z", 0.0, shadow=True),
+        Station("Z", lags("z_at_200_um"), "Z", 200.0, shadow=True),
     ]
     texts = ["x=3um", "z_at_0 = 0.004 mm", "z_at_200_um=5 um"]
     found = start.begin_measured(stations, start.deviations(texts), {})
@@ -165,14 +165,17 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
     ]:
         with pytest.raises(InputError, match=says):
             start.begin_measured(stations, wrong, {})
-    three = [*stations, Station("Z", lags("z_at_400_um"), "Z", 400.0)]
+    three = [*stations, Station("Z", lags("z_at_400_um"), "Z", 400.0, shadow=True)]
     with pytest.raises(InputError, match="that of Z at Z 400 mm is missing; give z_at_400=VALUEum"):
         start.begin_measured(three, {"X": 3.0, "z_at_0": 4.0, "z_at_200": 5.0}, {})
 
 
 @pytest.mark.parametrize("other", [lags, ticking])
 def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., ErrorModel]) -> None:
-    stations = [Station("Z", lags("z_at_0_um"), "Z", 0.0), Station("Z", other("z_at_600_um", 0.4), "Z", 600.0)]
+    stations = [
+        Station("Z", lags("z_at_0_um"), "Z", 0.0, shadow=True),
+        Station("Z", other("z_at_600_um", 0.4), "Z", 600.0, shadow=True),
+    ]
     whole = start.begin_measured(stations, {"Z": 7.0}, {})
     low, high = (float(s.deviation) for s in whole.states)
     assert 0.5 * (low + high) == pytest.approx(7.0, abs=1e-6)
@@ -196,14 +199,20 @@ def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., Erro
 
 
 def test_stations_that_are_proportional_stay_so() -> None:
-    stations = [Station("Z", lags("a_um", -1.0), "Z", 0.0), Station("Z", lags("b_um", -3.0), "Z", 600.0)]
+    stations = [
+        Station("Z", lags("a_um", -1.0), "Z", 0.0, shadow=True),
+        Station("Z", lags("b_um", -3.0), "Z", 600.0, shadow=True),
+    ]
     one_of_them, other = start.begin_measured(stations, {"Z": -12.0}, {}).states
     assert float(one_of_them.deviation) == pytest.approx(-6.0, abs=1e-6)
     assert float(other.deviation) == pytest.approx(-18.0, abs=1e-6)
 
 
 def test_a_station_without_memory_or_speed_cannot_be_fixed_by_another() -> None:
-    stations = [Station("Z", lags("a_um"), "Z", 0.0), Station("Z", static("b_um"), "Z", 600.0)]
+    stations = [
+        Station("Z", lags("a_um"), "Z", 0.0, shadow=True),
+        Station("Z", static("b_um"), "Z", 600.0, shadow=True),
+    ]
     with pytest.raises(InputError, match="model of b_um has no memory"):
         start.begin_measured(stations, {"Z": 2.0}, {})
     with pytest.raises(InputError, match="model of b_um has no memory"):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from driftmodels import lags
+from driftmodels import judged, lags
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -11,7 +11,7 @@ from thermocomp.nc.thermal.stations import Station, stations
 
 
 def models(*targets: str) -> list[ErrorModel]:
-    return [lags(t) for t in targets]
+    return [judged(lags(t), 2.0) for t in targets]
 
 
 def places(found: list[Station]) -> dict[str, str]:

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from driftmodels import ACCEPTED
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +36,7 @@ LAGS = LinearDynamic(
     time_constants=(600.0,),
     lagged=(0.01,),
     intercept=1.5,
+    honest_error=ACCEPTED,
 )
 STATIC = Polynomial(
     target="z",
@@ -44,9 +46,16 @@ STATIC = Polynomial(
     terms=((0,), (0, 1)),
     coefficients=(3.0, -2e-4),
     intercept=-0.5,
+    honest_error=ACCEPTED,
 )
 TICKS = Autoregressive(
-    target="z", unit="um", inputs=INPUTS, interval=30.0, a=(0.9,), b=((0.1, 0.05), (2e-4, 1e-4)), intercept=0.0
+    target="z",
+    unit="um",
+    inputs=INPUTS,
+    interval=30.0,
+    a=(0.9,),
+    b=((0.1, 0.05), (2e-4, 1e-4)),
+    honest_error=ACCEPTED,
 )
 FAMILIES = {"lags": LAGS, "static": STATIC, "ticks": TICKS}
 

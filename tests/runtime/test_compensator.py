@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from driftmodels import ACCEPTED
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -34,6 +35,7 @@ def model(target: str = "z", unit: str = "um") -> LinearDynamic:
         lag_signals=(1,),
         time_constants=(600.0,),
         lagged=(0.01,),
+        honest_error=ACCEPTED,
     )
 
 

@@ -58,10 +58,11 @@ def map(
             [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
         )
     from thermocomp.files.mending import mend, take_best
-    from thermocomp.files.tomlfile import read_text
+    from thermocomp.files.plaintext import read_text
+    from thermocomp.files.tomlfile import MOST
     from thermocomp.recording.quality import check
 
-    begun = "" if mapping is None else read_text(mapping, "mapping file")
+    begun = "" if mapping is None else read_text(mapping, "mapping file", MOST)
     mended = mend(recording, begun, take_best if yes or json else _ask)
     left = [f for f in check(mended.recording) if f.severity == "trouble"]
     if output is not None:

@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import NODES, check_count, check_finite
+from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Constant, Lookup, Node, Sum
-from thermocomp.core.inputs import check_finite
 from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Variable
 
@@ -45,11 +45,11 @@ class Curve:
         check_finite(f"{self.kind} curve", x=self.x, y=self.y)
         if len(self.y) != len(self.x) + (self.kind == "step") or not self.y:
             more = ", one y more than x" if self.kind == "step" else ", equally many"
-            raise InputError(f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: want at least one y{more}")
+            raise SettingError(f"{self.kind} curve of {len(self.x)} x and {len(self.y)} y: want at least one y{more}")
         if any(not a < b for a, b in pairwise(self.x)):
-            raise InputError(f"{self.kind} curve: x must rise strictly")
+            raise SettingError(f"{self.kind} curve: x must rise strictly")
         if not np.isfinite(self._pieces[2]).all():
-            raise InputError(f"{self.kind} curve: two x are so close that the slope between them is no number")
+            raise SettingError(f"{self.kind} curve: two x are so close that the slope between them is no number")
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -101,7 +101,7 @@ class Additive(ErrorModel):
         What the sum goes through, such as the inverse of theta; None: nothing.
     """
 
-    family: ClassVar[str] = "additive"
+    family: Literal["additive"] = "additive"
     remembers: ClassVar[bool] = False
 
     variables: tuple[Variable, ...]
@@ -111,12 +111,11 @@ class Additive(ErrorModel):
     def _check(self) -> None:
         owner = f"model of {self.target}"
         if len(self.variables) != len(self.curves):
-            raise InputError(f"{owner}: {len(self.variables)} variables but {len(self.curves)} curves")
+            raise SettingError(f"{owner}: {len(self.variables)} variables but {len(self.curves)} curves")
+        check_count(owner, NODES, variables=self.variables)
         check_finite(owner, intercept=self.intercept)
         for v in self.variables:
-            check_finite(f"{owner}, variable {v.name}", weights=[w for _, w in v.weights])
-            if not v.weights or any(not 0 <= i < len(self.inputs) for i, _ in v.weights):
-                raise InputError(f"{owner}: variable {v.name} refers to an input beyond the {len(self.inputs)} given")
+            v.check_inputs(len(self.inputs))
 
     def _begin(self, change: FloatArray) -> FloatArray:
         return np.empty((*change.shape[:-1], 0))

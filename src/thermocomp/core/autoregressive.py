@@ -21,19 +21,21 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import GAP, ORDER, TICK, check_between, check_count, check_finite
+from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurrence, Sum, sum_weighted
-from thermocomp.core.inputs import check_finite
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.network import Affine, Perceptron
 
 #: share of the interval by which a reading may come early and still make the tick: rounding of clocks, nothing else
 EARLY = 1e-6
+#: what is left of 1 less the sum of the own coefficients, at least: a settled state is the drive by that
+SETTLES = 1e-9
 #: ticks of a net made at once, at most: a day of 15 s; after that the machine is taken to have settled
 MOST_TICKS = 5760
 
@@ -122,8 +124,7 @@ class Ticking(ErrorModel):
         return State(zero, memory, own[..., 0].copy(), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def _check_interval(self) -> None:
-        if not 0 < self.interval < math.inf:
-            raise InputError(f"model of {self.target}: interval {self.interval} s must be positive and finite")
+        check_between(f"model of {self.target}", TICK, GAP, interval=self.interval)
 
     def _begin(self, change: FloatArray) -> FloatArray:
         # [time since the last tick, inputs summed over it, own past, inputs of the last m ticks]
@@ -211,7 +212,7 @@ class Autoregressive(Ticking):
         Per input, b_0 .. b_m [unit per unit of the input].
     """
 
-    family: ClassVar[str] = "autoregressive"
+    family: Literal["autoregressive"] = "autoregressive"
 
     a: tuple[float, ...]
     b: tuple[tuple[float, ...], ...]
@@ -220,17 +221,18 @@ class Autoregressive(Ticking):
         owner = f"model of {self.target}"
         self._check_interval()
         if len(self.b) != len(self.inputs) or not self.b or len({len(b) for b in self.b}) != 1 or not self.b[0]:
-            raise InputError(
+            raise SettingError(
                 f"{owner}: want b_0 .. b_m, equally many, for each of {len(self.inputs)} inputs: at least one"
             )
-        check_finite(owner, a=self.a, intercept=self.intercept)
-        for b in self.b:
-            check_finite(owner, b=b)
+        check_count(owner, ORDER, past_deviations=self.a, past_inputs=self.b[0][1:])
+        check_finite(owner, a=self.a, b=self.b, intercept=self.intercept)
         largest = find_largest_root(self.a)
         if not largest < 1:
-            raise InputError(
+            raise SettingError(
                 f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, want < 1"
             )
+        if not 1.0 - sum(self.a) > SETTLES:
+            raise SettingError(f"{owner}: its free run settles nowhere: its coefficients a add up to 1")
 
     @property
     def orders(self) -> tuple[int, int]:
@@ -287,7 +289,7 @@ class AutoregressiveNet(Ticking):
         From what the net gives to the deviation [unit].
     """
 
-    family: ClassVar[str] = "autoregressive-network"
+    family: Literal["autoregressive-network"] = "autoregressive-network"
 
     k: int
     m: int
@@ -299,17 +301,18 @@ class AutoregressiveNet(Ticking):
         owner = f"model of {self.target}"
         self._check_interval()
         check_finite(owner, intercept=self.intercept)
+        check_between(owner, 0, ORDER, k=self.k, m=self.m)
         wanted = self.k + (self.m + 1) * len(self.inputs)
         n_inputs, _, n_outputs = self.net.shape
-        if self.k < 0 or self.m < 0 or not self.inputs or not n_inputs == wanted == len(self.input_scaling.gain):
-            raise InputError(
+        if not self.inputs or not n_inputs == wanted == len(self.input_scaling.gain):
+            raise SettingError(
                 f"{owner}: k = {self.k}, m = {self.m} and {len(self.inputs)} inputs want a net of {wanted} inputs; "
                 f"found {n_inputs}, and scaling of {len(self.input_scaling.gain)}"
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
-            raise InputError(f"{owner}: want one output, found {n_outputs}")
+            raise SettingError(f"{owner}: want one output, found {n_outputs}")
         if self.net.output == "identity":
-            raise InputError(f"{owner}: an identity output has no bounds: its free run could run away")
+            raise SettingError(f"{owner}: an identity output has no bounds: its free run could run away")
 
     @property
     def orders(self) -> tuple[int, int]:

@@ -1,11 +1,11 @@
 """What a model wants to know, in which range it was trained, and what it does beyond."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
-
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import LEAST, MARGIN, RANGE, check_between, check_finite, check_name
+from thermocomp.core.exceptions import SettingError, explain_unknown
+from thermocomp.core.units import HOUSE_UNITS
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Input:
     name : str
         Channel name.
     quantity, unit : str
-        What it measures, in house units.
+        What it measures, a key of `HOUSE_UNITS`, and its house unit.
     reference : float
         Value that counts as zero [unit].
     rezero : bool
@@ -26,6 +26,11 @@ class Input:
         spindle speed.
     low, high : float
         Trained range of value minus reference [unit].
+
+    Raises
+    ------
+    SettingError
+        No such quantity, another unit, an empty range, no name, or a number beyond `thermocomp.core.bounds.RANGE`.
     """
 
     name: str
@@ -37,10 +42,14 @@ class Input:
     high: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.low) and np.isfinite(self.high)):
-            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] must be finite numbers")
+        check_name("input", self.name)
+        if self.quantity not in HOUSE_UNITS:
+            raise explain_unknown("quantity", self.quantity, HOUSE_UNITS, ("quantity",))
+        if self.unit != (house := HOUSE_UNITS[self.quantity]):
+            raise SettingError(f"input {self.name}: a {self.quantity} is in {house}, found {self.unit!r}", ("unit",))
+        check_finite(f"input {self.name}", RANGE, reference=self.reference, low=self.low, high=self.high)
         if not self.low <= self.high:
-            raise InputError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
+            raise SettingError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
 
 
 @dataclass(frozen=True)
@@ -70,12 +79,5 @@ class Support:
     fade_over: float = 0.5
 
     def __post_init__(self) -> None:
-        if not self.margin >= 0 or not self.fade_over > 0:
-            raise InputError(f"support: margin {self.margin} must be >= 0 and fade_over {self.fade_over} > 0")
-
-
-def check_finite(owner: str, **numbers: Any) -> None:
-    """Raise `InputError` if one of the named number sequences holds a nan or an infinity."""
-    for name, values in numbers.items():
-        if not np.isfinite(np.asarray(values, dtype=np.float64)).all():
-            raise InputError(f"{owner}: {name} must be finite numbers, found {values}")
+        check_between("support", 0.0, MARGIN, margin=self.margin)
+        check_between("support", LEAST, MARGIN, fade_over=self.fade_over)

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.core.inputs import check_finite
+from thermocomp.core.bounds import MEMORY, READING, check_between, check_finite, check_name
+from thermocomp.core.exceptions import SettingError
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,12 @@ class StationState:
     doubt: float
 
     def __post_init__(self) -> None:
-        numbers = (*self.reference, *self.memory, self.deviation, self.zero, self.doubt)
-        check_finite(f"state of {self.station}", numbers=numbers)
+        check_name("station", self.station)
+        check_name("target", self.target)
+        owner = f"state of {self.station}"
+        check_finite(owner, READING, reference=self.reference)
+        check_finite(owner, MEMORY, memory=self.memory, deviation=self.deviation, zero=self.zero)
+        check_between(owner, 0.0, MEMORY, doubt=self.doubt)
 
 
 @dataclass(frozen=True)
@@ -65,4 +69,4 @@ class JobState:
     def __post_init__(self) -> None:
         names = [s.station for s in self.stations]
         if not names or len(set(names)) != len(names):
-            raise InputError(f"state of a job: want each station once, found {', '.join(names) or 'none'}")
+            raise SettingError(f"state of a job: want each station once, found {', '.join(names) or 'none'}")

@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import COEFFICIENT, LEAST, check_between, check_finite
+from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 
@@ -52,18 +53,18 @@ class JointSupport:
     tolerances: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        numbers = [*self.scale, *(v for p in self.points for v in p), self.limit]
-        numbers += [*(v for level in self.levels for v in level), *self.tolerances]
-        if not np.isfinite(numbers).all() or not min([*self.scale, *self.tolerances, self.limit]) > 0:
-            raise InputError("joint support: numbers must be finite, scales, tolerances and the limit positive")
+        points, levels = [v for p in self.points for v in p], [v for level in self.levels for v in level]
+        check_finite("joint support", points=points, levels=levels)
+        positive = {"scale": self.scale, "tolerances": self.tolerances, "limit": self.limit}
+        check_between("joint support", LEAST, COEFFICIENT, **positive)
         if len(self.scale) != len(self.columns) or any(len(p) != len(self.columns) for p in self.points):
-            raise InputError("joint support: a scale and a number in each point for every column is wanted")
+            raise SettingError("joint support: a scale and a number in each point for every column is wanted")
         if not len(self.speeds) == len(self.levels) == len(self.tolerances) or not all(self.levels):
-            raise InputError("joint support: levels and a tolerance for every speed are wanted")
+            raise SettingError("joint support: levels and a tolerance for every speed are wanted")
         if self.columns and not self.points:
-            raise InputError("joint support: no point")
+            raise SettingError("joint support: no point")
         if min([*self.columns, *self.speeds], default=0) < 0:
-            raise InputError("joint support: there is no input before the first")
+            raise SettingError("joint support: there is no input before the first")
 
     @property
     def n_inputs(self) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import COEFFICIENT, check_between, check_finite
 
 FloatArray = NDArray[np.float64]
 
@@ -32,10 +32,8 @@ class Learned:
     largest: float
 
     def __post_init__(self) -> None:
-        if not np.isfinite([self.mean, self.last, self.noise, self.largest]).all():
-            raise InputError(f"what was learned must be finite numbers, found {self}")
-        if self.noise < 0 or self.largest < 0:
-            raise InputError(f"noise {self.noise} and largest deviation {self.largest} must not be negative")
+        check_finite("what was learned", mean=self.mean, last=self.last)
+        check_between("what was learned", 0.0, COEFFICIENT, noise=self.noise, largest=self.largest)
 
 
 def probe_noise(y: FloatArray) -> float:

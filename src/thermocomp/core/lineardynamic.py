@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import ENTRIES, GAP, LEAST, check_between, check_count, check_finite
+from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Lag, Node, sum_weighted
-from thermocomp.core.inputs import check_finite
 from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -40,7 +40,7 @@ class LinearDynamic(ErrorModel):
     --------
     >>> from thermocomp import LinearDynamic
     >>> from thermocomp.core.inputs import Input
-    >>> speed = Input("spindle_rpm", "speed", "1/min", reference=0.0, rezero=False, low=0.0, high=6000.0)
+    >>> speed = Input("spindle_rpm", "spindle_speed", "1/min", reference=0.0, rezero=False, low=0.0, high=6000.0)
     >>> model = LinearDynamic(
     ...     target="z_um",
     ...     unit="um",
@@ -56,7 +56,7 @@ class LinearDynamic(ErrorModel):
     [0.0, 19.0, 25.9, 30.0]
     """
 
-    family: ClassVar[str] = "linear-dynamic"
+    family: Literal["linear-dynamic"] = "linear-dynamic"
     remembers: ClassVar[bool] = True
 
     signals: tuple[Term, ...]
@@ -68,19 +68,17 @@ class LinearDynamic(ErrorModel):
     def _check(self) -> None:
         owner = f"model of {self.target}"
         if len(self.direct) != len(self.signals):
-            raise InputError(f"{owner}: {len(self.signals)} signals but {len(self.direct)} direct coefficients")
+            raise SettingError(f"{owner}: {len(self.signals)} signals but {len(self.direct)} direct coefficients")
         if not len(self.lag_signals) == len(self.time_constants) == len(self.lagged):
-            raise InputError(
+            raise SettingError(
                 f"{owner}: {len(self.lag_signals)} lag signals, {len(self.time_constants)} time constants and "
                 f"{len(self.lagged)} lag coefficients: must be equally many"
             )
         if any(not 0 <= i < len(self.signals) for i in self.lag_signals):
-            raise InputError(f"{owner}: a lag follows a signal beyond the {len(self.signals)} given")
-        if any(not tau > 0 for tau in self.time_constants):
-            raise InputError(f"{owner}: time constants must be positive, found {self.time_constants}")
-        check_finite(
-            owner, direct=self.direct, time_constants=self.time_constants, lagged=self.lagged, intercept=self.intercept
-        )
+            raise SettingError(f"{owner}: a lag follows a signal beyond the {len(self.signals)} given")
+        check_count(owner, ENTRIES, signals=self.signals, lags=self.lagged)
+        check_between(owner, LEAST, GAP, time_constants=self.time_constants)
+        check_finite(owner, direct=self.direct, lagged=self.lagged, intercept=self.intercept)
         self._table  # noqa: B018 - refuses indices that point nowhere
 
     @cached_property

@@ -4,6 +4,7 @@ Estimators freeze into one of the families (`thermocomp.core.polynomial`, `therm
 object is evaluated live, replayed in every assessment and written as JSON. State in, state out: nothing hides in it.
 """
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,8 +15,9 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.core.bounds import GAP, INPUTS, READING, check_count, check_name
 from thermocomp.core.columns import Columns, count_rows, read_clock, read_numbers
-from thermocomp.core.exceptions import InputError, ReadingError
+from thermocomp.core.exceptions import InputError, ReadingError, SettingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input, Support
@@ -26,6 +28,7 @@ from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+_UNIT = re.compile(r"(um|urad)(/m(\^[2-9])?)?")
 
 
 class State(NamedTuple):
@@ -49,7 +52,7 @@ class ErrorModel(ABC):
     target : str
         Displacement channel (or error component) it predicts.
     unit : str
-        Unit of the deviation it gives: um, urad, um/m.
+        Unit of the deviation it gives: um or urad; of a factor along an axis um/m, urad/m^2 and so on.
     inputs : tuple of Input
         What it wants to know, in this order.
     intercept : float
@@ -76,9 +79,9 @@ class ErrorModel(ABC):
     [0.0, 8.0]
     """
 
-    family: ClassVar[str]
     remembers: ClassVar[bool]  #: False: the deviation depends on the last reading alone
 
+    family: str  #: which of the families it is; each has its own word for it
     target: str
     unit: str
     inputs: tuple[Input, ...]
@@ -91,11 +94,15 @@ class ErrorModel(ABC):
     zeroing: Zeroing = FIRST_READING
 
     def __post_init__(self) -> None:
-        names = [i.name for i in self.inputs]
+        check_name("target", self.target)
+        owner, names = f"model of {self.target}", [i.name for i in self.inputs]
+        if not _UNIT.fullmatch(self.unit):
+            raise SettingError(f"{owner}: unit {self.unit!r}: want um, urad or, along an axis, um/m", ("unit",))
+        check_count(owner, INPUTS, inputs=self.inputs)
         if len(set(names)) != len(names):
-            raise InputError(f"model of {self.target}: an input is named twice in {names}")
+            raise SettingError(f"{owner}: an input is named twice in {names}")
         if self.joint is not None and self.joint.n_inputs > len(names):
-            raise InputError(f"model of {self.target}: its joint support is of more inputs than its {len(names)}")
+            raise SettingError(f"{owner}: its joint support is of more inputs than its {len(names)}")
         self._check()
 
     # -- what a family fills in --------------------------------------------------------------------------------------
@@ -173,6 +180,7 @@ class ErrorModel(ABC):
         """
         if not np.isfinite(inputs).all() or not 0.0 <= dt < np.inf:
             raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
+        inputs, dt = np.minimum(np.maximum(inputs, -READING), READING), min(dt, GAP)
         reference = state.reference
         memory = state.memory
         if memory is None:
@@ -339,12 +347,25 @@ class ErrorModel(ABC):
         return replace(self, honest_error=replace(found, taken=f"{name.strip()}, {reason.strip()}"))
 
     def check_may_run(self) -> None:
-        """Raise `InputError` if the do-no-harm gate did not let this model pass, and nobody takes it all the same."""
+        """Refuse to run what the do-no-harm gate did not let pass, unless somebody takes what is unproven.
+
+        Raises
+        ------
+        InputError
+            It was never judged, or by other rules than today's; it was refused, or is unproven and not taken.
+        """
         found = self.honest_error
-        if found is None or found.word == "accepted":
+        if found is None:
+            raise InputError(
+                f"model of {self.target} was never judged on cycles it has not seen and will not run: "
+                "'thermocomp fit' judges what it fits; what was fitted otherwise can be compared and assessed"
+            )
+        if found.word == "accepted":
             return
         if found.word == "refused":
             raise InputError(f"model of {self.target} was refused and will not run: {found.reason}")
+        if not found.current:
+            raise InputError(f"model of {self.target} is unproven and runs in shadow only: {found.why}; fit it anew")
         if not found.taken:
             raise InputError(
                 f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "

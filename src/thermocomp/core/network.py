@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import ENTRIES, NODES, check_count, check_finite
+from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Constant, Named, Node, Sigmoid, Sum, scale_node, sum_weighted
-from thermocomp.core.inputs import check_finite
 from thermocomp.core.model import ErrorModel, FloatArray
 
 Activation = Literal["sigmoid", "tanh", "identity"]
@@ -52,7 +52,7 @@ class Affine:
 
     def __post_init__(self) -> None:
         if len(self.gain) != len(self.offset):
-            raise InputError(f"scaling: {len(self.gain)} gains but {len(self.offset)} offsets")
+            raise SettingError(f"scaling: {len(self.gain)} gains but {len(self.offset)} offsets")
         check_finite("scaling", gain=self.gain, offset=self.offset)
 
     @cached_property
@@ -93,20 +93,27 @@ class Perceptron:
     def __post_init__(self) -> None:
         n_inputs, n_hidden, n_outputs = self.shape
         if n_hidden == 0 or n_outputs == 0 or n_hidden != len(self.hidden_weights):
-            raise InputError(
+            raise SettingError(
                 f"net: weights of {len(self.hidden_weights)} hidden nodes and {len(self.output_weights)} outputs, but "
                 f"thresholds of {n_hidden} and {n_outputs}; both layers need at least one node"
             )
         if any(len(w) != n_inputs for w in self.hidden_weights):
-            raise InputError(f"net: every hidden node wants {n_inputs} weights, one per input")
+            raise SettingError(f"net: every hidden node wants {n_inputs} weights, one per input")
         if len(self.output_weights) != n_outputs or any(len(w) != n_hidden for w in self.output_weights):
-            raise InputError(f"net: every one of {n_outputs} outputs wants {n_hidden} weights, one per hidden node")
+            raise SettingError(f"net: every one of {n_outputs} outputs wants {n_hidden} weights, one per hidden node")
         for layer in (self.hidden, self.output):
             if layer not in _FUNCTIONS:
-                raise InputError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
-        for w in (*self.hidden_weights, *self.output_weights):
-            check_finite("net", weights=w)
-        check_finite("net", thresholds=(*self.hidden_thresholds, *self.output_thresholds))
+                raise SettingError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
+        check_count("net", NODES, hidden_nodes=self.hidden_thresholds, outputs=self.output_thresholds)
+        if self.n_parameters > ENTRIES:
+            raise SettingError(f"net: {self.n_parameters:,} weights and thresholds, at most {ENTRIES:,}")
+        check_finite(
+            "net",
+            hidden_weights=self.hidden_weights,
+            hidden_thresholds=self.hidden_thresholds,
+            output_weights=self.output_weights,
+            output_thresholds=self.output_thresholds,
+        )
 
     @classmethod
     def of(
@@ -217,7 +224,7 @@ class Network(ErrorModel):
         From what the net gives to the deviation [unit].
     """
 
-    family: ClassVar[str] = "network"
+    family: Literal["network"] = "network"
     remembers: ClassVar[bool] = False
 
     net: Perceptron
@@ -228,12 +235,12 @@ class Network(ErrorModel):
         owner = f"model of {self.target}"
         n_inputs, _, n_outputs = self.net.shape
         if n_inputs != len(self.inputs) or n_inputs != len(self.input_scaling.gain):
-            raise InputError(
+            raise SettingError(
                 f"{owner}: {len(self.inputs)} inputs, scaling of {len(self.input_scaling.gain)} and a net that takes "
                 f"{n_inputs}: must be equally many"
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
-            raise InputError(
+            raise SettingError(
                 f"{owner}: a net of {n_outputs} outputs with scaling of {len(self.output_scaling.gain)}: want 1; make "
                 "one model of each output"
             )

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import ENTRIES, NODES, check_count, check_finite
+from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Node, sum_weighted
-from thermocomp.core.inputs import check_finite
 from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.terms import Term, TermTable, Variable
 
@@ -47,7 +47,7 @@ class Polynomial(ErrorModel):
     [0.0, 12.5, 30.0]
     """
 
-    family: ClassVar[str] = "polynomial"
+    family: Literal["polynomial"] = "polynomial"
     remembers: ClassVar[bool] = False
 
     variables: tuple[Variable, ...]
@@ -57,7 +57,9 @@ class Polynomial(ErrorModel):
     def _check(self) -> None:
         owner = f"model of {self.target}"
         if len(self.terms) != len(self.coefficients):
-            raise InputError(f"{owner}: {len(self.terms)} terms but {len(self.coefficients)} coefficients")
+            raise SettingError(f"{owner}: {len(self.terms)} terms but {len(self.coefficients)} coefficients")
+        check_count(owner, NODES, variables=self.variables)
+        check_count(owner, ENTRIES, terms=self.terms)
         check_finite(owner, coefficients=self.coefficients, intercept=self.intercept)
         self._table  # noqa: B018 - refuses indices that point nowhere
 

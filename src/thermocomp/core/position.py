@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.core.inputs import check_finite
+from thermocomp.core.bounds import DEGREE, POSITION, check_count, check_finite, check_name
+from thermocomp.core.exceptions import SettingError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.profile import Coordinates, Numbers, Profile, clamp, coordinates
 from thermocomp.core.provenance import Provenance
@@ -55,18 +55,20 @@ class PositionModel:
     provenance: Provenance | None = None
 
     def __post_init__(self) -> None:
+        check_name("target", self.target)
         owner = f"model of {self.target}"
         if self.unit not in ("um", "urad"):
-            raise InputError(f"{owner}: unit {self.unit!r}: expected um or urad")
+            raise SettingError(f"{owner}: unit {self.unit!r}: expected um or urad")
         if self.axis not in ("X", "Y", "Z"):
-            raise InputError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
+            raise SettingError(f"{owner}: axis {self.axis!r}: expected X, Y or Z")
+        check_finite(owner, POSITION, travel=self.travel, reference_position=self.reference_position)
         if not self.travel[0] < self.travel[1]:
-            raise InputError(f"{owner}: travel {self.travel} mm must rise")
-        check_finite(owner, travel=self.travel, reference_position=self.reference_position)
+            raise SettingError(f"{owner}: travel {self.travel} mm must rise")
+        check_count(owner, DEGREE, slopes=self.slopes)
         for power, model in self._by_power:
             wanted = slope_unit(self.unit, power)
             if model.unit != wanted:
-                raise InputError(f"{owner}: k_{power} is in {model.unit}, must be in {wanted}")
+                raise SettingError(f"{owner}: k_{power} is in {model.unit}, must be in {wanted}")
 
     @cached_property
     def _by_power(self) -> tuple[tuple[int, ErrorModel], ...]:

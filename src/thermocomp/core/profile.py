@@ -4,13 +4,22 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.core.inputs import check_finite
+from thermocomp.core.bounds import (
+    EXPONENT,
+    LEAST,
+    NODES,
+    POSITION,
+    POWER_OF_TEN,
+    check_between,
+    check_count,
+    check_finite,
+)
+from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -34,7 +43,7 @@ class PolynomialProfile:
         Where it was measured, x, y, z [mm]; beyond, the value at the border holds.
     """
 
-    kind: ClassVar[str] = "polynomial"
+    kind: Literal["polynomial"] = "polynomial"
 
     exponents: tuple[tuple[int, int, int], ...]
     coefficients: tuple[float, ...]
@@ -45,13 +54,17 @@ class PolynomialProfile:
 
     def __post_init__(self) -> None:
         if len(self.exponents) != len(self.coefficients):
-            raise InputError(f"profile: {len(self.exponents)} terms but {len(self.coefficients)} coefficients")
-        if any(len(term) != 3 or min(term) < 0 for term in self.exponents):
-            raise InputError("profile: a term wants three exponents, none of them negative")
-        if not all(s > 0 for s in self.scale):
-            raise InputError(f"profile: scale {self.scale} must be positive")
+            raise SettingError(f"profile: {len(self.exponents)} terms but {len(self.coefficients)} coefficients")
+        if any(len(term) != 3 or not 0 <= min(term) <= max(term) <= EXPONENT for term in self.exponents):
+            raise SettingError(f"profile: a term wants three exponents from 0 to {EXPONENT}")
+        check_count("profile", NODES, terms=self.exponents)
+        check_between("profile", LEAST, POSITION, scale=self.scale)
+        check_finite("profile", coefficients=self.coefficients)
+        check_finite("profile", POSITION, centre=self.centre, low=self.low, high=self.high)
         _check_range(self.low, self.high)
-        check_finite("profile", coefficients=self.coefficients, centre=self.centre, scale=self.scale)
+        corner = np.abs([self.low, self.high] - np.array(self.centre)).max(axis=0) / self.scale
+        if any(np.dot(term, np.log10(np.maximum(corner, 1.0))) > POWER_OF_TEN for term in self.exponents):
+            raise SettingError("profile: a term is beyond all numbers at the border: check centre and scale")
 
     @cached_property
     def _axes(self) -> tuple[int, ...]:
@@ -125,7 +138,7 @@ class SplineProfile:
         One per piece: coefficients of ((p - its first knot) / its length)^0..3 [unit of the error].
     """
 
-    kind: ClassVar[str] = "spline"
+    kind: Literal["spline"] = "spline"
 
     axis: str
     knots: tuple[float, ...]
@@ -133,12 +146,13 @@ class SplineProfile:
 
     def __post_init__(self) -> None:
         if self.axis not in ("X", "Y", "Z"):
-            raise InputError(f"profile: axis {self.axis!r}: expected X, Y or Z")
+            raise SettingError(f"profile: axis {self.axis!r}: expected X, Y or Z")
         if len(self.knots) != len(self.pieces) + 1 or len(self.pieces) < 1:
-            raise InputError(f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces")
+            raise SettingError(f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces")
         if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
-            raise InputError("profile: knots must rise")
-        check_finite("profile", knots=self.knots, pieces=self.pieces)
+            raise SettingError("profile: knots must rise")
+        check_finite("profile", POSITION, knots=self.knots)
+        check_finite("profile", pieces=self.pieces)
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return from where to where it is known [mm], under its axis."""
@@ -199,4 +213,4 @@ def _cubic(c: Sequence[float] | FloatArray, u: Numbers) -> Numbers:
 
 def _check_range(low: Vector, high: Vector) -> None:
     if not all(a <= b for a, b in zip(low, high, strict=True)):
-        raise InputError(f"profile: range from {low} to {high} mm is empty")
+        raise SettingError(f"profile: range from {low} to {high} mm is empty")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from thermocomp.core.bounds import COEFFICIENT, check_between
 from thermocomp.core.fingerprints import Prints
 from thermocomp.core.learned import Learned
 
@@ -46,6 +47,9 @@ class Provenance:
     prints: Prints | None = field(default=None, repr=False)
     starts: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        check_between("provenance", 0, COEFFICIENT, rows=self.rows)
+
 
 #: version of the rules that a verdict is given by; files that do not say were judged by older ones
 RULES = 1
@@ -79,6 +83,11 @@ class HonestError:
         Who takes an unproven model all the same, and why; empty without that.
     harm_margin : float or None
         Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
+
+    Raises
+    ------
+    SettingError
+        An error, a count or the margin is negative or not finite.
     """
 
     protocol: str
@@ -96,13 +105,39 @@ class HonestError:
     taken: str = ""
     harm_margin: float | None = None
 
+    def __post_init__(self) -> None:
+        check_between(
+            "honest error",
+            0,
+            COEFFICIENT,
+            mae=self.mae,
+            rms=self.rms,
+            max_abs=self.max_abs,
+            none_mae=self.none_mae,
+            none_rms=self.none_rms,
+            cycles=list(self.cycles.values()),
+            units=self.units,
+            tried=self.tried,
+            rules=self.rules,
+            harm_margin=self.harm_margin or 0.0,
+        )
+
+    @property
+    def current(self) -> bool:
+        """True if it was judged by the rules of today."""
+        return self.rules == RULES
+
     @property
     def word(self) -> Literal["accepted", "unproven", "refused"]:
-        """The verdict as it counts today: accepted by older rules is unproven."""
-        return "unproven" if self.verdict == "accepted" and self.rules < RULES else self.verdict
+        """The verdict as it counts today: accepted by other rules is unproven."""
+        return self.verdict if self.current or self.verdict != "accepted" else "unproven"
 
     @property
     def why(self) -> str:
         """The reason as it counts today."""
-        why = f"judged by older rules: {self.reason}" if self.word != self.verdict else self.reason
+        why = (
+            self.reason
+            if self.current
+            else f"judged by {'older' if self.rules < RULES else 'newer'} rules: {self.reason}"
+        )
         return f"{why}. Taken by {self.taken}" if self.taken else why

@@ -12,7 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import DEGREE, INPUTS, NAME, check_count, check_finite, check_name
+from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.expression import Difference, Named, Node, Power, Product, Sum, scale_node
 
 FloatArray = NDArray[np.float64]
@@ -29,10 +30,23 @@ class Variable:
         Such as ``T6-T7``.
     weights : tuple of (int, float)
         Index of an input and its factor.
+
+    Raises
+    ------
+    SettingError
+        What is no name, no input, or a factor that is no finite number.
     """
 
     name: str
     weights: tuple[tuple[int, float], ...]
+
+    def __post_init__(self) -> None:
+        if self.name:
+            check_name("variable", self.name, INPUTS * NAME)  # of a projection, the names of all inputs
+        check_count(f"variable {self.name}", INPUTS, weights=self.weights)
+        check_finite(f"variable {self.name}", weights=[w for _, w in self.weights])
+        if not self.weights:
+            raise SettingError(f"variable {self.name}: is of no input")
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":
@@ -46,6 +60,11 @@ class Variable:
             if name not in names:
                 raise InputError(f"difference {plus}-{minus}: no input is named {name!r}; there are {', '.join(names)}")
         return cls(f"{plus}-{minus}", ((names.index(plus), 1.0), (names.index(minus), -1.0)))
+
+    def check_inputs(self, count: int) -> None:
+        """Raise `SettingError` if it is of another input than the `count` that there are."""
+        if any(not 0 <= i < count for i, _ in self.weights):
+            raise SettingError(f"variable {self.name}: refers to an input beyond the {count} given")
 
     def expression(self, change: Sequence[Node]) -> Node:
         """Return it as a part of an expression."""
@@ -78,11 +97,11 @@ class TermTable:
 
     def __post_init__(self) -> None:
         for v in self.variables:
-            if any(not 0 <= i < self.n_inputs for i, _ in v.weights):
-                raise InputError(f"variable {v.name}: refers to an input beyond the {self.n_inputs} given")
+            v.check_inputs(self.n_inputs)
         for t in self.terms:
+            check_count("term", DEGREE, factors=t)
             if not t or any(not 0 <= i < len(self.variables) for i in t):
-                raise InputError(f"term {t}: refers to a variable beyond the {len(self.variables)} given")
+                raise SettingError(f"term {t}: refers to a variable beyond the {len(self.variables)} given")
 
     @cached_property
     def _mixing(self) -> FloatArray | None:

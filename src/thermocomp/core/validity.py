@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import COEFFICIENT, check_between, check_finite, check_name
+from thermocomp.core.exceptions import SettingError
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Validity:
     Raises
     ------
     InputError
-        Fewer units than independent ones.
+        Fewer units than independent ones, or numbers that count or measure nothing.
     """
 
     units: int
@@ -49,4 +50,8 @@ class Validity:
 
     def __post_init__(self) -> None:
         if not 0 <= self.independent <= self.units:
-            raise InputError(f"validity: {self.independent} independent of {self.units} units")
+            raise SettingError(f"validity: {self.independent} independent of {self.units} units")
+        check_between("validity", 0, COEFFICIENT, nearest=self.nearest or 0.0, days=self.days, hours=self.hours)
+        check_finite("validity", speeds=self.speeds, ambient=self.ambient or (), start=self.start or ())
+        if self.ambient_channel:
+            check_name("validity", self.ambient_channel)

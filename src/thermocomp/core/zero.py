@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.bounds import GAP, check_between, check_name
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -42,7 +42,7 @@ class Zeroing:
     Raises
     ------
     InputError
-        A time is negative or not finite.
+        A time is negative or not finite, or the channel has no name.
     """
 
     at_rest: float = 300.0
@@ -50,8 +50,9 @@ class Zeroing:
     speed: str = ""
 
     def __post_init__(self) -> None:
-        if not (0 <= self.at_rest < np.inf and 0 <= self.otherwise < np.inf):
-            raise InputError(f"zero over {self.at_rest} s at rest, {self.otherwise} s otherwise: must be times in s")
+        check_between("zero", 0.0, GAP, at_rest=self.at_rest, otherwise=self.otherwise)
+        if self.speed:
+            check_name("zero", self.speed)
 
     def stands(self, speed: object) -> bool:
         """Return whether a reading of `speed` says that the spindle stands; anything but a number does not."""

@@ -2,9 +2,11 @@
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
-from pydantic import AwareDatetime, ConfigDict, TypeAdapter, ValidationError, with_config
+from pydantic import AwareDatetime
+from pydantic_core import SchemaValidator
 
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.jobstate import JobState
@@ -13,7 +15,6 @@ from thermocomp.files import jsonfile
 KIND = jsonfile.Format("thermocomp-job-state", 1, "state file of a job", "thermocomp revise")
 
 
-@with_config(ConfigDict(extra="forbid", allow_inf_nan=False))
 @dataclass(frozen=True)
 class SavedJob:
     """A state and when it was.
@@ -29,7 +30,9 @@ class SavedJob:
     state: JobState
 
 
-_ADAPTER = TypeAdapter(SavedJob)
+@cache
+def _reader() -> SchemaValidator:
+    return jsonfile.reader_of(SavedJob)
 
 
 def dumps(state: JobState, written: datetime) -> str:
@@ -58,15 +61,12 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     Raises
     ------
     ModelFileError
-        Not JSON, not a state file, of another version, altered or incomplete.
+        Not JSON, not a state file, of a newer version, altered or incomplete.
     """
-    body = jsonfile.unpack(KIND, text, source)
-    try:
-        saved = _ADAPTER.validate_python(body[0])
-    except ValidationError as e:
-        raise jsonfile.explain_damage(e, source) from e
-    except InputError as e:
-        raise ModelFileError(f"{source}: {e}") from e
+    jobs: list[SavedJob] = jsonfile.unpack(KIND, _reader(), text, source)
+    if len(jobs) > 1:
+        raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: want one")
+    saved = jobs[0]
     return SavedJob(saved.written.astimezone(UTC), saved.state)
 
 

@@ -2,14 +2,28 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from pydantic import ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+from pydantic_core import ErrorDetails, SchemaValidator
 
 from thermocomp.core.draft import write_text
-from thermocomp.core.exceptions import ModelFileError
+from thermocomp.core.exceptions import ModelFileError, SettingError
+from thermocomp.core.shown import replace_unprintable
+from thermocomp.files.plaintext import read_text
+
+#: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
+MOST = 64_000_000
+#: the same of what stands in it: memory is bounded, whatever is made of the bytes
+_COUNTS = {",": 5_000_000, "[": 500_000, "{": 100_000, '"': 1_000_000}
+#: digits of an integer
+_DIGITS = 18
+#: errors that are listed
+_LISTED = 20
+#: characters of a text from a file that an error repeats
+_REPEATED = 60
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,7 @@ class Format:
 
 MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit")
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
+_STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
@@ -50,13 +65,15 @@ def pack(kind: Format, body: list[Any]) -> str:
     return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def unpack(kind: Format, text: str, source: str) -> list[Any]:
-    """Return the models in the text of a file, not yet understood.
+def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> list[Any]:
+    """Return the models in the text of a file.
 
     Parameters
     ----------
     kind : Format
         What it must be.
+    reader : SchemaValidator
+        What they must be; see `reader_of`.
     text : str
     source : str
         What to call it in an error.
@@ -64,39 +81,51 @@ def unpack(kind: Format, text: str, source: str) -> list[Any]:
     Raises
     ------
     ModelFileError
-        Not JSON, of another kind or version, altered or incomplete.
+        Not JSON, of another kind or version, altered or incomplete, or not what they must be.
     """
-    no = f"{source}: not a {kind.words}"
-    try:
-        content = json.loads(text)
-    except RecursionError as e:
-        raise ModelFileError(f"{no}: nested too deeply") from e
-    except json.JSONDecodeError as e:
-        where = f"line {e.lineno}, column {e.colno}"
-        if e.pos >= len(text.rstrip()) - 1 or "Unterminated" in e.msg:
-            raise ModelFileError(f"{source}: the file ends in the middle ({where}); copy it again, completely") from e
-        raise ModelFileError(f"{no}: {e.msg} at {where}") from e
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != kind.name:
-        other = _KNOWN.get(found) if isinstance(found, str) else None
-        if other is not None:
-            raise ModelFileError(
-                f"{no} but a {other.words}, as '{other.command}' writes it; a {kind.words} comes from '{kind.command}'"
-            )
-        raise ModelFileError(f'{no}: it has no "format": "{kind.name}"')
-    if content.get("version") != kind.version:
-        raise ModelFileError(
-            f"{source}: {kind.words} version {content.get('version')!r}; this thermocomp reads version {kind.version}"
-        )
+    content = _parse(text, f"{source}: not a {kind.words}", source)
+    _check_kind(kind, content, source)
     body = content.get("models")
     if not isinstance(body, list) or not body:
         raise ModelFileError(f"{source}: holds no model")
-    if content.get("sha256") != digest(body):
+    try:
+        canonical = _canonical(body)
+    except (ValueError, RecursionError) as e:  # 1e999, half a character, a hundred brackets
+        raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
+    if content.get("sha256") != hashlib.sha256(canonical).hexdigest():
         raise ModelFileError(
             f"{source}: its numbers do not match its checksum: the file was altered or damaged; write it anew with "
             f"'{kind.command}'"
         )
-    return body
+    try:
+        found: list[Any] = reader.validate_json(text).models  # the text: keys in the order of the file
+    except ValidationError as e:
+        raise _explain(e, content, source) from e
+    return found
+
+
+def reader_of(entry: Any) -> SchemaValidator:
+    """Return what reads the models of a file, each of the type `entry`.
+
+    Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
+    the first wrong one is enough: the errors of a million would take a gigabyte.
+    """
+    whole = make_dataclass("whole", [("format", str), ("version", int), ("sha256", str), ("models", list[entry])])
+    schema = TypeAdapter(with_config(_STRICT)(whole)).core_schema
+    _stop_at_first(schema)
+    return SchemaValidator(schema)
+
+
+def _stop_at_first(schema: Any) -> None:
+    if isinstance(schema, dict):
+        items = [i.get("type") for i in schema.get("items_schema", ())] if schema.get("type") == "tuple" else ()
+        if items and all(i in ("float", "int", "str", "tuple") for i in items):
+            schema["fail_fast"] = True
+        for inner in schema.values():
+            _stop_at_first(inner)
+    elif isinstance(schema, list):
+        for inner in schema:
+            _stop_at_first(inner)
 
 
 def write(text: str, path: str | Path, *, overwrite: bool) -> None:
@@ -116,25 +145,123 @@ def read(kind: Format, path: str | Path) -> tuple[str, str]:
     Raises
     ------
     ModelFileError
-        There is no such file, or it is no text.
+        There is no such file, it is none, too large, or no text.
     """
-    source = Path(path)
-    try:
-        return source.read_text(encoding="utf-8"), str(source)
-    except FileNotFoundError as e:
-        raise ModelFileError(f"{source}: no such file") from e
-    except (OSError, UnicodeDecodeError) as e:
-        raise ModelFileError(f"{source}: cannot be read as a {kind.words}: {e}") from e
+    return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
 
 def digest(body: list[Any]) -> str:
     """Return the SHA-256 of models as they stand in a file."""
-    canonical = json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    return hashlib.sha256(canonical.encode()).hexdigest()
+    return hashlib.sha256(_canonical(body)).hexdigest()
 
 
-def explain_damage(failure: ValidationError, where: str) -> ModelFileError:
-    """Return the error that tells the place of pydantic's first one."""
-    first = failure.errors()[0]
-    place = ".".join(str(p) for p in first["loc"])
-    return ModelFileError(f"{where}: {place}: {first['msg']}")
+def _canonical(body: list[Any]) -> bytes:
+    return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()
+
+
+# -- JSON --------------------------------------------------------------------------------------------------------------
+
+
+def _parse(text: str, no: str, source: str) -> Any:
+    for sign, most in _COUNTS.items():
+        if text.count(sign) > most:
+            raise ModelFileError(f"{no}: {sign} stands in it more than {most:,} times")
+    try:
+        return json.loads(text, object_pairs_hook=_table, parse_constant=_refuse, parse_int=_whole)
+    except RecursionError as e:
+        raise ModelFileError(f"{no}: nested too deeply") from e
+    except json.JSONDecodeError as e:
+        where = f"line {e.lineno}, column {e.colno}"
+        if e.pos >= len(text.rstrip()) - 1 or "Unterminated" in e.msg:
+            raise ModelFileError(f"{source}: the file ends in the middle ({where}); copy it again, completely") from e
+        raise ModelFileError(f"{no}: {e.msg} at {where}") from e
+    except ValueError as e:
+        raise ModelFileError(f"{no}: {e}") from e
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        keys = [k for k, _ in pairs]
+        twice = next(k for k in found if keys.count(k) > 1)
+        raise ValueError(f"the key {_short(twice)} stands twice in one table")
+    return found
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no number")
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _DIGITS:
+        raise ValueError(f"{digits[:_DIGITS]}...: an integer of {len(digits):,} digits")
+    return int(digits)
+
+
+def _check_kind(kind: Format, content: Any, source: str) -> None:
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != kind.name:
+        no, other = f"{source}: not a {kind.words}", _KNOWN.get(found) if isinstance(found, str) else None
+        if other is not None:
+            raise ModelFileError(
+                f"{no} but a {other.words}, as '{other.command}' writes it; a {kind.words} comes from '{kind.command}'"
+            )
+        raise ModelFileError(f'{no}: it has no "format": "{kind.name}"')
+    version = content.get("version")
+    if type(version) is not int or version < 1:
+        raise ModelFileError(f"{source}: {kind.words} without a version; write it anew with '{kind.command}'")
+    if version > kind.version:
+        raise ModelFileError(
+            f"{source}: written by a newer thermocomp, version {version} of a {kind.words}; this one reads version "
+            f"{kind.version}: update"
+        )
+
+
+# -- what is wrong with the models -------------------------------------------------------------------------------------
+
+
+def _explain(failure: ValidationError, content: Any, source: str) -> ModelFileError:
+    """Return the error that tells all places, up to `_LISTED`."""
+    told = list(dict.fromkeys(_tell(e, content) for e in failure.errors(include_url=False)))
+    if len(told) == 1:
+        return ModelFileError(f"{source}: {told[0]}")
+    more = [f"and {len(told) - _LISTED:,} more"] if len(told) > _LISTED else []
+    return ModelFileError("\n  ".join([f"{source}: {len(told):,} errors", *told[:_LISTED], *more]))
+
+
+def _tell(error: ErrorDetails, content: Any) -> str:
+    message, found, context = error["msg"], error["input"], error.get("ctx", {})
+    keys: list[str | int] = []
+    for key in error["loc"]:  # the rest are members of a union, which do not stand in the file
+        try:
+            content = content[key]
+        except (KeyError, IndexError, TypeError):
+            continue
+        keys.append(key)
+    match error["type"]:
+        case "value_error":
+            cause = context["error"]
+            message = str(cause)
+            keys += cause.path if isinstance(cause, SettingError) else ()
+        case "union_tag_invalid":
+            kind, known = (context[k].replace("'", "") for k in ("discriminator", "expected_tags"))
+            message = f"unknown {kind} {_short(context['tag'])}; known are {known}"
+        case "union_tag_not_found":
+            message = f"has no {context['discriminator']}"
+        case "unexpected_keyword_argument" | "extra_forbidden":
+            message = "unknown key"
+        case "missing":
+            keys.append(error["loc"][-1])
+            message = "is missing"
+        case _ if isinstance(found, str | int | float):
+            message += f", found {_short(found)}"
+    place = [f"model {keys[1] + 1}"] if keys[:1] == ["models"] and isinstance(keys[1], int) else []
+    inner = keys[2:] if place else keys
+    place += [".".join(str(k) if isinstance(k, int) or k.isidentifier() else _short(k) for k in inner)] if inner else []
+    return ": ".join([*place, message])
+
+
+def _short(text: object) -> str:
+    """Return a text or number from a file, quoted, fit to stand in an error."""
+    shown = ascii(text) if isinstance(text, str) and not text.isprintable() else repr(text)
+    return replace_unprintable(shown if len(shown) <= _REPEATED else f"{shown[:_REPEATED]}...")

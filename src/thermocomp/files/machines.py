@@ -235,7 +235,8 @@ class _Sources:
             raise SettingError(f"{path} holds a model of {model.target}, not of {component.code}", here)
         for part in model.models if isinstance(model, PositionModel) else (model,):
             try:
-                part.check_may_run()
+                if part.honest_error is not None:  # what was never judged is shown as such, and runs nowhere
+                    part.check_may_run()
             except InputError as e:
                 raise SettingError(f"{path}: {e}; fit a better one, or leave {component.code} out", here) from e
         return model

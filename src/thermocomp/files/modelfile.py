@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
+from pydantic import Discriminator
+from pydantic_core import SchemaValidator
 
 from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
-from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.exceptions import ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Network
@@ -20,15 +21,15 @@ from thermocomp.files import jsonfile
 #: as it stands in the file
 FORMAT = jsonfile.MODELS.name
 #: every family that a file may hold
-FAMILIES: dict[str, type[ErrorModel]] = {
-    f.family: f for f in (Polynomial, LinearDynamic, Network, Additive, Autoregressive, AutoregressiveNet)
-}
+Family = Polynomial | LinearDynamic | Network | Additive | Autoregressive | AutoregressiveNet
+#: as it stands in a file, by its ``family``
+Entry = Annotated[Family, Discriminator("family")]
+FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}
 
 
 @cache
-def _adapter(family: type[ErrorModel]) -> TypeAdapter[ErrorModel]:
-    # Strict numbers: "1.0" in quotes or a missing field is damage, not something to guess at.
-    return TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(family))
+def _reader() -> SchemaValidator:
+    return jsonfile.reader_of(Entry)
 
 
 def dumps(models: Sequence[ErrorModel]) -> str:
@@ -41,6 +42,7 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     ModelFileError
         A model is of a family that no file holds: not plain numbers, such as a Gaussian process.
     """
+    _check_judged(models, "model file")
     return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models])
 
 
@@ -60,10 +62,11 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     Raises
     ------
     ModelFileError
-        Not JSON, not a model file, of another version, altered or incomplete.
+        Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all places.
     """
-    body = jsonfile.unpack(jsonfile.MODELS, text, source)
-    return tuple(model_of(entry, f"{source}: model {k}") for k, entry in enumerate(body, start=1))
+    models: list[ErrorModel] = jsonfile.unpack(jsonfile.MODELS, _reader(), text, source)
+    _check_judged(models, source)
+    return tuple(models)
 
 
 def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = False) -> None:
@@ -101,26 +104,15 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
             f"model of {model.target}: the family {model.family!r} cannot be written, it is not plain numbers; "
             f"a file may hold {', '.join(FAMILIES)}"
         )
-    return {"family": model.family, **asdict(model)}
+    return asdict(model)
 
 
-def model_of(entry: Any, where: str) -> ErrorModel:
-    """Return the model that stands in a file.
-
-    Raises
-    ------
-    ModelFileError
-        It is none; the message begins with `where`.
-    """
-    if not isinstance(entry, dict) or not isinstance(entry.get("family"), str):
-        raise ModelFileError(f'{where}: has no "family"')
-    family = FAMILIES.get(entry["family"])
-    if family is None:
-        raise ModelFileError(f"{where}: unknown family {entry['family']!r}; known are {', '.join(FAMILIES)}")
-    fields = {k: v for k, v in entry.items() if k != "family"}
-    try:
-        return _adapter(family).validate_python(fields)
-    except ValidationError as e:
-        raise jsonfile.explain_damage(e, where) from e
-    except InputError as e:
-        raise ModelFileError(f"{where}: {e}") from e
+def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
+    """Refuse a verdict that its own figures contradict; that of a position model is on more than one of its factors."""
+    for k, model in enumerate(models, start=1):
+        found = model.honest_error
+        if found is not None and found.verdict == "accepted" and found.rms > found.none_rms:
+            raise ModelFileError(
+                f"{source}: model {k}: honest_error: accepted with an RMS of {found.rms:g} {model.unit}, above the "
+                f"{found.none_rms:g} {model.unit} without compensation: it was altered"
+            )

@@ -80,7 +80,7 @@ class EstimatorModel(ErrorModel):
         Predictions that were made before, by the bytes of the inputs minus their reference.
     """
 
-    family: ClassVar[str] = "estimator"
+    family: str = "estimator"
     remembers: ClassVar[bool] = False
 
     estimator: UnfrozenRegressor = field(compare=False)

@@ -59,7 +59,8 @@ class VolumetricModel:
                 self._constants[INDEX[code]] = source
         self._of_time = [k for k, _ in uniform], [m for _, m in uniform]
         for model in models:
-            model.check_may_run()
+            if model.honest_error is not None:  # what was never judged runs in no compensator; here nothing runs
+                model.check_may_run()
         self.stack = Stack(models)
 
     @property

@@ -1,6 +1,5 @@
 """What has come of a revision: its warnings, and all its numbers."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,9 +46,6 @@ def warnings(job: Job, done: Done) -> list[str]:
         found.append(f"{revision.idle} lines behind the end of the program are as they were: nobody runs them")
     if done.written and revision.method.leaves_mark:
         found.append("G52 may stay in force if the run is aborted: send G52 X0 Y0 Z0 then")
-    for b in done.bounds:
-        if math.isnan(b.model):
-            found.append(f"the model of {b.axis} was never judged on cycles it had not seen: there is no bound")
     found += [
         f"the model of {s.axis} is unproven: {honest.why}"
         for s in drift.stations

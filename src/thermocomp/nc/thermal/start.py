@@ -230,7 +230,7 @@ def hand_over_state(
 
 def identity(model: ErrorModel) -> str:
     """Return a hash of the numbers a model is made of; where it comes from and how it was judged do not matter."""
-    numbers = {k: v for k, v in asdict(model).items() if k not in ("provenance", "honest_error")}
+    numbers = {k: v for k, v in asdict(model).items() if k not in ("family", "provenance", "honest_error")}
     return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 
 from thermocomp.core.exceptions import InputError, explain_unknown
@@ -31,17 +31,21 @@ class Station:
         The axis whose position it depends on; None: the model holds everywhere.
     at : float
         Where along it the model holds, machine coordinate [mm].
+    shadow : bool
+        True: the drift is computed, and no machine runs by it, as in a study; the model may be one that was never
+        judged.
 
     Raises
     ------
     InputError
-        The model is not in um, or the do-no-harm gate has refused it; there is no such axis.
+        The model is not in um, or may not run; there is no such axis.
     """
 
     axis: str
     model: ErrorModel
     along: str | None = None
     at: float = 0.0
+    shadow: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.axis not in tuple(AXES) or self.along not in (None, *AXES):
@@ -52,7 +56,8 @@ class Station:
             )
         if not abs(self.at) < float("inf"):
             raise InputError(f"model of {self.model.target}: position {self.at} mm must be finite")
-        self.model.check_may_run()
+        if not self.shadow:
+            self.model.check_may_run()
 
     def __str__(self) -> str:
         return self.axis if self.along is None else f"{self.axis} at {self.along} {self.at:g} mm"

@@ -166,7 +166,7 @@ def _filled(lines: list[str], due: Sequence[tuple[int, float]]) -> list[str]:
 
 def stations(models: Sequence[ErrorModel]) -> list[Station]:
     """Return the models of the drift of Z at each position (P-04)."""
-    return [Station("Z", m, "Z", float(p)) for m, p in zip(models, POSITIONS, strict=True)]
+    return [Station("Z", m, "Z", float(p), shadow=True) for m, p in zip(models, POSITIONS, strict=True)]
 
 
 def warmed(models: Sequence[ErrorModel], seconds: float, speed: float) -> ThermalStart:

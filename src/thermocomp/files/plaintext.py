@@ -1,0 +1,46 @@
+"""Small text files, read whole: of a bounded size, no pipes and devices, UTF-8."""
+
+import stat
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError
+
+
+def read_text(path: str | Path, what: str, most: int, failure: type[InputError] = InputError) -> str:
+    """Read a text file.
+
+    Parameters
+    ----------
+    path : str or Path
+    what : str
+        What to call it, such as ``machine file``.
+    most : int
+        Bytes it may have.
+    failure : type of InputError
+        What is raised.
+
+    Returns
+    -------
+    str
+        Without a byte order mark.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is none (a folder, a pipe, a device), too large, or not UTF-8.
+    """
+    source = Path(path)
+    try:
+        if not stat.S_ISREG(source.stat().st_mode):
+            raise failure(f"{source}: cannot be read as a {what}: it is a folder, a pipe or a device")
+        with source.open("rb") as file:
+            content = file.read(most + 1)
+        if len(content) > most:
+            raise failure(f"{source}: cannot be read as a {what}: it has more than {most:,} bytes")
+        return content.decode("utf-8-sig")
+    except FileNotFoundError as e:
+        raise failure(f"{source}: no such {what}") from e
+    except (OSError, UnicodeDecodeError) as e:
+        raise failure(f"{source}: cannot be read as a {what}: {e}") from e
+    except ValueError as e:  # a null character
+        raise failure(f"{str(source)!a}: is no name of a {what}: {e}") from e
