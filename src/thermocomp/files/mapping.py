@@ -13,6 +13,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
+from thermocomp.files.limits import Limits
 from thermocomp.files.tomlfile import read_toml
 
 #: a column by its heading, or by its number from 1
@@ -161,12 +162,14 @@ class Mapping:
         By channel name.
     read : ReadOptions
     cycles : CycleRule
+    limits : Limits
     """
 
     time: TimeColumn = TimeColumn()
     columns: AbstractMapping[str, ColumnMap] = field(default_factory=dict)
     read: ReadOptions = ReadOptions()
     cycles: CycleRule = CycleRule()
+    limits: Limits = Limits()
 
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
@@ -197,7 +200,13 @@ class Mapping:
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
 ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
 
-_TABLES: dict[str, type] = {"time": TimeColumn, "columns": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
+_TABLES: dict[str, type] = {
+    "time": TimeColumn,
+    "columns": ColumnMap,
+    "read": ReadOptions,
+    "cycles": CycleRule,
+    "limits": Limits,
+}
 
 
 def read_mapping(path: str | Path) -> Mapping:
