@@ -12,7 +12,7 @@ _UNPACKED_FREE: Final = 64 << 20
 #: what each limit counts, for messages
 _COUNTED: Final = {
     "file_bytes": "bytes",
-    "line_bytes": "bytes",
+    "line_bytes": "bytes in a line or a text",
     "cell_characters": "characters in a cell",
     "heading_characters": "characters in a heading",
     "columns": "columns",
@@ -103,8 +103,8 @@ class Limits:
         most = getattr(self, name)
         if found > most:
             raise RecordingError(
-                f"{where}: over {most:,} {_COUNTED[name]} (found {found:,}), which are not read: delete what is no "
-                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {found}"
+                f"{where}: over {most:,} {_COUNTED[name]} (at least {found:,}), which are not read: delete what is no "
+                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:

@@ -56,7 +56,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: Limits) -> FrameTabl
         check_unzipped(path, limits)
         with ExitStack() as stack:
             stack.enter_context(warnings.catch_warnings(action="ignore"))  # of styles and the like
-            sheets = _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack)
+            sheets = _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack, limits)
             limits.check("sheets", len(sheets), path)
             name, notes = _choose(path, sheets, options)
             return _table(path, name, stack.enter_context(closing(sheets[name]())), notes, options, limits)
@@ -217,7 +217,7 @@ def _plain(cell: object) -> object:
     return cell.isoformat() if isinstance(cell, date | time) else cell
 
 
-def _xlsx_sheets(path: Path, stack: ExitStack) -> Sheets:
+def _xlsx_sheets(path: Path, stack: ExitStack, limits: Limits) -> Sheets:
     import openpyxl
 
     book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
@@ -226,7 +226,13 @@ def _xlsx_sheets(path: Path, stack: ExitStack) -> Sheets:
     def rows(name: str) -> Generator[Row]:
         sheet = book[name]
         sheet.reset_dimensions()  # what a file says of its size may be wrong
-        return (_trimmed(row) for row in sheet.iter_rows(values_only=True))
+        cells = due = 0
+        for row in sheet.iter_rows(values_only=True):
+            cells += len(row)  # empty ones, too
+            if cells > due:
+                limits.check_unpacked(8 * cells, path)
+                due = cells + _CHUNK
+            yield _trimmed(row)
 
     return {sheet.title: lambda name=sheet.title: rows(name) for sheet in book.worksheets}  # type: ignore[misc]
 
