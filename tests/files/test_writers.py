@@ -36,6 +36,7 @@ GIVEN = {
 WRITING = {
     "adapters/linuxcnc/expansion/expand.py",
     "api/revision/job.py",
+    "cli/map.py",
     "files/jsonfile.py",
     "files/recordings.py",
     "report/checks.py",

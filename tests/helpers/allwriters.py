@@ -98,6 +98,16 @@ def _revise(controller: str) -> Writer:
     return Writer(go, tuple(f"out.ngc{end}" for end in ends), "out.ngc")
 
 
+def _mapping(folder: Path, version: int) -> None:
+    """A mapping for a file that `_inputs` has beside the program."""
+    raw = _inputs(PLATE, version) / "raw.csv"
+    raw.write_text(f"time_s,T{version},Z\n0,20,0\n10,21,1\n20,21,2\n", encoding="ascii")
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as told:
+        code = run(["map", str(raw), "--yes", "--overwrite", "-o", str(folder / "raw.toml")])
+    if code:
+        raise InputError(told.getvalue())
+
+
 #: by the name of the kind
 WRITERS: dict[str, Writer] = {
     "model": Writer(
@@ -108,6 +118,7 @@ WRITERS: dict[str, Writer] = {
         ("position.json",),
         "position.json",
     ),
+    "mapping": Writer(_mapping, ("raw.toml",), "raw.toml"),
     "csv": _recording("csv"),
     "parquet": _recording("parquet"),
     "check page": _page(checks, "render", lambda p: checks.write([], [], p, overwrite=True)),

@@ -76,11 +76,15 @@ def understand(heading: str) -> Meaning | None:
             if words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
                 raise
             return None
+        said = _suffix(base)
+        if said and SUFFIXES[said] == meant.symbol:  # x_um [um]: twice
+            inner = understand(base)
+            if inner is not None and (inner.unit.scale, inner.unit.shift) == (1, 0):
+                return Meaning(base, inner.base, inner.unit)
     else:
-        ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
+        suffix = _suffix(heading)
         behind = _BEHIND.fullmatch(heading)
-        if ends:
-            suffix = max(ends, key=len)
+        if suffix:
             base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
         elif behind:
             base, meant = behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
@@ -90,6 +94,12 @@ def understand(heading: str) -> Meaning | None:
         meant = find_unit(meant.symbol, "position")
     # one word, so that the name can go into a formula or a controller
     return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
+
+
+def _suffix(heading: str) -> str:
+    """Return the unit behind the last underscore of a heading, as it is written there."""
+    ends = (s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1)
+    return max(ends, key=len, default="")
 
 
 def _is_position(base: str, symbol: str) -> bool:

@@ -1,7 +1,7 @@
 """What columns may be whose headings do not say: guesses by name and values, which somebody has to confirm."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from thermocomp.files.tables import FileTable
 
 FloatArray = NDArray[np.float64]
 
+#: columns that are guessed about
+MOST_GUESSES = 100
 #: words of a name, by what they mean
 _TEMPERATURE = re.compile(
     r"t\d*|tc\d*|pt\d+\w*|rtd\d*|ntc\d*|temp\w*|thermo\w*|lager|bearing|motor|ambient|umgebung|raum|room|air|luft|"
@@ -76,15 +78,15 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
     """
     known = {rule.column or name for name, rule in mapping.columns.items()}
     known |= {mapping.time.column, mapping.time.date, mapping.cycles.column}
+    unknown = [
+        k
+        for k, heading in enumerate(table.headings)
+        if heading and known.isdisjoint((heading, k + 1)) and heading.casefold() != "cycle"
+        if understand_or_none(heading) is None and table.is_number(k, empty=False)
+    ]
     found = []
-    for k, heading in enumerate(table.headings):
-        if not heading or not known.isdisjoint((heading, k + 1)) or heading.casefold() == "cycle":
-            continue
-        if understand_or_none(heading) is not None or not table.is_number(k, empty=False):
-            continue
-        values = _numbers(table, k)
-        if values is None:
-            continue
+    for k, values in _numbers(table, unknown[:MOST_GUESSES]).items():
+        heading = table.headings[k]
         place = heading if table.headings.count(heading) == 1 else k + 1
         best = _role(heading, values)
         others = [(role, HOUSE_UNITS[role]) for role in _ROLES if role != best[0]] + [("", "")] * bool(best[0])
@@ -111,13 +113,17 @@ def understand_or_none(heading: str) -> Meaning | None:
         return None
 
 
-def _numbers(table: FileTable, column: int) -> FloatArray | None:
-    """Return a column of numbers; None if it holds text, or nothing."""
+def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
+    """Return columns of numbers; those that hold text, or nothing, are left out."""
     try:
-        values: FloatArray = table.load([column], [])[column].to_numpy(dtype=np.float64)
-    except InputError:
-        return None
-    return values if np.isfinite(values).any() else None
+        cells = table.load(columns, [])
+        found = {k: cells[k].to_numpy(dtype=np.float64) for k in columns}
+    except InputError:  # one of them holds text
+        if len(columns) < 2:
+            return {}
+        half = len(columns) // 2
+        found = {**_numbers(table, columns[:half]), **_numbers(table, columns[half:])}
+    return {k: values for k, values in found.items() if np.isfinite(values).any()}
 
 
 def _role(heading: str, values: FloatArray) -> tuple[str, str]:
@@ -148,7 +154,7 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
         if not heading:
             continue
         if table.is_number(k, empty=False):
-            values = _numbers(table, k)
+            values = _numbers(table, [k]).get(k)
             if values is not None and len(values) > 1 and (np.diff(values) > 0).all():
                 return {"column": heading, "unit": "s"}
         else:

@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
+from thermocomp.files.limits import Limits
 from thermocomp.files.tomlfile import read_toml
 from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
 
@@ -174,6 +175,7 @@ class Mapping:
     cycles : CycleRule
     clean : tuple of Step
         What is changed in the values that were read, in this order; see `thermocomp.recording.cleaning`.
+    limits : Limits
     """
 
     time: TimeColumn = TimeColumn()
@@ -181,6 +183,7 @@ class Mapping:
     read: ReadOptions = ReadOptions()
     cycles: CycleRule = CycleRule()
     clean: tuple[CleaningStep, ...] = ()
+    limits: Limits = Limits()
 
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
@@ -212,7 +215,13 @@ class Mapping:
 ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
 
 _STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
-_TABLES: dict[str, type] = {"time": TimeColumn, "columns": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
+_TABLES: dict[str, type] = {
+    "time": TimeColumn,
+    "columns": ColumnMap,
+    "read": ReadOptions,
+    "cycles": CycleRule,
+    "limits": Limits,
+}
 
 
 def read_mapping(path: str | Path) -> Mapping:

@@ -153,7 +153,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     """
     owner = str(path)
     dialogue = _Dialogue(Draft(text), decide)
-    table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner).read))
+    table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
         for shown, options in guess_columns(table, mapping):

@@ -16,10 +16,12 @@ from pydantic import ValidationError
 from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.headings import understand
-from thermocomp.files.columns import ColumnPlan, plan, why_left_out
+from thermocomp.files.columns import Column, ColumnPlan, plan, why_left_out
 from thermocomp.files.guesses import guess
+from thermocomp.files.limits import Limits, check_file
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
-from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet, skip_row
+from thermocomp.files.parquet import open_parquet
+from thermocomp.files.tables import EMBEDDED, FileTable, defuse, restore, skip_row
 from thermocomp.files.textfile import open_csv
 from thermocomp.files.times import read_times
 from thermocomp.files.workbook import open_workbook
@@ -29,6 +31,10 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.rows import Rows
 
 FloatArray = NDArray[np.float64]
+
+#: notes of one recording, and characters of a note or an error
+_MOST_NOTES = 100
+_MOST_SAID = 2_000
 
 ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".ods", ".parquet")
 
@@ -86,15 +92,29 @@ def read_rows(
         See `read`.
     """
     source = Path(path)
-    mapping = mapping or Mapping()
-    table, sha256 = _opened(source, mapping.read)
+    try:
+        return _read_rows(source, mapping or Mapping(), rising=rising, extra=extra)
+    except InputError as e:
+        text = str(e)
+        if len(text) <= _MOST_SAID:
+            raise
+        half = _MOST_SAID // 2
+        raise type(e)(f"{text[:half]} ... {text[-half:]}", e.remedies) from e
+
+
+def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[str]) -> Rows:
+    table, sha256 = _opened(source, mapping.read, mapping.limits)
+    notes = [*table.notes]
     if table.embedded:
-        mapping = mapping.over(_described(table.embedded, source))
+        described, note = _described(table.embedded, source)
+        mapping = mapping.over(described)
+        notes.extend(note)
     try:
         columns = plan(table.headings, mapping, str(source))
     except (RecordingError, UnitError) as e:
         e.remedies = e.remedies or guess(table, mapping)
         raise
+    notes.extend(columns.notes)
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns] + ([] if is_stamp else [columns.time])
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
@@ -102,19 +122,18 @@ def read_rows(
         k for k in (columns.time if is_stamp else None, columns.date, columns.cycle, *more.values()) if k is not None
     ]
     cells = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
-    notes = [*table.notes, *columns.notes]
-    time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    time, start = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     if not is_stamp and not columns.time_unit:
         notes.append(f"{table.headings[columns.time]!r} has no unit and is taken as seconds")
     data, changed = {}, list[str]()
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
-        data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
+        data[column.channel.name], found = _convert(column, raw, mapping.read.missing, table)
         changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
-    notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric)
-    texts_only = [table.headings[k] for k in left_out if k not in numeric]
+    notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
+    texts_only = [table.headings[k] for k in left_out if k not in set(numeric)]
     if texts_only:
         notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
     rows = Rows(
@@ -128,9 +147,10 @@ def read_rows(
         extra={h: cells[k].tolist() for h, k in more.items()},
         min_run=mapping.cycles.min_run_s,
         min_stop=mapping.cycles.min_stop_s,
+        most_cycles=mapping.limits.cycles,
         aliases=columns.aliases,
-        notes=tuple(notes),
-        changed=tuple(changed),
+        notes=_shorten(notes, len(numeric)),
+        changed=_shorten(changed, 0),
         place=table.place,
     )
     return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
@@ -193,46 +213,64 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     target = Path(path)
     if target.suffix not in (".csv", ".parquet"):
         raise InputError(f"{target}: a recording is written as .csv or .parquet")
+    as_text = target.suffix == ".csv"
     described: dict[str, ColumnMap] = {}
     headings = {}
     for c in recording.channels:
         meaning = understand(c.name)
         known = meaning is not None and (meaning.name, meaning.unit.symbol) == (c.name, c.unit)
-        headings[c.name] = c.name if known and not c.place else f"{c.name} [{c.unit}]"
-        if headings[c.name] != c.name:
-            described[c.name] = ColumnMap(headings[c.name], c.unit, c.quantity, place=c.place)  # type: ignore[arg-type]
+        heading = c.name if known else f"{c.name} [{c.unit}]".strip()
+        if not known or c.place:
+            column = "" if known else heading
+            described[c.name] = ColumnMap(column, c.unit, c.quantity, place=c.place)  # type: ignore[arg-type]
+        headings[c.name] = _as_written(heading, as_text=as_text)
     out = recording.table.rename(columns=headings)
     out.insert(0, "time_s", recording.time)
     names = [c.name for c in recording.cycles]
     if len(set(names)) < len(names):
         names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
+    names = [_as_written(name, as_text=as_text) for name in names]
     out["cycle"] = np.repeat(names, [len(c) for c in recording.cycles])
     embedded = Mapping(TimeColumn(column="time_s", unit="s", start=recording.start), described)
     needed = bool(described or recording.start)
     text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
     with draft(target, overwrite=overwrite) as started:
-        if target.suffix == ".csv":
+        if as_text:
             with started.open("x", encoding="utf-8", newline="") as f:
                 if text:
                     f.write(f"# {EMBEDDED}: {text}\n")
                 out.to_csv(f, index=False, lineterminator="\n")
         else:
-            out.attrs = {EMBEDDED: text} if text else {}
+            out.attrs = {EMBEDDED: text} if text else {}  # pandas keeps these when it reads the file and writes another
             out.to_parquet(started, index=False)
 
 
-def open_table(path: str | Path, options: ReadOptions) -> FileTable:
+def _as_written(name: str, *, as_text: bool) -> str:
+    """Return a heading or a label so that reading it gives the same; in text also so that no spreadsheet calculates."""
+    return defuse(name) if as_text or restore(name) != name else name
+
+
+def open_table(path: str | Path, mapping: Mapping) -> FileTable:
     """Open a file without understanding what its columns are.
+
+    Parameters
+    ----------
+    path : str or Path
+    mapping : Mapping
+
+    Returns
+    -------
+    FileTable
 
     Raises
     ------
     RecordingError
         It cannot be read as a table.
     """
-    return _opened(Path(path), options)[0]
+    return _opened(Path(path), mapping.read, mapping.limits)[0]
 
 
-def _opened(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
+def _opened(path: Path, options: ReadOptions, limits: Limits) -> tuple[FileTable, str]:
     """Return the raw table and the SHA-256 of the file."""
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -240,31 +278,31 @@ def _opened(path: Path, options: ReadOptions) -> tuple[FileTable, str]:
             f"{path}: files ending in {ending or 'nothing'!r} are not read; save it as one of {', '.join(ENDINGS)}"
         )
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            raise RecordingError(f"{path}: is a pipe or a device and no file; write what comes from it into a file")
+        check_file(path, limits)
         with path.open("rb") as f:
             sha256 = hashlib.file_digest(f, "sha256").hexdigest()
         if ending in (".xlsx", ".ods"):
-            return open_workbook(path, options), sha256
+            return open_workbook(path, options, limits), sha256
         if ending == ".parquet":
-            return open_parquet(path), sha256
-        return open_csv(path, options), sha256
+            return open_parquet(path, limits), sha256
+        return open_csv(path, options, limits), sha256
     except FileNotFoundError as e:
         others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         near = get_close_matches(path.name, others, n=1)
         raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
     except OSError as e:
         raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
+    except ValueError as e:  # a name that no file can have
+        raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
 
 
-def _described(text: str, source: Path) -> Mapping:
+def _described(text: str, source: Path) -> tuple[Mapping, list[str]]:
+    """Return thermocomp's own description of the columns; nothing but a note if another program has damaged it."""
     try:
-        return ADAPTER.validate_json(text)
+        return ADAPTER.validate_json(text), []
     except ValidationError as e:
-        raise RecordingError(
-            f"{source}: thermocomp's own description of the columns is damaged ({e.errors()[0]['msg']}); delete the "
-            "first line, or give a mapping and write the file anew"
-        ) from e
+        reason = e.errors()[0]["msg"]
+        return Mapping(), [f"thermocomp's own description of the columns is damaged ({reason}) and not used"]
     except InputError as e:
         raise type(e)(f"{source}: {e}") from e
 
@@ -285,6 +323,49 @@ def _later(start: str, seconds: float) -> str:
     return (datetime.fromisoformat(start) + timedelta(seconds=seconds)).isoformat() if start and seconds else start
 
 
+def _times(
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+    *,
+    is_stamp: bool,
+    rising: bool,
+) -> tuple[FloatArray, str]:
+    where = f"{source}: column {table.headings[columns.time]!r}"
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    except (ValueError, OverflowError, TypeError) as e:  # a format that is none, a year that no clock has
+        raise RecordingError(
+            f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
+        ) from e
+    if not np.isfinite(time).all():
+        raise RecordingError(f"{where}: the times are too far apart for a number; correct them")
+    return time, start
+
+
+def _convert(
+    column: Column, raw: FloatArray, missing: Sequence[float], table: FileTable
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the values of a column; one that a scale or a unit makes infinite is missing."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        values, notes = column.convert(raw, missing, table.place)
+    infinite = np.isinf(values)
+    if not infinite.any():
+        return values, notes
+    note = f"{column.channel.name}: infinite by its scale or unit, taken as missing, in {infinite.sum()} cells"
+    return np.where(infinite, np.nan, values), (*notes, note)
+
+
+def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
+    """Return notes as far as a user can read them, and the number of the others."""
+    found = [n if len(n) <= _MOST_SAID else f"{n[:_MOST_SAID]} ..." for n in notes]
+    more = max(len(found) - _MOST_NOTES, 0) + max(left_out - _MOST_NOTES, 0)
+    return (*found[:_MOST_NOTES], *([f"left out or replaced: {more:,} more columns"] if more else []))
+
+
 def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: Path) -> list[Any] | None:
     if columns.cycle is None:
         return None
@@ -296,17 +377,20 @@ def _labels(cells: pd.DataFrame, columns: ColumnPlan, table: FileTable, source: 
             "every row belongs to a cycle",
             [skip_row(table, row)],
         )
-    return list(labels.tolist())
+    return [restore(label) if isinstance(label, str) else label for label in labels.tolist()]
 
 
-def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> Sequence[Cycle]:
+def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> tuple[Cycle, ...]:
+    speed = recording.speed
     if labels is not None:
         try:
-            return split_by_labels(labels)
+            found = split_by_labels(labels)
         except RecordingError as e:
             raise RecordingError(f"{recording.source}: {e}") from e
-    speed = recording.speed
-    if speed is None:
-        return make_single_cycle(len(recording))
-    values = recording.table[speed.name].to_numpy()
-    return find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
+    elif speed is None:
+        found = make_single_cycle(len(recording))
+    else:
+        values = recording.table[speed.name].to_numpy()
+        found = find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
+    Limits(cycles=rows.most_cycles).check("cycles", len(found), recording.source)
+    return found

@@ -1,5 +1,6 @@
-"""Raw tables, their cells not yet understood: Parquet, and what all kinds of files share."""
+"""Raw tables, their cells not yet understood: what all kinds of files share."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,13 +9,20 @@ from typing import Any, NoReturn, Protocol
 import numpy as np
 import pandas as pd
 
-from thermocomp.core.exceptions import MissingExtraError, RecordingError, Remedy
+from thermocomp.core.exceptions import RecordingError, Remedy
+from thermocomp.files.limits import Limits
 
 #: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
 
 #: texts that stand for a missing value, besides an empty cell
 MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
+
+#: what a spreadsheet calculates, perhaps behind apostrophes
+_FORMULA = re.compile(r"'*[=+\-@\t\r\n\u240d\u240a]")
+_LINE_ENDS, _LINE_SIGNS = {13: "\u240d", 10: "\u240a"}, {0x240D: "\r", 0x240A: "\n"}
+#: heading of an index that had none
+_NAMELESS = re.compile(r"Unnamed: \d+")
 
 
 class FileTable(Protocol):
@@ -50,7 +58,7 @@ class FileTable(Protocol):
 
 @dataclass(frozen=True)
 class FrameTable:
-    """A sheet or a Parquet file, which arrive as a whole.
+    """A sheet, which arrives as a whole.
 
     Parameters
     ----------
@@ -74,21 +82,13 @@ class FrameTable:
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
-        filled = self.frame[column].dropna()
-        return empty if filled.empty else is_float(str(filled.iloc[0]))
+        return first_is_number(self.frame[column], empty=empty)
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
         """Read columns; see `Table.load`."""
         data = {k: self.frame[k] for k in texts}
         for k in numbers:
-            cells = self.frame[k]
-            if cells.dtype != np.float64:
-                bad = not_numbers(cells).to_numpy()
-                if bad.any():
-                    row = int(np.flatnonzero(bad)[0])
-                    refuse_cell(self, self.source, row, k, cells.iloc[row])
-                cells = pd.to_numeric(cells, errors="coerce").astype(np.float64)
-            data[k] = cells
+            data[k] = load_column(self, self.source, self.frame[k], k)
         return pd.DataFrame(data, copy=False)
 
     def place(self, row: int) -> str:
@@ -96,37 +96,65 @@ class FrameTable:
         return f"row {self.rows[row]}"
 
 
-def open_parquet(path: Path) -> FrameTable:
-    """Open a Parquet file.
+def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
+    """Return whether the first filled cell is a number; `empty` if there is none."""
+    filled = cells.dropna()
+    return empty if filled.empty else is_float(str(filled.iloc[0]))
+
+
+def load_column(
+    table: FileTable, source: str, cells: "pd.Series[Any]", column: int, first: int = 0
+) -> "pd.Series[float]":
+    """Return the cells of a column as numbers; the first of them stands in row `first` of the table.
 
     Raises
     ------
     RecordingError
-        It is not a Parquet file, or holds no recording.
+        One of them is no number.
     """
-    try:
-        frame = pd.read_parquet(path)
-    except ImportError as e:
-        raise MissingExtraError("study", "pyarrow") from e
-    except (ValueError, KeyError) as e:  # pyarrow's own errors are ValueErrors
-        raise RecordingError(f"{path}: is not a Parquet file, or a damaged one ({e}); write it anew") from e
-    embedded = str(frame.attrs.get(EMBEDDED, ""))
-    if not isinstance(frame.index, pd.RangeIndex):
-        frame = frame.reset_index()
-    headings = tuple(str(c).strip() for c in frame.columns)
-    check_headings(path, headings, n_rows=len(frame))
-    frame.columns = pd.RangeIndex(len(headings))
-    return FrameTable(str(path), headings, frame, range(1, len(frame) + 1), embedded)
+    if cells.dtype == np.float64:
+        return cells
+    bad = not_numbers(cells).to_numpy()
+    if bad.any():
+        row = int(np.flatnonzero(bad)[0])
+        refuse_cell(table, source, first + row, column, cells.iloc[row])
+    return pd.to_numeric(cells, errors="coerce").astype(np.float64)
 
 
-def check_headings(path: Path, headings: Sequence[str], n_rows: int) -> None:
+def clean_heading(cell: object) -> str:
+    """Return a heading as it was before other programs had it.
+
+    White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
+    spreadsheet would calculate (`defuse`).
+    """
+    text = restore(str(cell).strip())
+    return "" if _NAMELESS.fullmatch(text) else text
+
+
+def defuse(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula when it opens a CSV file, on one line.
+
+    An apostrophe stands before ``=``, ``+``, ``-``, ``@``, a tab or a line's end; line ends become the signs for them.
+    `restore` turns it back.
+    """
+    return f"'{text}".translate(_LINE_ENDS) if _FORMULA.match(text) else text.translate(_LINE_ENDS)
+
+
+def restore(text: str) -> str:
+    """Turn back what `defuse` did."""
+    return (text[1:] if text.startswith("'") and _FORMULA.match(text) else text).translate(_LINE_SIGNS)
+
+
+def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Limits) -> None:
     """Refuse a table that cannot be a recording, whatever its columns mean.
 
     Raises
     ------
     RecordingError
-        No headings, numbers instead of headings, one column, or no rows.
+        No headings, numbers instead of headings, one column, no rows, or over a limit.
     """
+    limits.check_table(n_rows, len(headings), path)
+    limits.check("heading_characters", max(map(len, headings), default=0), path)
     filled = [h for h in headings if h.strip()]
     if not filled:
         raise RecordingError(f"{path}: no heading line; a recording has headings such as time_s,t1_C,drift_um")

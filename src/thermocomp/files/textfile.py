@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +15,27 @@ import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
+from thermocomp.files.limits import Limits
 from thermocomp.files.mapping import ReadOptions
-from thermocomp.files.tables import EMBEDDED, MISSING_TEXT, check_headings, is_float, not_numbers, refuse_cell
+from thermocomp.files.tables import (
+    EMBEDDED,
+    MISSING_TEXT,
+    check_headings,
+    clean_heading,
+    is_float,
+    not_numbers,
+    refuse_cell,
+)
 
-#: bytes of a line that are read at most
-MOST_LINE = 4_000_000
+#: lines that tell how the file is written; fewer if they are long
 _SAMPLE_LINES = 100
+_SAMPLE_BYTES = 2 << 20
 _CHUNK = 100_000  # rows that are text in memory at a time
 _BOM = b"\xef\xbb\xbf"
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
 _SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
+#: a spreadsheet puts quotation marks around the line
+_OWN = (f"# {EMBEDDED}: ".encode(), f'"# {EMBEDDED}: '.encode())
 _POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 # pandas before 3.1 may read the last digit wrong unless told
 _PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
@@ -130,7 +141,7 @@ class CsvTable:
                     refuse_cell(self, str(self.path), int(chunk.index[row]), column, chunk.iloc[row, k], cause)
 
 
-def open_csv(path: Path, options: ReadOptions) -> CsvTable:
+def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> CsvTable:
     """Find out how a text file is written: one pass over its lines, none of which is kept.
 
     Parameters
@@ -138,43 +149,47 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     path : Path
     options : ReadOptions
         What is known beforehand.
+    limits : Limits
 
     Raises
     ------
     RecordingError
-        Empty, binary, no heading line, no rows, one column, or rows of unequal length.
+        Empty, binary, no heading line, no rows, one column, rows of unequal length, or over a limit.
     """
-    _refuse_binary(path)
-    comment = options.comment.encode()
     skipped: list[int] = []
     top = options.heading - 1
-    first = list(islice((c for c in _content(path, comment, [], options) if c[0] >= top), _SAMPLE_LINES))
+    content = partial(_content, path, options, limits=limits, returns=_refuse_binary(path))
+    first = _sample(content([]), top)
     if not first:
         raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
     sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
-    delimiter, layout = _find_table(sample, options.delimiter or _separator(path))
+    delimiter, layout = _find_table(path, sample, options.delimiter or _separator(path), limits)
     ending = delimiter.encode()
     heading, begin = first[layout.heading][1], 1 + max(layout)
-    width, is_utf8, n_rows = _cells(heading, delimiter), True, -begin
-    for number, line in _content(path, comment, skipped, options):
+    plain = delimiter != " "
+    width, is_utf8, n_rows, long = _cells(heading, delimiter), True, -begin, limits.cell_characters
+    for number, line in content(skipped):
         is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
         n_rows += number >= top
         if n_rows <= 0:  # what stands above the rows
             skipped.append(number)
             continue
-        cells = _cells(line, delimiter)
+        cells = line.count(ending) + 1 if plain and b'"' not in line else _cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
         if cells != width:
             text = _ragged(path, number + 1, cells, width, line, delimiter)
             raise RecordingError(text, [{"read": {"skip": [number + 1]}}])
+        if len(line) > long:
+            most = max(map(len, _split(line.decode("latin-1"), delimiter)))
+            limits.check("cell_characters", most, f"{path}: line {number + 1}")
     encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
     try:
-        headings = [h.strip() for h in _split(heading.decode(encoding), delimiter)]
+        headings = [clean_heading(h) for h in _split(heading.decode(encoding), delimiter)]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
     headings += [""] * (width - len(headings))
-    check_headings(path, headings, n_rows)
+    check_headings(path, headings, n_rows, limits)
     if layout.units > layout.heading:
         headings = join_units(headings, _split(first[layout.units][1].decode(encoding), delimiter))
     rows = tuple(tuple(_split(line, delimiter)) for line in sample[begin:])
@@ -187,62 +202,98 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
         encoding=encoding,
         skipped=tuple(skipped),
         n_rows=n_rows,
-        embedded=_embedded(path),
+        embedded=_embedded(path, limits),
         notes=tell_layout([number + 1 for number, _ in first], layout, "line"),
     )
 
 
-def _content(path: Path, comment: bytes, skipped: list[int], options: ReadOptions) -> Iterator[tuple[int, bytes]]:
+def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
+    """Return the first lines; a few at least, however long they are."""
+    found: list[tuple[int, bytes]] = []
+    size = 0
+    for number, line in content:
+        if number >= top:
+            found.append((number, line))
+            size += len(line)
+            if len(found) == _SAMPLE_LINES or (size > _SAMPLE_BYTES and len(found) >= 8):
+                break
+    return found
+
+
+def _content(
+    path: Path, options: ReadOptions, skipped: list[int], *, limits: Limits, returns: bool
+) -> Iterator[tuple[int, bytes]]:
     """Yield number and text of each line that is neither blank nor a comment; tell the others in `skipped`."""
     blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
+    comment, most = options.comment.encode(), limits.line_bytes
     with path.open("rb") as f:
-        for number, raw in enumerate(f):
-            if len(raw) > MOST_LINE:
-                raise RecordingError(
-                    f"{path}: line {number + 1} has more than {MOST_LINE:,} bytes; a row that long is no row of a "
-                    "recording: save a table with so many columns as Parquet"
-                )
+        for number, raw in enumerate(iter(partial(f.readline, most + 1), b"")):
+            if len(raw) > most:
+                limits.check("line_bytes", len(raw), f"{path}: line {number + 1}")
             line = raw.removeprefix(_BOM) if number == 0 else raw
-            if line.count(b"\r") > line.endswith(b"\r\n"):  # pandas would count lines otherwise than we do
+            if returns and line.count(b"\r") > line.endswith(b"\r\n"):  # pandas would count lines otherwise than we do
                 raise RecordingError(
                     f"{path}: line {number + 1} holds a carriage return that does not end it, as in files of old "
                     "Macintoshes; save the file with the line ends of Unix or Windows"
                 )
+            if number and line[:1].isalnum() and line[:1] != comment[:1] and not options.skip:
+                yield number, line
+                continue
             text = line.lstrip()
-            remark = (comment and text.startswith(comment)) or (number == 0 and _SEPARATOR.fullmatch(raw))
-            if remark or not text.strip(blank) or (options.skip and options.skips(number + 1)):
+            remark = (comment and text.startswith(comment)) or (
+                number == 0 and (text.startswith(_OWN) or _SEPARATOR.fullmatch(raw))
+            )
+            if remark or not text.strip(blank) or options.skips(number + 1):
                 skipped.append(number)
+                limits.check("skipped_lines", len(skipped), path)
             else:
                 yield number, line
 
 
-def _embedded(path: Path) -> str:
+def _embedded(path: Path, limits: Limits) -> str:
     """Return the description that thermocomp writes into the first line of its own files."""
     with path.open("rb") as f:
-        line = f.readline()
-    start = f"# {EMBEDDED}: ".encode()
-    return line.removeprefix(start).decode("utf-8", "replace").strip() if line.startswith(start) else ""
+        line = f.readline(limits.line_bytes).removeprefix(_BOM)
+    if not line.startswith(_OWN):
+        return ""
+    text = line.decode("utf-8", "replace").rstrip(" \t\r\n,;|")
+    if text.startswith('"'):
+        text = _split(text, ";")[0]
+    return text.partition(": ")[2].strip()
 
 
-def _refuse_binary(path: Path) -> None:
-    with path.open("rb") as f:
-        head = f.read(65536)
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise RecordingError(f"{path}: is written in UTF-16; save it as UTF-8 (in a spreadsheet: CSV UTF-8)")
+def _refuse_binary(path: Path) -> bool:
+    """Refuse what is no text; return whether there are carriage returns that end no line."""
     kinds = {b"PK\x03\x04": "a workbook or zip file", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file"}
-    kind = next((k for magic, k in kinds.items() if head.startswith(magic)), "")
-    if kind or b"\x00" in head:
-        raise RecordingError(
-            f"{path}: is not text but {kind or 'binary'}; export the recording as CSV, or correct the file's ending"
-        )
+    returns, last = 0, b""
+    with path.open("rb") as f:
+        while block := f.read(1 << 20):
+            if not last and block.startswith((b"\xff\xfe", b"\xfe\xff")):
+                raise RecordingError(f"{path}: is written in UTF-16; save it as UTF-8 (in a spreadsheet: CSV UTF-8)")
+            kind = "" if last else next((k for magic, k in kinds.items() if block.startswith(magic)), "")
+            if kind or b"\x00" in block:
+                raise RecordingError(
+                    f"{path}: is not text but {kind or 'binary'}; export the recording as CSV, or correct the file's "
+                    "ending"
+                )
+            returns += block.count(b"\r") - block.count(b"\r\n") - (last == b"\r" and block.startswith(b"\n"))
+            last = block[-1:]
+    return returns > 0
 
 
-def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout]:
+def _find_table(path: Path, lines: Sequence[str], delimiter: str, limits: Limits) -> tuple[str, Layout]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
     best, best_layout, best_fit = delimiter or ",", Layout(0, 0), (False, 0.0, 0)
+    widest = 0
     for tried in delimiter or "\t;|, ":
-        if tried == " " and best_fit > (False, 0.0, 0) and not delimiter:
-            continue  # white space stands inside headings and timestamps too: the last resort
+        if tried == " " and not delimiter:  # it stands inside headings and timestamps too: the last resort
+            if best_fit > (False, 0.0, 0):
+                continue
+            limits.check("columns", widest, path)
+        cells = max(line.count(tried) for line in lines) + 1
+        if cells > limits.columns + 1:  # one more may be empty
+            widest = max(widest, cells)
+            continue
         rows = [_split(line, tried) for line in lines]
         found = find_layout(rows)
         layout = found or Layout(0, 0)
@@ -251,6 +302,8 @@ def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout]:
         fit = (found is not None, sum(fits) / len(fits) if fits else 1.0, width)
         if delimiter or (width > 1 and fit > best_fit and (fit[1] > 0 or tried != " ")):
             best, best_layout, best_fit = tried, layout, fit
+    if best_fit == (False, 0.0, 0):
+        limits.check("columns", widest, path)
     return best, best_layout
 
 

@@ -1,38 +1,43 @@
-"""Workbooks (XLSX, ODS): sheets are streamed, and only as much of them as a recording may have."""
+"""Workbooks (XLSX, ODS): sheets are streamed, after a look at what they become when they are unzipped."""
 
 import re
+import warnings
 import zipfile
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from datetime import date, datetime, time
-from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
 from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
+from thermocomp.files.limits import Limits
 from thermocomp.files.mapping import ReadOptions
-from thermocomp.files.tables import FrameTable, check_headings
+from thermocomp.files.tables import FrameTable, check_headings, clean_heading
+from thermocomp.files.unzipped import check_unzipped
 
-#: columns and cells of a sheet, and bytes of an unzipped workbook, that are read at most
-MOST_COLUMNS: Final = 10_000
-MOST_CELLS: Final = 50_000_000
-MOST_BYTES: Final = 4 << 30
-#: rows that tell where a table begins
+#: rows that tell where a table begins; fewer if they are wide, or if nothing stands in them
 _SAMPLE = 100
+_SAMPLE_CELLS = 10_000
+_SAMPLE_PLACES = 10_000
+#: cells that are kept as objects; more become numbers first
+_CHUNK = 200_000
 _OFFICE, _TABLE, _TEXT = (
     f"{{urn:oasis:names:tc:opendocument:xmlns:{part}:1.0}}" for part in ("office", "table", "text")
 )
 _SPAN = re.compile(r"PT(\d+)H(\d+)M(\d+)(?:[.,](\d+))?S")
 
 Row = tuple[Any, ...]
+Column = NDArray[Any]
 Sheets = dict[str, Callable[[], Generator[Row]]]
 
 
-def open_workbook(path: Path, options: ReadOptions) -> FrameTable:
+def open_workbook(path: Path, options: ReadOptions, limits: Limits) -> FrameTable:
     """Open the sheet of a workbook that holds a recording.
 
     Parameters
@@ -40,18 +45,21 @@ def open_workbook(path: Path, options: ReadOptions) -> FrameTable:
     path : Path
         Ending in .xlsx or .ods.
     options : ReadOptions
+    limits : Limits
 
     Raises
     ------
     RecordingError
-        It is not a workbook, it is too large, it holds no recording, or several sheets may be it.
+        It is not a workbook, it is over a limit, it holds no recording, or several sheets may be it.
     """
     try:
-        _refuse_large(path)
+        check_unzipped(path, limits)
         with ExitStack() as stack:
-            sheets = _ods_sheets(path) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack)
+            stack.enter_context(warnings.catch_warnings(action="ignore"))  # of styles and the like
+            sheets = _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack, limits)
+            limits.check("sheets", len(sheets), path)
             name, notes = _choose(path, sheets, options)
-            return _table(path, name, stack.enter_context(closing(sheets[name]())), notes, options)
+            return _table(path, name, stack.enter_context(closing(sheets[name]())), notes, options, limits)
     except ImportError as e:
         raise MissingExtraError("study", "openpyxl") from e
     except (InputError, OSError):
@@ -60,16 +68,6 @@ def open_workbook(path: Path, options: ReadOptions) -> FrameTable:
         raise RecordingError(
             f"{path}: is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it anew"
         ) from e
-
-
-def _refuse_large(path: Path) -> None:
-    with zipfile.ZipFile(path) as parts:
-        size = sum(part.file_size for part in parts.infolist())
-    if size > MOST_BYTES:
-        raise RecordingError(
-            f"{path}: has {size / 2**30:.0f} GB when it is unzipped, and at most {MOST_BYTES >> 30} GB are read; save "
-            "the recording as CSV or Parquet"
-        )
 
 
 def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tuple[str, ...]]:
@@ -98,40 +96,102 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     return name, (f"sheet {name!r} of {names} is read",)
 
 
-def _sample(rows: Iterator[Row]) -> list[list[str]]:
-    return [[_text(cell) for cell in row] for row in islice((row for row in rows if _holds_cells(row)), _SAMPLE)]
+def _sample(rows: Iterable[Row]) -> list[list[str]]:
+    found: list[list[str]] = []
+    cells = 0
+    for place, row in enumerate(rows):
+        if _holds_cells(row):
+            found.append([_text(cell) for cell in row])
+            cells += len(row)
+        if len(found) == _SAMPLE or (cells > _SAMPLE_CELLS and len(found) >= 4) or place > _SAMPLE_PLACES:
+            break
+    return found
 
 
-def _table(path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], options: ReadOptions) -> FrameTable:
+def _table(
+    path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], options: ReadOptions, limits: Limits
+) -> FrameTable:
     """Return the table of a sheet: its heading row, and the rows below it."""
-    places, content, cells = list[int](), list[Row](), 0
+    where = f"{path}: sheet {name!r}"
+    places, first, body, cells = list[int](), list[Row](), _Body(), 0
     for place, row in enumerate(rows, 1):
+        limits.check("sheet_rows", place, where)
         if not _holds_cells(row) or place < options.heading or options.skips(place):
             continue
         cells += len(row)
-        if len(row) > MOST_COLUMNS or cells > MOST_CELLS:
-            wide = len(row) > MOST_COLUMNS
-            what = f"row {place} has more than {MOST_COLUMNS:,} columns" if wide else f"has over {MOST_CELLS:,} cells"
-            raise RecordingError(
-                f"{path}: sheet {name!r} {what}, which are not read: delete what is beside the table, or save the "
-                "recording as CSV or Parquet"
-            )
+        if len(row) > limits.columns:
+            limits.check("columns", len(row), f"{where}, row {place}")
+        limits.check("cells", cells, where)
         places.append(place)
-        content.append(row)
-    if not content:
-        raise RecordingError(f"{path}: sheet {name!r} is empty; a recording has a heading row and rows of numbers")
-    layout = find_layout(_sample(iter(content))) or Layout(0, 0)
+        if len(first) < _SAMPLE:
+            first.append(row)
+        else:
+            body.add(row)
+            if not len(places) % 1000:
+                limits.check_unpacked(8 * cells, path)
+    if not first:
+        raise RecordingError(f"{where} is empty; a recording has a heading row and rows of numbers")
+    layout = find_layout(_sample(first)) or Layout(0, 0)
     begin = 1 + max(layout)
-    headings = [_text(cell).strip() for cell in content[layout.heading]]
+    headings = [_text(cell).strip() for cell in first[layout.heading]]
     if layout.units > layout.heading:
-        headings = join_units(headings, [_text(cell) for cell in content[layout.units]])
-    below = content[begin:]
-    width = max(map(len, below), default=0)
-    headings += [""] * (width - len(headings))
-    check_headings(path, headings, n_rows=len(below))
-    frame = pd.DataFrame([row + (None,) * (len(headings) - len(row)) for row in below], dtype=object)
+        headings = join_units(headings, [_text(cell) for cell in first[layout.units]])
+    columns = body.close(first[begin:])
+    headings += [""] * (len(columns) - len(headings))
+    headings = [clean_heading(h) for h in headings]
+    n_rows = len(places) - begin
+    check_headings(path, headings, n_rows, limits)
+    empty = np.full(n_rows, np.nan)
+    frame = pd.DataFrame({k: columns[k] if k < len(columns) else empty for k in range(len(headings))}, copy=False)
     told = (*notes, *tell_layout(places, layout, "row"))
     return FrameTable(str(path), tuple(headings), frame, places[begin:], notes=told)
+
+
+class _Body:
+    """The rows of a sheet, column by column; numbers are kept as numbers, not as objects."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.cells = 0
+        self.parts: list[list[Column]] = []
+
+    def add(self, row: Row) -> None:
+        self.rows.append(row)
+        self.cells += len(row)
+        if self.cells > _CHUNK:
+            self._pack()
+
+    def close(self, before: list[Row]) -> list[Column]:
+        """Return the columns, with the rows that come before those that were added."""
+        self._pack()
+        self.rows = before
+        self._pack()
+        parts = [*self.parts[-1:], *self.parts[:-1]]
+        columns: list[Column] = []
+        for k in range(max(map(len, parts), default=0)):
+            pieces = [p[k] if k < len(p) else np.full(len(p[0]) if p else 0, np.nan) for p in parts]
+            columns.append(np.concatenate(pieces) if len(pieces) > 1 else pieces[0])
+        return columns
+
+    def _pack(self) -> None:
+        width = max(map(len, self.rows), default=0)
+        full = [row + (None,) * (width - len(row)) for row in self.rows]
+        self.parts.append([_column(cells) for cells in zip(*full, strict=True)])
+        self.rows, self.cells = [], 0
+
+
+def _column(cells: Row) -> Column:
+    kinds = set(map(type, cells))
+    try:
+        if kinds == {int}:
+            return np.array(cells, dtype=np.int64)
+        if kinds <= {int, float, type(None)}:
+            return np.array(cells, dtype=np.float64)
+    except OverflowError:  # a whole number larger than any float
+        pass
+    column = np.empty(len(cells), dtype=object)
+    column[:] = cells
+    return column
 
 
 def _holds_cells(row: Row) -> bool:
@@ -158,28 +218,34 @@ def _plain(cell: object) -> object:
     return cell.isoformat() if isinstance(cell, date | time) else cell
 
 
-def _xlsx_sheets(path: Path, stack: ExitStack) -> Sheets:
+def _xlsx_sheets(path: Path, stack: ExitStack, limits: Limits) -> Sheets:
     import openpyxl
 
-    book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
     stack.callback(book.close)
 
     def rows(name: str) -> Generator[Row]:
         sheet = book[name]
         sheet.reset_dimensions()  # what a file says of its size may be wrong
-        return (_trimmed(row) for row in sheet.iter_rows(values_only=True))
+        cells = due = 0
+        for row in sheet.iter_rows(values_only=True):
+            cells += len(row)  # empty ones, too
+            if cells > due:
+                limits.check_unpacked(8 * cells, path)
+                due = cells + _CHUNK
+            yield _trimmed(row)
 
     return {sheet.title: lambda name=sheet.title: rows(name) for sheet in book.worksheets}  # type: ignore[misc]
 
 
-def _ods_sheets(path: Path) -> Sheets:
+def _ods_sheets(path: Path, limits: Limits) -> Sheets:
     with zipfile.ZipFile(path) as parts, parts.open("content.xml") as content:
         tables = (e for _, e in ElementTree.iterparse(content, ("start",)) if e.tag == f"{_TABLE}table")
         names = [table.get(f"{_TABLE}name", "") for table in tables]
-    return {name: lambda k=k: _ods_rows(path, k) for k, name in enumerate(names)}  # type: ignore[misc]
+    return {name: lambda k=k: _ods_rows(path, k, limits) for k, name in enumerate(names)}  # type: ignore[misc]
 
 
-def _ods_rows(path: Path, wanted: int) -> Generator[Row]:
+def _ods_rows(path: Path, wanted: int, limits: Limits) -> Generator[Row]:
     """Yield the rows of a sheet; empty ones only where something comes after them."""
     with zipfile.ZipFile(path) as parts, parts.open("content.xml") as content:
         number, table, empty = -1, None, 0
@@ -190,17 +256,20 @@ def _ods_rows(path: Path, wanted: int) -> Generator[Row]:
                 number, table = number + (event == "start"), element
             elif event == "end" and element.tag == f"{_TABLE}table-row" and table is not None:
                 if number == wanted:
-                    row, times = _ods_cells(element), int(element.get(f"{_TABLE}number-rows-repeated", "1"))
+                    row, times = (
+                        _ods_cells(element, limits.columns),
+                        int(element.get(f"{_TABLE}number-rows-repeated", "1")),
+                    )
                     if row:
-                        for _ in range(min(empty, MOST_CELLS)):
+                        for _ in range(empty):
                             yield ()
-                        for _ in range(min(times, MOST_CELLS)):
+                        for _ in range(times):
                             yield row
                     empty = 0 if row else empty + times
                 table.clear()  # of rows that are read nothing stays
 
 
-def _ods_cells(row: ElementTree.Element) -> Row:
+def _ods_cells(row: ElementTree.Element, most: int) -> Row:
     cells: list[Any] = []
     empty = 0
     for cell in row:
@@ -209,8 +278,10 @@ def _ods_cells(row: ElementTree.Element) -> Row:
             empty += times
             continue
         # one more than may be read is told, not filled in
-        cells += [None] * min(empty, MOST_COLUMNS + 1)
-        cells += [value] * min(times, MOST_COLUMNS + 1)
+        cells += [None] * min(empty, most + 1)
+        cells += [value] * min(times, most + 1)
+        if len(cells) > most:
+            break
         empty = 0
     return tuple(cells)
 

@@ -104,11 +104,11 @@ def split_by_labels(labels: Sequence[object]) -> tuple[Cycle, ...]:
     text = [f"{v:g}" if isinstance(v, float) else str(v) for v in labels]
     starts = [0, *(k for k in range(1, len(text)) if text[k] != text[k - 1])]
     names = [text[k] for k in starts]
-    for k, name in enumerate(names):
-        if name in names[:k]:
-            raise RecordingError(
-                f"cycle {name!r} comes back at row {starts[k]} after another cycle: rename one of them"
-            )
+    seen: set[str] = set()
+    for k, name in zip(starts, names, strict=True):
+        if name in seen:
+            raise RecordingError(f"cycle {name!r} comes back at row {k} after another cycle: rename one of them")
+        seen.add(name)
     return tuple(Cycle(n, a, b) for n, a, b in zip(names, starts, [*starts[1:], len(text)], strict=True))
 
 

@@ -44,6 +44,8 @@ class Rows:
         Cells of further columns that were asked for and are there.
     min_run, min_stop : float
         Shorter runs and stops of the spindle do not split the test into thermal cycles [s].
+    most_cycles : int
+        Thermal cycles it may have.
     aliases : mapping of str to str
         Headings and names without unit to channel names.
     notes : tuple of str
@@ -63,6 +65,7 @@ class Rows:
     extra: dict[str, list[Any]] = field(default_factory=dict)
     min_run: float = 300.0
     min_stop: float = 300.0
+    most_cycles: int = 10_000
     aliases: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()

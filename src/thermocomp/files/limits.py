@@ -1,0 +1,141 @@
+"""What the readers take at most: every limit in one place, so that no file costs more time or memory than it may."""
+
+import stat
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Final
+
+from thermocomp.core.exceptions import InputError, RecordingError
+
+#: bytes that a small file may become when it is unpacked: a few seconds of work
+_UNPACKED_FREE: Final = 64 << 20
+#: what each limit counts, for messages
+_COUNTED: Final = {
+    "file_bytes": "bytes",
+    "line_bytes": "bytes in a line or a text",
+    "cell_characters": "characters in a cell",
+    "heading_characters": "characters in a heading",
+    "columns": "columns",
+    "rows": "rows",
+    "cells": "cells",
+    "skipped_lines": "lines that are no rows (comments, blank lines)",
+    "sheets": "sheets",
+    "sheet_rows": "rows of a sheet",
+    "row_elements": "XML elements in one row or one other part of the workbook",
+    "growth": "times its size when it is unpacked",
+    "cycles": "thermal cycles",
+}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Table ``[limits]``: what is read of a file at most.
+
+    They stand far above what recordings need. Time and memory of reading grow with what they let pass.
+
+    Parameters
+    ----------
+    file_bytes : int
+        Of any file: beyond the memory of a workshop's computer.
+    line_bytes : int
+        Of a line of text, or of a text in a workbook: 10,000 columns of 400 characters.
+    cell_characters : int
+        As many as a cell of a spreadsheet holds; no number and no name is longer.
+    heading_characters : int
+        Headings become names in tables, figures and messages.
+    columns : int
+        Each becomes an object of its own. A machine has some hundred sensors at most.
+    rows : int
+        Three years at one a second.
+    cells : int
+        Rows times columns: 8 bytes each in memory, so 4 GB.
+    skipped_lines : int
+        Comments and blank lines: where they stand is kept, for messages.
+    sheets : int
+        Of a workbook; each is opened to see whether it holds a table.
+    sheet_rows : int
+        As many as a spreadsheet has; a workbook can claim any number in a few bytes.
+    row_elements : int
+        Of the XML of a row, of a list of styles and the like: these are in memory at once.
+    growth : int
+        How many times larger than the file a workbook or a Parquet file may become when it is unpacked, after the
+        first 64 MiB. Recordings become 3 to 30 times larger, a zip bomb 1,000 times.
+    cycles : int
+        Thermal cycles take hours; a column that has more labels numbers something else.
+    """
+
+    file_bytes: int = 8 << 30
+    line_bytes: int = 4_000_000
+    cell_characters: int = 32_767
+    heading_characters: int = 1_000
+    columns: int = 10_000
+    rows: int = 100_000_000
+    cells: int = 500_000_000
+    skipped_lines: int = 1_000_000
+    sheets: int = 100
+    sheet_rows: int = 1_048_576
+    row_elements: int = 200_000
+    growth: int = 100
+    cycles: int = 10_000
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if not getattr(self, f.name) >= 1:
+                raise InputError(f"[limits]: {f.name} = {getattr(self, f.name)}: must be at least 1")
+
+    def check(self, name: str, found: int, where: object) -> None:
+        """Refuse what exceeds a limit.
+
+        Parameters
+        ----------
+        name : str
+            Of the limit.
+        found : int
+            What there is, or what has been counted until it was too much.
+        where : object
+            File and place, for the message.
+
+        Raises
+        ------
+        RecordingError
+            It is more than the limit.
+        """
+        most = getattr(self, name)
+        if found > most:
+            raise RecordingError(
+                f"{where}: over {most:,} {_COUNTED[name]} (at least {found:,}), which are not read: delete what is no "
+                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
+            )
+
+    def check_table(self, rows: int, columns: int, where: object) -> None:
+        """Refuse a table that is too large; see `check`."""
+        self.check("columns", columns, where)
+        self.check("rows", rows, where)
+        self.check("cells", rows * columns, where)
+
+    def check_unpacked(self, unpacked: int, path: Path) -> None:
+        """Refuse a small file that becomes a large one, in bytes; see `check`."""
+        size = max(path.stat().st_size, 1)
+        if unpacked > _UNPACKED_FREE:
+            self.check("growth", -(-(unpacked - _UNPACKED_FREE) // size), path)
+
+
+def check_file(path: Path, limits: Limits) -> None:
+    """Refuse what is no file, such as a pipe or a device (also through a link), and a file that is too large.
+
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Raises
+    ------
+    RecordingError
+        See `Limits.check`.
+    OSError
+        There is nothing of that name.
+    """
+    found = path.stat()
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder says what it is
+        raise RecordingError(f"{path}: is a pipe or a device and no file; write what comes from it into a file")
+    limits.check("file_bytes", found.st_size, path)

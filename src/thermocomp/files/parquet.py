@@ -1,0 +1,180 @@
+"""Parquet files: columns are read in batches, and only after what the file says of its size has been looked at."""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
+from thermocomp.files.limits import Limits
+from thermocomp.files.tables import (
+    EMBEDDED,
+    FileTable,
+    check_headings,
+    clean_heading,
+    first_is_number,
+    load_column,
+)
+
+if TYPE_CHECKING:
+    from pyarrow import Array, RecordBatch
+    from pyarrow.parquet import ParquetFile
+
+_TEXTS = ("string", "large_string", "binary", "large_binary")
+_BATCH = 65_536  # rows that are unpacked at a time
+_BUFFER = 1 << 18  # bytes of a column that are read at a time; else all of a row group are
+#: where pandas keeps what belongs to a table
+_PANDAS, _ATTRIBUTES = b"pandas", b"PANDAS_ATTRS"
+
+
+@dataclass(frozen=True)
+class ParquetTable:
+    """A Parquet file; made by `open_parquet`. A `thermocomp.files.tables.FileTable`.
+
+    Parameters
+    ----------
+    path : Path
+    names : tuple of str
+        Of the columns, as the file has them.
+    headings : tuple of str
+    texts : tuple of str
+        Names of the columns that hold texts.
+    n_rows : int
+    embedded : str
+    limits : Limits
+    notes : tuple of str
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    headings: tuple[str, ...]
+    texts: tuple[str, ...]
+    n_rows: int
+    embedded: str
+    limits: Limits
+    notes: tuple[str, ...] = ()
+
+    def is_number(self, column: int, *, empty: bool = True) -> bool:
+        """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+        for batch in self._batches([column]):
+            filled = batch.column(0).drop_null()
+            if len(filled):
+                return first_is_number(filled.slice(0, 1).to_pandas(), empty=empty)
+        return empty
+
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+        """Read columns; see `thermocomp.files.tables.FileTable.load`."""
+        wanted = [*numbers, *texts]
+        values = {k: np.empty(self.n_rows) for k in numbers}
+        parts: dict[int, list[pd.Series[Any]]] = {k: [] for k in texts}
+        row = size = 0
+        with _translated(self.path):
+            for batch in self._batches(wanted):
+                stop = row + len(batch)
+                size += sum(map(_unpacked, batch.columns))
+                self.limits.check_unpacked(size, self.path)
+                for k, column in zip(wanted, batch.columns, strict=True):
+                    cells = column.to_pandas()
+                    if isinstance(cells.dtype, pd.CategoricalDtype):
+                        cells = cells.astype(object)
+                    if k in values:
+                        values[k][row:stop] = load_column(self, str(self.path), cells, k, row)
+                    else:
+                        parts[k].append(cells)
+                row = stop
+        if row != self.n_rows:
+            raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it anew")
+        data = {**values, **{k: pd.concat(p, ignore_index=True) for k, p in parts.items()}}
+        return pd.DataFrame({k: data[k] for k in wanted}, copy=False)
+
+    def place(self, row: int) -> str:
+        """Say in which row of the file, counted from 1, a row stands."""
+        return f"row {row + 1}"
+
+    def _batches(self, columns: Sequence[int]) -> Iterator["RecordBatch"]:
+        from pyarrow.parquet import ParquetFile
+
+        names = [self.names[k] for k in columns]
+        with (
+            _translated(self.path),
+            ParquetFile(self.path, read_dictionary=list(self.texts), buffer_size=_BUFFER, pre_buffer=False) as file,
+        ):
+            for batch in file.iter_batches(_BATCH, columns=names, use_threads=False):
+                yield batch.select(names)
+
+
+@contextmanager
+def _translated(path: Path) -> Iterator[None]:
+    """Make a `RecordingError` of whatever a damaged file makes of the library."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as e:
+        raise RecordingError(
+            f"{path}: is not a Parquet file, or a damaged one ({type(e).__name__}: {e}); write it anew"
+        ) from e
+
+
+def open_parquet(path: Path, limits: Limits) -> FileTable:
+    """Open a Parquet file.
+
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Raises
+    ------
+    RecordingError
+        It is not a Parquet file, holds no recording, or is over a limit.
+    """
+    try:
+        from pyarrow.parquet import ParquetFile
+    except ImportError as e:
+        raise MissingExtraError("study", "pyarrow") from e
+    with _translated(path), ParquetFile(path) as file:
+        about, schema = file.metadata, file.schema_arrow
+        limits.check_table(about.num_rows, about.num_columns, path)
+        packed = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+        limits.check_unpacked(max(packed, 8 * about.num_rows * about.num_columns), path)
+        if len(set(schema.names)) < len(schema.names):
+            raise RecordingError(f"{path}: two columns have one name; rename one of them")
+        names = _names(file)
+        texts = [f.name for f in schema if str(f.type) in _TEXTS]
+        embedded = _embedded(schema.metadata or {})
+    headings = [clean_heading("index" if name == "__index_level_0__" else name) for name in names]
+    check_headings(path, headings, about.num_rows, limits)
+    return ParquetTable(path, tuple(names), tuple(headings), tuple(texts), about.num_rows, embedded, limits)
+
+
+def _names(file: "ParquetFile") -> list[str]:
+    """Return the names of the columns, those that pandas keeps as an index in front, as it shows them."""
+    names = list(file.schema_arrow.names)
+    about = json.loads((file.schema_arrow.metadata or {}).get(_PANDAS, b"{}"))
+    index = [name for name in about.get("index_columns", ()) if isinstance(name, str) and name in names]
+    return index + [name for name in names if name not in set(index)]
+
+
+def _embedded(metadata: dict[bytes, bytes]) -> str:
+    """Return thermocomp's own description, from the file's metadata or from those of a table in pandas."""
+    own = metadata.get(EMBEDDED.encode())
+    if own is not None:
+        return own.decode("utf-8", "replace")
+    return str(json.loads(metadata.get(_ATTRIBUTES, b"{}")).get(EMBEDDED, ""))
+
+
+def _unpacked(column: "Array") -> int:
+    """Return the bytes that a column takes when each cell has its own text."""
+    import pyarrow.compute as pc
+    from pyarrow import DictionaryArray
+
+    if isinstance(column, DictionaryArray) and str(column.type.value_type) in _TEXTS:
+        lengths = pc.binary_length(column.dictionary)
+        return int(pc.sum(lengths.take(column.indices)).as_py() or 0)
+    return int(column.nbytes)
