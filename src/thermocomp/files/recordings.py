@@ -15,8 +15,9 @@ from pydantic import ValidationError
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import understand
 from thermocomp.core.machine import Channel
-from thermocomp.files.columns import ColumnPlan, plan, why_left_out
+from thermocomp.files.columns import ColumnPlan, plan
 from thermocomp.files.draft import draft
+from thermocomp.files.leftout import refuse_nameless, why_left_out
 from thermocomp.files.mapping import ADAPTER, ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.tables import EMBEDDED, FileTable, open_parquet
 from thermocomp.files.textfile import open_csv
@@ -132,23 +133,26 @@ def read_rows(
         mapping = mapping.over(_described(table.embedded, source))
     columns = plan(table.headings, mapping, str(source))
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
-    numbers = [c.index for c in columns.columns] + ([] if is_stamp else [columns.time])
+    numbers = [c.index for c in columns.columns]
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
-    texts = [
-        k for k in (columns.time if is_stamp else None, columns.date, columns.cycle, *more.values()) if k is not None
-    ]
-    cells = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
-    notes = [*table.notes, *columns.notes]
-    time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
-    if not is_stamp and not columns.time_unit:
-        notes.append(f"{table.headings[columns.time]!r} has no unit and is taken as seconds")
+    if is_stamp and columns.fraction is not None:
+        numbers.append(columns.fraction)
+    times = [columns.time, *columns.beside]
+    numbers += [] if is_stamp else times
+    texts = [k for k in (*(times if is_stamp else ()), columns.date, columns.cycle, *more.values()) if k is not None]
+    cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
+    notes = [*table.notes, *columns.notes, *told]
+    time, start, told = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    notes.extend(told)
     data = {}
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
+        column.refuse_doubtful(raw, table.headings[column.index], str(source))
         data[column.channel.name], found = column.convert(raw, mapping.read.missing, table.place)
         notes.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
+    refuse_nameless([table.headings[k] for k in numeric], str(source))
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric)
     texts_only = [table.headings[k] for k in left_out if k not in numeric]
     if texts_only:

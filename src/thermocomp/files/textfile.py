@@ -3,20 +3,35 @@
 import csv
 import re
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
+from thermocomp.files.encodings import bring_to_utf8, find_encoding
+from thermocomp.files.layout import (
+    MOST_REMARKS,
+    Layout,
+    find_end,
+    find_layout,
+    find_value_columns,
+    find_width,
+    join_units,
+    name_stamps,
+    tell_layout,
+    tell_rows,
+)
 from thermocomp.files.mapping import ReadOptions
-from thermocomp.files.tables import EMBEDDED, MISSING_TEXT, check_headings, is_float, not_numbers, refuse_cell
+from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
+from thermocomp.files.tables import EMBEDDED, check_headings, convert, decide, tell_notation
 
 #: bytes of a line that are read at most
 MOST_LINE = 4_000_000
@@ -25,7 +40,6 @@ _CHUNK = 100_000  # rows that are text in memory at a time
 _BOM = b"\xef\xbb\xbf"
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
 _SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
-_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 # pandas before 3.1 may read the last digit wrong unless told
 _PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
 _EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round_trip"}
@@ -43,58 +57,87 @@ class CsvTable:
         Cells of the first rows.
     delimiter : str
         One character; a space stands for any white space.
-    decimals : str
-        Decimal signs to try, in this order.
+    decimal : str
+        Decimal sign, if it is known beforehand.
     encoding : str
+    errors : {'strict', 'replace'}
+        What is done about bytes that are none of that encoding.
     skipped : tuple of int
         Lines that are no rows (headings, comments, blank ones), from 0.
     n_rows : int
     embedded : str
     notes : tuple of str
+    data : bytes or None
+        The whole file in UTF-8, where it had to be brought to that.
     """
 
     path: Path
     headings: tuple[str, ...]
     sample: tuple[tuple[str, ...], ...]
     delimiter: str
-    decimals: str
+    decimal: str
     encoding: str
+    errors: str
     skipped: tuple[int, ...]
     n_rows: int
     embedded: str
     notes: tuple[str, ...] = ()
+    data: bytes | None = None
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if the first rows have none."""
-        cells = (row[column].strip() for row in self.sample if column < len(row))
-        first = next((c for c in cells if c.casefold() not in MISSING_TEXT), None)
-        return empty if first is None else is_float(first.replace(",", "."))
+        cells = (row[column] for row in self.sample if column < len(row))
+        first = next((c for c in cells if not is_filler(c)), None)
+        return empty if first is None else is_number_like(first)
 
-    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `thermocomp.files.tables.FileTable.load`."""
+        signs = Signs()
+        for row in self.sample:
+            signs.add(row[k] for k in numbers if k < len(row))
+        decimal = self.decimal or ("," if signs.proven[","] > signs.proven["."] else ".")
+        if self.decimal or signs.proven or (self.delimiter == "," and not signs.open):
+            with suppress(ValueError):
+                return self._load_plain(numbers, texts, decimal), tell_notation(Notation(decimal))
+        return self._load_anyhow(numbers, texts)
+
+    def _load_plain(self, numbers: Sequence[int], texts: Sequence[int], decimal: str) -> pd.DataFrame:
+        """Read columns of numbers that are all written in one way; a ValueError if they are not."""
         types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
-        options = self._options(types)
-        failure: ValueError = ValueError("nothing tried")
-        for decimal in self.decimals:
-            try:
-                with pd.read_csv(self.path, decimal=decimal, **options, **_EXACT) as chunks:
-                    frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
-                if len(frame) != self.n_rows:
-                    raise RecordingError(
-                        f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
-                        "goes over the end of its line; close it, or delete the mark"
-                    )
-                return frame
-            except UnicodeDecodeError as e:
-                raise RecordingError(
-                    f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
-                    "[read] encoding"
-                ) from e
-            except ValueError as e:
-                failure = e
-        with suppress(ValueError):  # pandas' own reasons; what is wrong with a cell comes as a RecordingError
-            self._refuse_text(numbers, failure)
-        raise RecordingError(f"{self.path}: cannot be read as a table: {failure}") from failure
+        return self._read_frame(types, decimal=decimal, **_EXACT)
+
+    def _load_anyhow(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read columns cell by cell: slowly, with whatever may stand in place of a number."""
+        try:
+            frame = self._read_frame(dict.fromkeys((*texts, *numbers), str))
+        except ValueError as e:
+            raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
+        signs = Signs()
+        for k in numbers:
+            signs.add(frame[k].dropna())
+        notation = decide(signs, self.decimal, self.delimiter, str(self.path))
+        notes = tell_notation(notation)
+        for k in numbers:
+            values, found = convert(self, str(self.path), k, frame[k], notation)
+            frame[k] = values
+            notes += found
+        return frame, notes
+
+    def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
+        try:
+            with pd.read_csv(BytesIO(self.data) if self.data else self.path, **self._options(types), **more) as chunks:
+                frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
+        except UnicodeDecodeError as e:
+            raise RecordingError(
+                f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
+                "[read] encoding"
+            ) from e
+        if len(frame) != self.n_rows:
+            raise RecordingError(
+                f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
+                "goes over the end of its line; close it, or delete the mark"
+            )
+        return frame
 
     def place(self, row: int) -> str:
         """Say in which line of the file, counted from 1, a row stands."""
@@ -114,20 +157,11 @@ class CsvTable:
             "skiprows": list(self.skipped),
             "skipinitialspace": True,
             "encoding": self.encoding,
+            "encoding_errors": self.errors,
             "chunksize": _CHUNK,
             "keep_default_na": False,
             "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
         }
-
-    def _refuse_text(self, numbers: Sequence[int], cause: Exception) -> None:
-        """Name the first cell that is not a number; slow, but only met on the way to an error."""
-        with pd.read_csv(self.path, **self._options(dict.fromkeys(numbers, str))) as chunks:
-            for chunk in chunks:
-                bad = np.logical_and.reduce([_not_numbers(chunk, decimal) for decimal in self.decimals])
-                if bad.any():
-                    row, k = (int(v) for v in np.argwhere(bad)[0])
-                    column: Any = chunk.columns[k]
-                    refuse_cell(self, str(self.path), int(chunk.index[row]), column, chunk.iloc[row, k], cause)
 
 
 def open_csv(path: Path, options: ReadOptions) -> CsvTable:
@@ -144,57 +178,108 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     RecordingError
         Empty, binary, no heading line, no rows, one column, or rows of unequal length.
     """
-    _refuse_binary(path)
+    data, told = bring_to_utf8(path)
+    _refuse_binary(path, data)
     comment = options.comment.encode()
     skipped: list[int] = []
     top = options.heading - 1
-    first = list(islice((c for c in _content(path, comment, []) if c[0] >= top), _SAMPLE_LINES))
+    first = list(islice((c for c in _content(path, data, comment, []) if c[0] >= top), _SAMPLE_LINES))
     if not first:
         raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
     sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
-    delimiter, layout = _find_table(sample, options.delimiter or _separator(path))
+    delimiter, layout = _find_table(sample, options.delimiter or _separator(path, data))
+    in_remark = layout is None and (remark := _remark_above(path, data, comment, first[0][0])) is not None
+    if in_remark:  # headings behind #, as numpy writes them
+        first, sample = [remark, *first], [remark[1].decode("utf-8", "replace"), *sample]
+        delimiter, layout = _find_table(sample, delimiter)
+    layout = layout or Layout(0, 0, 1)
+    heading, begin = first[layout.heading][1], layout.begin
     ending = delimiter.encode()
-    heading, begin = first[layout.heading][1], 1 + max(layout)
-    width, is_utf8, n_rows = _cells(heading, delimiter), True, -begin
-    for number, line in _content(path, comment, skipped):
-        is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
+    width, odd, n_rows, again = _cells(heading, delimiter), list[bytes](), int(in_remark) - begin, list[int]()
+    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
+    for number, line in _content(path, data, comment, skipped):
+        if not line.isascii() and len(odd) < _SAMPLE_LINES and not _is_utf8(line):
+            odd.append(line)
         n_rows += number >= top
         if n_rows <= 0:  # what stands above the rows
             skipped.append(number)
             continue
+        if line == heading:  # of a logger that was started again
+            skipped.append(number)
+            again.append(number + 1)
+            n_rows -= 1
+            continue
         cells = _cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        if cells != width:
-            raise RecordingError(_ragged(path, number + 1, cells, width, line, delimiter))
-    encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
+        tail.append((number, line))
+        if cells != width and ragged is None:
+            ragged = number, _ragged(path, number + 1, cells, width, line, delimiter)
+    encoding = options.encoding or (find_encoding(odd) if odd else "utf-8")
+
+    def split(line: bytes, errors: str = "replace") -> list[str]:
+        return _split(line.decode(encoding, errors), delimiter)
+
+    rows = [split(line) for _, line in first[begin:]]
+    last = [split(line) for _, line in tail]
+    n_last = min(find_end(last, find_value_columns(rows, find_width(rows)), width), n_rows - 1) if rows else 0
+    remarks = [number for number, _ in tail][len(tail) - n_last :]
+    if ragged and not (remarks and ragged[0] >= remarks[0]):
+        raise RecordingError(ragged[1])
+    skipped = sorted((*skipped, *remarks))
     try:
-        headings = [h.strip() for h in _split(heading.decode(encoding), delimiter)]
+        headings = [h.strip() for h in split(heading, "strict" if options.encoding else "replace")]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
     headings += [""] * (width - len(headings))
     check_headings(path, headings, n_rows)
-    if layout.units > layout.heading:
-        headings = join_units(headings, _split(first[layout.units][1].decode(encoding), delimiter))
-    rows = tuple(tuple(_split(line, delimiter)) for line in sample[begin:])
+    if layout.units != layout.heading:
+        headings = join_units(headings, split(first[layout.units][1]))
+    headings, named = name_stamps(headings, rows)
+    numbers = [number + 1 for number, _ in first]
+    if odd and not options.encoding:
+        told = (*told, f"written in {encoding}, not in UTF-8")
+    if again:
+        places = ", ".join(map(str, again[:MOST_REMARKS])) + " ..." * (len(again) > MOST_REMARKS)
+        named = (*named, f"the headings come again, passed over, in line {places}")
+    if remarks:
+        end = [number + 1 for number in remarks]
+        named = (*named, f"{tell_rows(end, 'line')} at the end {'is' if n_last == 1 else 'are'} no row of the table, and left out")
     return CsvTable(
         path=path,
+        data=data,
         headings=tuple(headings),
-        sample=rows,
+        sample=tuple(map(tuple, rows)),
         delimiter=delimiter,
-        decimals=options.decimal or _sniff_decimal(rows, delimiter),
+        decimal=options.decimal,
         encoding=encoding,
+        errors="strict" if options.encoding else "replace",
         skipped=tuple(skipped),
-        n_rows=n_rows,
+        n_rows=n_rows - n_last,
         embedded=_embedded(path),
-        notes=tell_layout([number + 1 for number, _ in first], layout, "line"),
+        notes=(*told, *tell_layout(numbers, layout, "line"), *named),
     )
 
 
-def _content(path: Path, comment: bytes, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
+def _open(path: Path, data: bytes | None) -> BinaryIO:
+    return path.open("rb") if data is None else BytesIO(data)
+
+
+def _remark_above(path: Path, data: bytes | None, comment: bytes, end: int) -> tuple[int, bytes] | None:
+    """Return number and text of the last comment line above a line."""
+    found = None
+    with _open(path, data) as f:
+        for number, raw in enumerate(islice(f, end)):
+            line = raw.removeprefix(_BOM).lstrip()
+            if comment and line.startswith(comment):
+                found = number, line.lstrip(comment + b" ")
+    return found
+
+
+def _content(path: Path, data: bytes | None, comment: bytes, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
     """Yield number and text of each line that is neither blank nor a comment; tell the others in `skipped`."""
     blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
-    with path.open("rb") as f:
+    with _open(path, data) as f:
         for number, raw in enumerate(f):
             if len(raw) > MOST_LINE:
                 raise RecordingError(
@@ -223,11 +308,9 @@ def _embedded(path: Path) -> str:
     return line.removeprefix(start).decode("utf-8", "replace").strip() if line.startswith(start) else ""
 
 
-def _refuse_binary(path: Path) -> None:
-    with path.open("rb") as f:
+def _refuse_binary(path: Path, data: bytes | None) -> None:
+    with _open(path, data) as f:
         head = f.read(65536)
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise RecordingError(f"{path}: is written in UTF-16; save it as UTF-8 (in a spreadsheet: CSV UTF-8)")
     kinds = {b"PK\x03\x04": "a workbook or zip file", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file"}
     kind = next((k for magic, k in kinds.items() if head.startswith(magic)), "")
     if kind or b"\x00" in head:
@@ -236,39 +319,27 @@ def _refuse_binary(path: Path) -> None:
         )
 
 
-def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout]:
+def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout | None]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
-    best, best_layout, best_fit = delimiter or ",", Layout(0, 0), (False, 0.0, 0)
+    best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
     for tried in delimiter or "\t;|, ":
         if tried == " " and best_fit > (False, 0.0, 0) and not delimiter:
             continue  # white space stands inside headings and timestamps too: the last resort
         rows = [_split(line, tried) for line in lines]
         found = find_layout(rows)
-        layout = found or Layout(0, 0)
-        width = len(rows[layout.heading])
-        fits = [len(row) in (width, width + 1) for row in rows[1 + max(layout) :]]
+        width = len(rows[found.heading if found else 0])
+        fits = [len(row) in (width, width + 1) for row in rows[found.begin if found else 1 :]]
         fit = (found is not None, sum(fits) / len(fits) if fits else 1.0, width)
         if delimiter or (width > 1 and fit > best_fit and (fit[1] > 0 or tried != " ")):
-            best, best_layout, best_fit = tried, layout, fit
+            best, best_layout, best_fit = tried, found, fit
     return best, best_layout
 
 
-def _separator(path: Path) -> str:
+def _separator(path: Path, data: bytes | None) -> str:
     """Return the delimiter that a spreadsheet writes into the first line of a file (``sep=;``), if it does."""
-    with path.open("rb") as f:
+    with _open(path, data) as f:
         found = _SEPARATOR.fullmatch(f.readline(16))
     return found[1].decode() if found else ""
-
-
-def _sniff_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
-    if delimiter == ",":
-        return "."
-    cells = [c.strip() for row in rows for c in row]
-    points = sum(_POINT.fullmatch(c) is not None for c in cells)
-    commas = sum("." not in c and _POINT.fullmatch(c.replace(",", ".", 1)) is not None for c in cells)
-    if points == commas == 0:
-        return ".,"  # whole numbers so far: try both
-    return "," if commas > points else "."
 
 
 def _split(line: str, delimiter: str) -> list[str]:
@@ -294,13 +365,6 @@ def _ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimi
     if not line.endswith(b"\n"):
         return f"{text}; it is the last line, perhaps cut off while it was written: complete or delete it"
     return f"{text}; complete or delete the line"
-
-
-def _not_numbers(cells: pd.DataFrame, decimal: str) -> Any:
-    if decimal == ",":
-        # a point is no part of a number where the comma is the decimal sign
-        cells = cells.apply(lambda c: c.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False))
-    return cells.apply(not_numbers).to_numpy()
 
 
 def _is_utf8(line: bytes) -> bool:

@@ -119,10 +119,10 @@ def _table(path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], o
         content.append(row)
     if not content:
         raise RecordingError(f"{path}: sheet {name!r} is empty; a recording has a heading row and rows of numbers")
-    layout = find_layout(_sample(iter(content))) or Layout(0, 0)
-    begin = 1 + max(layout)
+    layout = find_layout(_sample(iter(content))) or Layout(0, 0, 1)
+    begin = layout.begin
     headings = [_text(cell).strip() for cell in content[layout.heading]]
-    if layout.units > layout.heading:
+    if layout.units != layout.heading:
         headings = join_units(headings, [_text(cell) for cell in content[layout.units]])
     below = content[begin:]
     width = max(map(len, below), default=0)
