@@ -208,7 +208,9 @@ def test_a_long_file_is_read_in_parts(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_numbers_without_a_unit_of_time_are_asked_for(tmp_path: Path) -> None:
     path = _csv(tmp_path, "time,t1_C\n0,1\n1,2\n")
-    with pytest.raises(RecordingError, match=r"'time' holds numbers from 0 to 1 and says no unit.*time \[s\].*unit = \"s\""):
+    with pytest.raises(
+        RecordingError, match=r"'time' holds numbers from 0 to 1 and says no unit.*time \[s\].*unit = \"s\""
+    ):
         read(path)
     assert read(path, Mapping(TimeColumn("time", unit="min"))).time.tolist() == [0.0, 60.0]
 

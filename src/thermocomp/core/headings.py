@@ -17,17 +17,89 @@ SUFFIXES = {
 }
 #: what may stand behind a name without brackets, as in "T1 °C", "T1 in °C", "T1 / °C" and "T1, °C": no letter alone
 _BEHIND = re.compile(
-    r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|[dD]eg\.? ?|DEG ?|Grad )[CF]|℃|(?:[cC]elsius|CELSIUS)"
+    r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|[dD]eg\.? ?|DEG ?|Grad "
+    r")[CF]|℃|(?:[cC]elsius|CELSIUS)"
     r"|(?:\d[\d.,/]* ?)?(?:[µμu]m|mm|UM|MM)|[µμ]rad|rpm|RPM|(?:U|1|r|tr|rev)/(?:min|MIN)|(?:min|MIN)(?:-1|\^-1|⁻¹))"
     r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
 )
 #: units of what is no use here; they are no slips of the pen
 _OTHERS = frozenset(
     (
-        *("%", "°", "deg", "grad", "rad", "rev", "v", "mv", "vdc", "vac", "a", "ma", "adc", "aac", "w", "kw", "va", "wh", "kwh"),
-        *("n", "kn", "nm", "ncm", "bar", "mbar", "pa", "kpa", "mpa", "hpa", "psi", "l/min", "l/h", "m3/h", "ml/min", "gpm"),
-        *("kg", "g", "mg", "ohm", "ω", "kohm", "kω", "mm/s", "m/s", "mm/rev", "g/m3", "db", "dba", "khz", "mhz", "%rh", "%rf"),
-        *("% rh", "% rf", "bit", "inc", "counts", "digits", "w/m2", "j", "kj", "var", "cos phi", "ppm", "1/k", "um/s", "rad/s"),
+        *(
+            "%",
+            "°",
+            "deg",
+            "grad",
+            "rad",
+            "rev",
+            "v",
+            "mv",
+            "vdc",
+            "vac",
+            "a",
+            "ma",
+            "adc",
+            "aac",
+            "w",
+            "kw",
+            "va",
+            "wh",
+            "kwh",
+        ),
+        *(
+            "n",
+            "kn",
+            "nm",
+            "ncm",
+            "bar",
+            "mbar",
+            "pa",
+            "kpa",
+            "mpa",
+            "hpa",
+            "psi",
+            "l/min",
+            "l/h",
+            "m3/h",
+            "ml/min",
+            "gpm",
+        ),
+        *(
+            "kg",
+            "g",
+            "mg",
+            "ohm",
+            "ω",
+            "kohm",
+            "kω",
+            "mm/s",
+            "m/s",
+            "mm/rev",
+            "g/m3",
+            "db",
+            "dba",
+            "khz",
+            "mhz",
+            "%rh",
+            "%rf",
+        ),
+        *(
+            "% rh",
+            "% rf",
+            "bit",
+            "inc",
+            "counts",
+            "digits",
+            "w/m2",
+            "j",
+            "kj",
+            "var",
+            "cos phi",
+            "ppm",
+            "1/k",
+            "um/s",
+            "rad/s",
+        ),
     )
 )
 # In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
@@ -43,20 +115,57 @@ _TURNING = ("spindle", "speed", "spindel", "drehzahl", "broche", "mandrin", "hus
 _NAMES = {
     "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "temperature": re.compile(r"t\d+|tc ?\d+|.*\btemp(?:\b|[ _.\d]|er).*|.*temperatur.*"),
-    "displacement": re.compile(r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"),
+    "displacement": re.compile(
+        r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"
+    ),
 }
 #: what counts from another temperature, and is no temperature
-_DIFFERENCE = re.compile(r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I)
+_DIFFERENCE = re.compile(
+    r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
+)
 #: headings of a time column, without their unit, in several languages
 _TIMES = frozenset(
     (
         *("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed", "zeit", "zeitstempel", "messzeit"),
-        *("laufzeit", "temps", "horodatage", "tempo", "tiempo", "timestamps", "time stamp", "date time", "elapsed time"),
+        *(
+            "laufzeit",
+            "temps",
+            "horodatage",
+            "tempo",
+            "tiempo",
+            "timestamps",
+            "time stamp",
+            "date time",
+            "elapsed time",
+        ),
         *("date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit", "datum und uhrzeit", "date/heure", "fecha/hora"),
         *("data/ora", "date and time", "date & time", "date&time", "datumzeit", "datum_uhrzeit", "datetime64", "_time"),
         *("zeitpunkt", "time (utc)", "utc", "utc time", "local time", "run time", "test time", "epoch", "unix time"),
-        *("unix", "dauer", "duration", "durée", "durata", "duración", "czas", "čas", "tijd", "tid", "time of measurement"),
-        *("dattim", "date time stamp", "datum", "fecha", "data", "tag", "day", "messzeitpunkt", "abs. time", "rel. time"),
+        *(
+            "unix",
+            "dauer",
+            "duration",
+            "durée",
+            "durata",
+            "duración",
+            "czas",
+            "čas",
+            "tijd",
+            "tid",
+            "time of measurement",
+        ),
+        *(
+            "dattim",
+            "date time stamp",
+            "datum",
+            "fecha",
+            "data",
+            "tag",
+            "day",
+            "messzeitpunkt",
+            "abs. time",
+            "rel. time",
+        ),
         *("absolute time", "relative time", "relativzeit", "absolutzeit", "uhrzeit", "clock", "time of day", "x_value"),
     )
 )
@@ -96,44 +205,12 @@ def understand(heading: str) -> Meaning | None:
         The brackets hold what looks like a mistyped unit.
     """
     heading = strip_heading(heading)
-    found = BRACKETS.fullmatch(heading)
-    earlier = _EARLIER.fullmatch(heading)
-    if earlier and is_unit(earlier["unit"]) and not (found and is_unit(found["square"] or found["round"] or "")):
-        heading, found = f"{earlier['before']} {earlier['after']}".strip(), None
-        base, meant = heading, find_unit(earlier["unit"])
-    elif found:
-        base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
-        turning = any(word in base.casefold() for word in _TURNING)
-        if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
-            return None
-        symbol = SUFFIXES.get(symbol, symbol)
-        if symbol == "m" and is_time_name(base):
-            raise UnitError("'m' stands for metres; minutes are min")
-        try:
-            meant = find_unit(symbol)
-        except UnitError:
-            # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-            if symbol.casefold() in _OTHERS or _FORMAT.fullmatch(symbol):
-                return None
-            words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
-            if words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
-                raise
-            return None
-    else:
-        ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
-        behind = _BEHIND.fullmatch(heading)
-        if ends:
-            suffix = max(ends, key=len)
-            base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
-        elif behind:
-            base, meant = behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
-        elif is_unit(heading) and find_unit(heading).symbol == "1/min":
-            base, meant = "spindle", find_unit(heading)  # a column that is called RPM
-        else:
-            return None
-    if meant.symbol == "K" and _DIFFERENCE.fullmatch(base):
+    said = _in_brackets(heading) if "[" in heading or "(" in heading else _behind(heading)
+    if said is None:
         return None
-    if meant.quantity == "time" and find_named_quantity(base):
+    base, meant = said
+    difference = meant.symbol == "K" and _DIFFERENCE.fullmatch(base)
+    if difference or (meant.quantity == "time" and find_named_quantity(base)):
         return None  # T1_min is the least of T1
     if meant.quantity == "displacement" and _is_position(base, meant.symbol):
         meant = find_unit(meant.symbol, "position")
@@ -146,6 +223,46 @@ def _is_position(base: str, symbol: str) -> bool:
     if any(w in ("pos", "position") for w in words):
         return True
     return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)
+
+
+def _in_brackets(heading: str) -> tuple[str, Unit] | None:
+    """Return name and unit of a heading with brackets: ``T1 [degC]``, ``[degC] T1``, ``T1 [degC] (front)``."""
+    found, earlier = BRACKETS.fullmatch(heading), _EARLIER.fullmatch(heading)
+    symbol = (found["square"] or found["round"] or "").strip() if found else ""
+    if earlier and is_unit(earlier["unit"]) and not (symbol and is_unit(symbol)):
+        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(earlier["unit"])
+    if found is None:
+        return _behind(heading)
+    base = found["base"]
+    turning = any(word in base.casefold() for word in _TURNING)
+    if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
+        return None
+    symbol = SUFFIXES.get(symbol, symbol)
+    if symbol == "m" and is_time_name(base):
+        raise UnitError("'m' stands for metres; minutes are min")
+    try:
+        return base, find_unit(symbol)
+    except UnitError:
+        # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
+        other = symbol.casefold() in _OTHERS or _FORMAT.fullmatch(symbol)
+        words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
+        if not other and (words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)):
+            raise
+        return None
+
+
+def _behind(heading: str) -> tuple[str, Unit] | None:
+    """Return name and unit of a heading without brackets: ``t1_C``, ``T1 degC``, ``RPM``."""
+    ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
+    if ends:
+        suffix = max(ends, key=len)
+        return heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
+    behind = _BEHIND.fullmatch(heading)
+    if behind:
+        return behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
+    if is_unit(heading) and find_unit(heading).symbol == "1/min":  # a column that is called RPM
+        return "spindle", find_unit(heading)
+    return None
 
 
 def strip_heading(heading: str) -> str:

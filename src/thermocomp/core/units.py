@@ -107,7 +107,8 @@ _WORDS = {
         "h": "hr hrs hour hours std stunde stunden heure heures ore horas",
         "d": "day days tag tage jour jours",
         "ms": "msec millisecond milliseconds millisekunden",
-        "degC": "celsius grad_c grad_celsius grd_c deg_c degc deg._c degree_c degrees_c degree_celsius degrees_celsius oc "
+        "degC": "celsius grad_c grad_celsius grd_c deg_c degc deg._c degree_c degrees_c degree_celsius "
+        "degrees_celsius oc "
         "°celsius cel gradi_c degrés_c grados_c",
         "K": "kelvin",
         "degF": "fahrenheit deg_f degf degrees_f degree_f",
@@ -117,7 +118,8 @@ _WORDS = {
         "in": "inch inches zoll",
         "mil": "mils thou",
         "uin": "uinch microinch microinches uinches u_in",
-        "1/min": "1/min rpm r/min rev/min revs/min u/min u_/_min upm umdr/min /min min-1 min^-1 1/minute tr/min giri/min "
+        "1/min": "1/min rpm r/min rev/min revs/min u/min u_/_min upm umdr/min /min min-1 min^-1 1/minute tr/min "
+        "giri/min "
         "rot/min obr/min ot/min o/min r.p.m umdr./min umdrehungen/min revolutions/min min**-1 min_-1",
         "1/s": "rps rev/s u/s s-1 s^-1",
         "mm/s2": "mm/s^2",
@@ -128,7 +130,9 @@ _WORDS = {
 #: all spellings of words
 SPELLINGS = tuple(_WORDS)
 #: signs that stand for others, or are what a wrong encoding makes of them
-_SIGNS = str.maketrans({"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "³": "3", "·": "*", "×": "*"})
+_SIGNS = str.maketrans(
+    {"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "³": "3", "·": "*", "×": "*"}
+)
 #: a count of a unit, such as 0.001 mm, 1/1000 mm, 10 um
 _COUNT = re.compile(r"(\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)(?:/(\d+))? ?\*? ?([^\d\s/*].*)")
 #: powers of ten in all their spellings: 10^-3 mm, 10-3 mm, 10**3 rpm, E-3 mm, x1000 rpm

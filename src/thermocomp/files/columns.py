@@ -19,11 +19,10 @@ from thermocomp.core.headings import (
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.files.mapping import ColumnMap, Mapping, Place
+from thermocomp.files.tables import tell_places
 
 FloatArray = NDArray[np.float64]
 
-#: places of cells that are listed
-_MOST_TOLD = 40
 #: below this no absolute temperature of a machine lies [K]
 _COLDEST = 200.0
 _SCPI_INFINITY = 9.9e37
@@ -34,8 +33,8 @@ _BARE = (
     *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
     *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
 )
-#: those that hold a number only if they say in which unit
-_NEEDS_UNIT = ("t", "elapsed", "data", "tag", "day")
+#: those that mean a time only beside a unit or another one
+_NEEDS_UNIT = ("t", "data", "tag", "day")
 #: headings of a date, and of the time of day beside it
 _DATES = ("date", "datum", "fecha", "data", "tag", "day")
 _CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
@@ -69,7 +68,8 @@ class Column:
         if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
             raise RecordingError(
                 f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
-                f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = "degC", '
+                f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = '
+                f'"degC", '
                 'or role = "ignore"'
             )
 
@@ -101,10 +101,9 @@ class Column:
             if beyond.size:
                 values = np.array(values)
                 values[beyond] = np.nan
-                where = ", ".join(place(int(k)) for k in beyond[:_MOST_TOLD]) + " ..." * (beyond.size > _MOST_TOLD)
                 notes.append(
                     f"{self.channel.name}: not within {low:g} to {high:g} {self.unit.symbol}, taken as missing, in "
-                    f"{beyond.size} of {len(raw)} cells: {where}"
+                    f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
                 )
         values = values if self.unit.scale == 1 else values * self.unit.scale
         return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
@@ -337,15 +336,24 @@ def _mapped(mapping: Mapping) -> set[Place]:
 def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: str = "") -> None:
     """Refuse columns of one heading, unless it is that of the time or the mapping names them by number."""
     numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
-    firsts: dict[str, int] = {}
-    for k, heading in enumerate(headings):
-        first = firsts.setdefault(heading, k)
+    places: dict[str, list[int]] = {}
+    for k, heading in enumerate(headings, start=1):
+        places.setdefault(heading, []).append(k)
+    found = {}
+    for heading, twins in places.items():
         alone = mapping.read.only_mapped and heading not in numbered
-        if heading not in ("", time) and first < k and not alone and not numbered.issuperset((first + 1, k + 1)):
-            raise RecordingError(
-                f"{source}: columns {first + 1} and {k + 1} are both named {heading!r}; rename one of them, or name "
-                f"both by number in a mapping, such as [columns.NAME] column = {k + 1}"
-            )
+        if heading not in ("", time) and len(twins) > 1 and not alone and not numbered.issuperset(twins):
+            found[heading] = twins
+    if found:
+        told = ", ".join(
+            f"columns {' and '.join(map(str, twins))} are {'both' if len(twins) == 2 else 'all'} named {heading!r}"
+            for heading, twins in found.items()
+        )
+        number = next(iter(found.values()))[1]
+        raise RecordingError(
+            f"{source}: {told}; rename them, or name each by number in a mapping, such as [columns.NAME] column = "
+            f"{number}"
+        )
 
 
 def _position(heading: Place, headings: Sequence[str], table: str, source: str) -> int:

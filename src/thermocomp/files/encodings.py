@@ -45,9 +45,11 @@ def bring_to_utf8(path: Path) -> tuple[bytes | None, tuple[str, ...]]:
         return None, ()
     if path.stat().st_size > MOST_BYTES:
         what = "is written in UTF-16" if encoding else "has the line ends of an old Macintosh"
-        raise RecordingError(f"{path}: {what} and has over {MOST_BYTES >> 30} GB; save it as UTF-8, lines ending as in Unix")
+        raise RecordingError(
+            f"{path}: {what} and has over {MOST_BYTES >> 30} GB; save it as UTF-8, lines ending as in Unix"
+        )
     data = path.read_bytes()
-    notes = ()
+    notes: tuple[str, ...] = ()
     if encoding:
         try:
             data = data.decode(encoding).removeprefix("\ufeff").encode()

@@ -11,7 +11,8 @@ from thermocomp.files.numbers import is_filler, is_number_like
 
 #: dates and times of day, in all their habits
 _TIME = re.compile(
-    r"'?(?:\d{1,4}[-./ ] ?(?:\d{1,2}|[^\W\d_]{3,9}\.?)[-./ ] ?\d{1,4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}|(?:\d+ days? )?\d{1,4}:\d\d)"
+    r"'?(?:\d{1,4}[-./ ] ?(?:\d{1,2}|[^\W\d_]{3,9}\.?)[-./ ] ?\d{1,4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
+    r"|(?:\d+ days? )?\d{1,4}:\d\d)"
     r"(?!\d)[-\dT.,:+ ]*(?:[AaPp]\.?[Mm]\.?)?(?: ?[A-Z]{1,4})?(?:[+-]\d\d:?\d\d)?|\d{8}T\d{4,6}[\dZ.,+:-]*"
 )
 #: characters of a date with a time of day
@@ -75,8 +76,9 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
         names = [k for k in above if k not in units and _is_heading(rows[k])]
         if names:
             known = [k for k in names if any(is_time_name(cell) or is_understood(cell) for cell in rows[k])]
-            # of rows that say nothing the lowest: what stands above is a preamble
-            heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), k))
+            # of rows that say nothing the first that is full; in two columns what stands above is a preamble
+            order = 1 if width == 2 else -1
+            heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
             return Layout(heading, units[-1] if units else heading, begin)
     return None
 
@@ -132,6 +134,18 @@ def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str,
     return tuple(found)
 
 
+def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
+    """Return in words which lines repeat the headings."""
+    places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
+    return (f"the headings come again, passed over, in line {places}",) if lines else ()
+
+
+def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
+    """Return in words which rows at the end are left out."""
+    what = "is no row" if len(numbers) == 1 else "are no rows"
+    return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
+
+
 def tell_rows(numbers: Sequence[int], word: str) -> str:
     """Return places of neighbouring rows in words: ``line 3``, ``lines 3 to 7``."""
     return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
@@ -142,7 +156,7 @@ def join_units(headings: Sequence[str], units: Sequence[str]) -> list[str]:
     found = []
     for k, heading in enumerate(headings):
         unit = units[k].strip().strip("[]()").strip() if k < len(units) else ""
-        bare = unit in _NO_UNIT or not heading or BRACKETS.fullmatch(heading)
+        bare = unit in _NO_UNIT or is_time_name(unit) or not heading or BRACKETS.fullmatch(heading)
         found.append(heading if bare else f"{heading} [{unit}]")
     return found
 

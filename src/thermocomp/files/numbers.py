@@ -16,7 +16,19 @@ _FILLERS = frozenset(
         *("underrange", "under range", "ovld", "ovl", "ovrng", "burnout", "burn out", "b.out", "open", "open tc"),
         *("no sensor", "sensor error", "error", "err", "invalid", "no data", "nodata", "missing", "bad", "skip"),
         *("fehler", "bruch", "fühlerbruch", "ungültig", "kein fühler", "fehlt", "erreur", "nat", "n.a.", "#nv"),
-        *("#n/v", "#wert!", "#value!", "#div/0!", "#ref!", "#bezug!", "#name?", "#num!", "#zahl!", "#null!", "#valeur!"),
+        *(
+            "#n/v",
+            "#wert!",
+            "#value!",
+            "#div/0!",
+            "#ref!",
+            "#bezug!",
+            "#name?",
+            "#num!",
+            "#zahl!",
+            "#null!",
+            "#valeur!",
+        ),
         *("nan(ind)", "-nan(ind)", "nan(snan)", "-1.#ind", "1.#ind", "1.#qnan", "-1.#qnan", "1.#inf", "-1.#inf"),
     )
 )
@@ -101,7 +113,8 @@ class Signs:
                 sign = "." if "." in cell else ","
                 whole, part = cell.replace(sign, ""), cell.replace(sign, ".")
                 raise RecordingError(
-                    f"{cell!r} can be read as {whole} or as {part}, and no other number tells which; say what the decimal "
+                    f"{cell!r} can be read as {whole} or as {part}, and no other number tells which; say what the "
+                    f"decimal "
                     f'sign is in a mapping: [read] decimal = "," or decimal = "."'
                 )
             decimal = "."

@@ -9,11 +9,15 @@ import pandas as pd
 from thermocomp.core.headings import find_date_order
 
 _CHUNK = 100_000
-_DATE = r"'?(?P<a>\d{1,4}|[^\W\d_]{3,9})(?P<sep>[./-]|\.? )(?P<b>\d{1,2}|[^\W\d_]{3,9})(?P<sep2>[./-]|[.,]? )(?P<c>\d{1,4})"
+_DATE = (
+    r"'?(?P<a>\d{1,4}|[^\W\d_]{3,9})(?P<sep>[./-]|\.? )(?P<b>\d{1,2}|[^\W\d_]{3,9})(?P<sep2>[./-]|[.,]? )(?P<c>\d{1,4})"
+)
 _CLOCK = r"(?P<hour>\d{1,2}):\d\d(?P<seconds>:\d\d(?:(?P<dot>[.,:])\d+)?)?(?: ?(?P<half>[AaPp]\.?[Mm]\.?))?"
 _ZONE = r" ?(?P<zone>Z|[A-Z]{3,4}|[+-]\d\d:?\d\d)?"
 _STAMP = re.compile(rf"{_DATE}(?:(?P<join>T|[ ,;_-]+){_CLOCK}{_ZONE})?|(?P<clock>{_CLOCK.replace('?P<', '?P<only_')})")
-_ISO = re.compile(r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:?\d\d)?)?|\d{8}T\d{4,6}(?:\.\d+)?Z?")
+_ISO = re.compile(
+    r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?(?:Z|[+-]\d\d:?\d\d)?)?|\d{8}T\d{4,6}(?:\.\d+)?Z?"
+)
 #: parts of a date in words of other languages than English, in small letters
 _MONTHS = {
     word: str(number)
@@ -44,7 +48,7 @@ class Parsed(NamedTuple):
     """Timestamps, and how they were read."""
 
     stamps: "pd.Series[pd.Timestamp]"  #: in UTC; NaT where a cell is none
-    first: pd.Timestamp  #: the first one, on its own clock
+    start: str  #: the first one in ISO 8601, on its own clock
     notes: tuple[str, ...]
 
 
@@ -129,7 +133,7 @@ def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
 def _parsed(stamps: "pd.Series[pd.Timestamp]", first: str, form: str, notes: tuple[str, ...]) -> Parsed:
     forms = [form, form.replace(".%f", "")]
     starts = (pd.to_datetime(pd.Series([first]), format=f, errors="coerce").iloc[0] for f in forms)
-    return Parsed(stamps, next((s for s in starts if not pd.isna(s)), pd.NaT), notes)
+    return Parsed(stamps, next((s.isoformat() for s in starts if not pd.isna(s)), ""), notes)
 
 
 def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
@@ -142,7 +146,9 @@ def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
     if shape["half"]:
         plain = plain.str.replace(r" ?([AaPp])\.?[Mm]\.?(?=$| )", lambda m: f" {m[1].upper()}M", regex=True)
     if shape["zone"] and shape["zone"].isalpha():
-        plain = plain.str.replace(r" ?([A-Z]{2,4})$", lambda m: _ZONES.get(m[1], "+00:00" if m[1] == "Z" else m[0]), regex=True)
+        plain = plain.str.replace(
+            r" ?([A-Z]{2,4})$", lambda m: _ZONES.get(m[1], "+00:00" if m[1] == "Z" else m[0]), regex=True
+        )
         plain = plain.str.replace(r"Z$", "+00:00", regex=True)
     elif shape["zone"]:
         plain = plain.str.replace(r" ?([+-]\d\d:?\d\d)$", r"\1", regex=True)

@@ -96,7 +96,7 @@ class FrameTable:
         for cells in written.values():
             signs.add(cell for cell in cells if isinstance(cell, str))
         notation = decide(signs, self.decimal, "", self.source)
-        notes = []
+        notes = list[str]()
         for k in numbers:
             cells = self.frame[k]
             if k not in written:
@@ -127,12 +127,17 @@ def open_parquet(path: Path) -> FrameTable:
     except (ValueError, KeyError) as e:  # pyarrow's own errors are ValueErrors
         raise RecordingError(f"{path}: is not a Parquet file, or a damaged one ({e}); write it anew") from e
     embedded = str(frame.attrs.get(EMBEDDED, ""))
+    notes: tuple[str, ...] = ()
     if not isinstance(frame.index, pd.RangeIndex):
+        timed = isinstance(frame.index, pd.DatetimeIndex | pd.TimedeltaIndex)
+        if timed and frame.index.name is None:
+            frame = frame.rename_axis("timestamp")
+            notes = ("the index has no name and holds times: taken as the time",)
         frame = frame.reset_index()
     headings = tuple(str(c).strip() for c in frame.columns)
     check_headings(path, headings, n_rows=len(frame))
     frame.columns = pd.RangeIndex(len(headings))
-    return FrameTable(str(path), headings, frame, range(1, len(frame) + 1), embedded)
+    return FrameTable(str(path), headings, frame, range(1, len(frame) + 1), embedded, notes)
 
 
 def check_headings(path: Path, headings: Sequence[str], n_rows: int) -> None:
@@ -198,7 +203,7 @@ def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
 
 def tell_notation(notation: Notation) -> tuple[str, ...]:
     """Say how numbers are written, where not as in Python."""
-    notes = ("the decimal sign is a comma",) if notation.decimal == "," else ()
+    notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
     if notation.thousands:
         notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
     return notes
@@ -253,9 +258,10 @@ def convert(
         elif cell.strip().casefold() not in MISSING_TEXT:
             refuse_cell(table, source, row, column, cell)
     if grouped >= 0:
-        _refuse_mixed(table, source, column, cells, notation, grouped)
+        _refuse_mixed(table, source, column, cells, grouped)
     return values, tuple(
-        f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: {tell_places(rows, table.place)}"
+        f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: "
+        f"{tell_places(rows, table.place)}"
         for word, rows in words.items()
     )
 
@@ -265,14 +271,13 @@ def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
     return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
 
 
-def _refuse_mixed(
-    table: FileTable, source: str, column: int, cells: "pd.Series[Any]", notation: Notation, grouped: int
-) -> None:
+def _refuse_mixed(table: FileTable, source: str, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
     """Refuse thousands with and without separator in one column: the separator may be a decimal sign there."""
     for row, cell in enumerate(cells):
         if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
             raise RecordingError(
-                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} with a "
+                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} "
+                f"with a "
                 f"separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
             )
 

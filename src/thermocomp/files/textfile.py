@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,9 @@ from thermocomp.files.layout import (
     find_width,
     join_units,
     name_stamps,
+    tell_again,
+    tell_end,
     tell_layout,
-    tell_rows,
 )
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
@@ -180,71 +181,36 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     """
     data, told = bring_to_utf8(path)
     _refuse_binary(path, data)
-    comment = options.comment.encode()
-    skipped: list[int] = []
-    top = options.heading - 1
-    first = list(islice((c for c in _content(path, data, comment, []) if c[0] >= top), _SAMPLE_LINES))
-    if not first:
-        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
-    sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
-    delimiter, layout = _find_table(sample, options.delimiter or _separator(path, data))
-    in_remark = layout is None and (remark := _remark_above(path, data, comment, first[0][0])) is not None
-    if in_remark:  # headings behind #, as numpy writes them
-        first, sample = [remark, *first], [remark[1].decode("utf-8", "replace"), *sample]
-        delimiter, layout = _find_table(sample, delimiter)
-    layout = layout or Layout(0, 0, 1)
-    heading, begin = first[layout.heading][1], layout.begin
-    ending = delimiter.encode()
-    width, odd, n_rows, again = _cells(heading, delimiter), list[bytes](), int(in_remark) - begin, list[int]()
-    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
-    for number, line in _content(path, data, comment, skipped):
-        if not line.isascii() and len(odd) < _SAMPLE_LINES and not _is_utf8(line):
-            odd.append(line)
-        n_rows += number >= top
-        if n_rows <= 0:  # what stands above the rows
-            skipped.append(number)
-            continue
-        if line == heading:  # of a logger that was started again
-            skipped.append(number)
-            again.append(number + 1)
-            n_rows -= 1
-            continue
-        cells = _cells(line, delimiter)
-        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
-            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        tail.append((number, line))
-        if cells != width and ragged is None:
-            ragged = number, _ragged(path, number + 1, cells, width, line, delimiter)
-    encoding = options.encoding or (find_encoding(odd) if odd else "utf-8")
+    comment, top = options.comment.encode(), options.heading - 1
+    head = _read_head(path, data, options)
+    delimiter, layout, first = head.delimiter, head.layout, head.lines
+    body = _scan(path, data, comment, top, head)
+    encoding = options.encoding or (find_encoding(body.odd) if body.odd else "utf-8")
 
     def split(line: bytes, errors: str = "replace") -> list[str]:
         return _split(line.decode(encoding, errors), delimiter)
 
-    rows = [split(line) for _, line in first[begin:]]
-    last = [split(line) for _, line in tail]
-    n_last = min(find_end(last, find_value_columns(rows, find_width(rows)), width), n_rows - 1) if rows else 0
-    remarks = [number for number, _ in tail][len(tail) - n_last :]
-    if ragged and not (remarks and ragged[0] >= remarks[0]):
-        raise RecordingError(ragged[1])
-    skipped = sorted((*skipped, *remarks))
+    rows = [split(line) for _, line in first[layout.begin :]]
+    remarks = list[int]()
+    if rows and body.n_rows > 1:
+        last = [split(line) for _, line in body.tail]
+        count = find_end(last, find_value_columns(rows, find_width(rows)), body.width)
+        remarks = [number for number, _ in body.tail][len(last) - min(count, body.n_rows - 1) :]
+    if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
+        raise RecordingError(body.ragged[1])
     try:
-        headings = [h.strip() for h in split(heading, "strict" if options.encoding else "replace")]
+        headings = [h.strip() for h in split(first[layout.heading][1], "strict" if options.encoding else "replace")]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
-    headings += [""] * (width - len(headings))
-    check_headings(path, headings, n_rows)
+    headings += [""] * (body.width - len(headings))
+    check_headings(path, headings, body.n_rows)
     if layout.units != layout.heading:
         headings = join_units(headings, split(first[layout.units][1]))
     headings, named = name_stamps(headings, rows)
-    numbers = [number + 1 for number, _ in first]
-    if odd and not options.encoding:
-        told = (*told, f"written in {encoding}, not in UTF-8")
-    if again:
-        places = ", ".join(map(str, again[:MOST_REMARKS])) + " ..." * (len(again) > MOST_REMARKS)
-        named = (*named, f"the headings come again, passed over, in line {places}")
-    if remarks:
-        end = [number + 1 for number in remarks]
-        named = (*named, f"{tell_rows(end, 'line')} at the end {'is' if n_last == 1 else 'are'} no row of the table, and left out")
+    if body.odd and not options.encoding:
+        told += (f"written in {encoding}, not in UTF-8",)
+    if head.in_remark:
+        told += (f"line {first[0][0] + 1} holds the headings, behind {options.comment!r}",)
     return CsvTable(
         path=path,
         data=data,
@@ -254,11 +220,74 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
         decimal=options.decimal,
         encoding=encoding,
         errors="strict" if options.encoding else "replace",
-        skipped=tuple(skipped),
-        n_rows=n_rows - n_last,
+        skipped=tuple(sorted((*body.skipped, *remarks))),
+        n_rows=body.n_rows - len(remarks),
         embedded=_embedded(path),
-        notes=(*told, *tell_layout(numbers, layout, "line"), *named),
+        notes=(
+            *told,
+            *tell_layout([number + 1 for number, _ in first], layout, "line"),
+            *named,
+            *tell_again(body.again),
+            *tell_end([number + 1 for number in remarks], "line"),
+        ),
     )
+
+
+class _Head(NamedTuple):
+    """What the first lines of a file say."""
+
+    lines: list[tuple[int, bytes]]  #: with their numbers from 0
+    delimiter: str
+    layout: Layout
+    in_remark: bool  #: the headings stand in a comment, as numpy writes them
+
+
+class _Body(NamedTuple):
+    """What a pass over all lines of a file finds."""
+
+    skipped: list[int]  #: lines that are no rows, from 0
+    width: int
+    n_rows: int
+    odd: list[bytes]  #: lines that are not UTF-8
+    again: list[int]  #: lines that repeat the headings, from 1
+    tail: deque[tuple[int, bytes]]  #: the last rows
+    ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
+
+
+def _read_head(path: Path, data: bytes | None, options: ReadOptions) -> _Head:
+    comment, top = options.comment.encode(), options.heading - 1
+    first = list(islice((c for c in _content(path, data, comment, []) if c[0] >= top), _SAMPLE_LINES))
+    if not first:
+        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
+    delimiter, layout = _find_table(first, options.delimiter or _separator(path, data))
+    remark = _remark_above(path, data, comment, first[0][0]) if layout is None else None
+    if remark is not None:
+        first = [remark, *first]
+        delimiter, layout = _find_table(first, options.delimiter)
+    return _Head(first, delimiter, layout or Layout(0, 0, 1), remark is not None)
+
+
+def _scan(path: Path, data: bytes | None, comment: bytes, top: int, head: _Head) -> _Body:
+    heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
+    skipped, odd, again = list[int](), list[bytes](), list[int]()
+    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
+    width, n_rows = _cells(heading, delimiter), int(head.in_remark) - head.layout.begin
+    for number, line in _content(path, data, comment, skipped):
+        if not line.isascii() and len(odd) < _SAMPLE_LINES and not _is_utf8(line):
+            odd.append(line)
+        n_rows += number >= top
+        if n_rows <= 0 or line == heading:  # what stands above the rows; or of a logger that was started again
+            again += [number + 1] if n_rows > 0 else []
+            n_rows -= n_rows > 0
+            skipped.append(number)
+            continue
+        cells = _cells(line, delimiter)
+        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
+            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
+        tail.append((number, line))
+        if cells != width and ragged is None:
+            ragged = number, _ragged(path, number + 1, cells, width, line, delimiter)
+    return _Body(skipped, width, n_rows, odd, again, tail, ragged)
 
 
 def _open(path: Path, data: bytes | None) -> BinaryIO:
@@ -319,8 +348,9 @@ def _refuse_binary(path: Path, data: bytes | None) -> None:
         )
 
 
-def _find_table(lines: Sequence[str], delimiter: str) -> tuple[str, Layout | None]:
+def _find_table(first: Sequence[tuple[int, bytes]], delimiter: str) -> tuple[str, Layout | None]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
+    lines = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
     best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
     for tried in delimiter or "\t;|, ":
         if tried == " " and best_fit > (False, 0.0, 0) and not delimiter:

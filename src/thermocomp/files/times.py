@@ -12,13 +12,15 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.units import find_unit
 from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
-from thermocomp.files.stamps import AmbiguousDatesError, parse, parse_stamps
-from thermocomp.files.tables import FileTable
+from thermocomp.files.stamps import AmbiguousDatesError, Parsed, parse, parse_stamps
+from thermocomp.files.tables import FileTable, tell_places
 
 FloatArray = NDArray[np.float64]
 
 #: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
-_CLOCK = re.compile(r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,]\d+)?))?")
+_CLOCK = re.compile(
+    r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,]\d+)?))?"
+)
 _HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
 #: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
 _EPOCH = 946684800.0, 4102444800.0
@@ -28,8 +30,6 @@ _SERIAL = 36526.0, 73050.0
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
-#: places of cells that are listed
-_MOST_TOLD = 40
 
 
 def read_times(
@@ -79,13 +79,17 @@ def read_times(
         other = np.flatnonzero(((cells[k] != shown) & ~(cells[k].isna() & shown.isna())).to_numpy())
         if other.size:
             raise RecordingError(
-                f"{source}: columns {columns.time + 1} and {k + 1} are both named {heading!r} and hold different times, such "
-                f"as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in {table.place(int(other[0]))}; channels that "
+                f"{source}: columns {columns.time + 1} and {k + 1} are both named {heading!r} and hold different "
+                f"times, such "
+                f"as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in {table.place(int(other[0]))}; channels "
+                f"that "
                 "were sampled at different times are no recording: resample them to one time"
             )
     notes: tuple[str, ...] = ()
     if columns.beside:
-        notes = (f"columns {', '.join(str(k + 1) for k in columns.beside)} hold the same times as column {columns.time + 1}",)
+        notes = (
+            f"columns {', '.join(str(k + 1) for k in columns.beside)} hold the same times as column {columns.time + 1}",
+        )
     if is_stamp:
         if columns.date is not None:
             shown = _date(cells[columns.date]) + " " + _clock(shown)
@@ -134,14 +138,12 @@ def _read_stamps(
         return _seconds(cells - cells.iloc[0]), cells.iloc[0].isoformat(), ()
     text = cells.astype(str)
     first = text.iloc[0].strip()
-    stamps: pd.Series[pd.Timestamp] | None
-    notes: tuple[str, ...] = ()
-    if wanted:
-        stamps = parse(text, wanted)
-        begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
-        dated = any(letter in wanted for letter in ("%d", "%j", "%x", "%c", "%D", "%F"))
-    elif columns.date is None and (_CLOCK.fullmatch(first) or _HALF.fullmatch(first)):
+    if not wanted and columns.date is None and (_CLOCK.fullmatch(first) or _HALF.fullmatch(first)):
         return _read_clock(text, table, source, heading)
+    if wanted:
+        begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
+        dated = any(letter in wanted for letter in ("%d", "%j", "%x", "%c", "%D", "%F")) and not pd.isna(begin)
+        found: Parsed | None = Parsed(parse(text, wanted), begin.isoformat() if dated else "", ())
     else:
         titles = [table.headings[k] for k in (columns.date, columns.time) if k is not None]
         try:
@@ -150,16 +152,16 @@ def _read_stamps(
             ways = " or ".join(f'format = "{form}"' for form in e.formats)
             where = f'column = "{heading}"' + (f', date = "{titles[0]}"' if columns.date is not None else "")
             raise RecordingError(
-                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e.orders}, and no row tells "
-                f"which; say how it is written in a mapping: [time] {where} and {ways}"
+                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e.orders}, and no row "
+                f"tells which; say how it is written in a mapping: [time] {where} and {ways}"
             ) from e
-        stamps, begin, notes, dated = (None, pd.NaT, (), False) if found is None else (*found, True)
-    if stamps is None or pd.isna(stamps.iloc[0]):
+    if found is None or pd.isna(found.stamps.iloc[0]):
         hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
         raise RecordingError(
             f"{source}: {table.place(0)}, column {heading!r}: {first!r} {hint}; say how it is written in a "
             f'mapping: [time] column = "{heading}" and format = "%d/%m/%Y %H:%M:%S"'
         )
+    stamps, start, notes = found
     bad = np.flatnonzero(stamps.isna())
     if bad.size:
         row = int(bad[0])
@@ -167,7 +169,7 @@ def _read_stamps(
             f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a timestamp like "
             f"{first!r}; correct or delete the row"
         )
-    return _seconds(stamps - stamps.iloc[0]), begin.isoformat() if dated and not pd.isna(begin) else "", notes
+    return _seconds(stamps - stamps.iloc[0]), start, notes
 
 
 def _read_clock(
@@ -179,8 +181,10 @@ def _read_clock(
     parts = text.str.strip().str.extract(_CLOCK)
     if not halves and pd.isna(parts["seconds"].iloc[0]):
         raise RecordingError(
-            f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as minutes and "
-            f'seconds; say how it is written in a mapping: [time] column = "{heading}" and format = "%H:%M" or format = '
+            f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as "
+            f"minutes and "
+            f'seconds; say how it is written in a mapping: [time] column = "{heading}" and format = "%H:%M" or '
+            f"format = "
             '"%M:%S"'
         )
     if halves:
@@ -199,7 +203,8 @@ def _read_clock(
     if bad.size:
         row = int(bad[0])
         raise RecordingError(
-            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a time like {first!r}; correct or "
+            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a time like {first!r}; "
+            f"correct or "
             "delete the row"
         )
     # exact where the file has no more than nanoseconds
@@ -209,7 +214,7 @@ def _read_clock(
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
     if not midnights.any() or whole.max() >= _DAY:
         return (whole - whole[0]) / 1e9, "", ()
-    places = ", ".join(table.place(int(k) + 1) for k in np.flatnonzero(midnights)[:_MOST_TOLD])
+    places = tell_places((np.flatnonzero(midnights) + 1).tolist(), table.place)
     days_on = np.concatenate([[0], np.cumsum(midnights)])
     return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day goes over midnight in {places}",)
 
@@ -221,7 +226,7 @@ def _read_numbers(
     if columns.time_unit:
         unit = find_unit(columns.time_unit, "time")
         time = (raw - raw[0]) * unit.scale if unit.scale >= 1 else (raw - raw[0]) / round(1 / unit.scale)
-        known = unit.scale == 1 or unit.scale == 1e-3
+        known = unit.scale in (1, 1e-3)
         counted = known and _EPOCH[0] <= raw[0] * unit.scale < _EPOCH[1] and not mapping.time.start
         if not counted:
             return time, "", ()
@@ -236,9 +241,14 @@ def _read_numbers(
     if _SERIAL[0] <= raw.min() and raw.max() < _SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
         milliseconds = np.rint(raw * 86400e3)
         start = pd.Timestamp(milliseconds[0] / 1e3 + _SERIAL_BEGIN, unit="s").isoformat()
-        return (milliseconds - milliseconds[0]) / 1e3, start, (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",)
+        return (
+            (milliseconds - milliseconds[0]) / 1e3,
+            start,
+            (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
+        )
     raise RecordingError(
-        f"{source}: column {heading!r} holds numbers from {raw[0]:.10g} to {raw[-1]:.10g} and says no unit: seconds, minutes, "
+        f"{source}: column {heading!r} holds numbers from {raw[0]:.10g} to {raw[-1]:.10g} and says no unit: seconds, "
+        f"minutes, "
         f'hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] column = '
         f'"{heading}" and unit = "s"'
     )
@@ -256,8 +266,10 @@ def _refuse_set_forward(
         spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
         if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
             raise RecordingError(
-                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and {after}, perhaps "
-                "as the clock was set forward (daylight saving), perhaps as nothing was recorded: use UTC, or timestamps "
+                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
+                f"{after}, perhaps "
+                "as the clock was set forward (daylight saving), perhaps as nothing was recorded: use UTC, or "
+                "timestamps "
                 "with an offset, or split the file into tests"
             )
 
