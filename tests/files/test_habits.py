@@ -87,13 +87,13 @@ def test_what_was_passed_over_is_told(tmp_path: Path) -> None:
 def test_the_line_of_the_headings_can_be_stated(tmp_path: Path) -> None:
     path = tmp_path / "habit.csv"
     names = "time_s;n_rpm;t1_C;t2_C;z_um\n"
-    path.write_text("a;b;c;d;e\n1;2;3;4;5\n1;2;3;4;5\n" + names + text(numbers()), encoding="utf-8")
+    path.write_text("a;b;c;d;e\n1;2;3;4;5\n" + names + text(numbers()), encoding="utf-8")
     with pytest.raises(RecordingError, match="no time column"):
         read(path)
-    same(read(path, Mapping(read=ReadOptions(heading=4))))
-    rows: list[list[object]] = [["a", "b"], [1.0, 2.0], [1.0, 2.0], [*names.strip().split(";")], *map(list, numbers())]
+    same(read(path, Mapping(read=ReadOptions(heading=3))))
+    rows: list[list[object]] = [["a", "b"], [1.0, 2.0], [*names.strip().split(";")], *map(list, numbers())]
     xlsx(path.with_suffix(".xlsx"), {"data": rows})
-    same(read(path.with_suffix(".xlsx"), Mapping(read=ReadOptions(heading=4))))
+    same(read(path.with_suffix(".xlsx"), Mapping(read=ReadOptions(heading=3))))
 
 
 def test_a_wrong_row_is_told_behind_a_preamble_too(tmp_path: Path) -> None:

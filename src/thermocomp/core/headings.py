@@ -120,6 +120,7 @@ _NAMES = {
     ),
 }
 #: what counts from another temperature, and is no temperature
+_ELECTRIC = re.compile(r"(?i)capaci|kapaz|charge|ladung")  # F and C are farads and coulombs there
 _DIFFERENCE = re.compile(
     r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
 )
@@ -209,8 +210,8 @@ def understand(heading: str) -> Meaning | None:
     if said is None:
         return None
     base, meant = said
-    difference = meant.symbol == "K" and _DIFFERENCE.fullmatch(base)
-    if difference or (meant.quantity == "time" and find_named_quantity(base)):
+    other = (meant.symbol == "K" and _DIFFERENCE.fullmatch(base)) or _ELECTRIC.search(base)
+    if other or (meant.quantity == "time" and find_named_quantity(base)):
         return None  # T1_min is the least of T1
     if meant.quantity == "displacement" and _is_position(base, meant.symbol):
         meant = find_unit(meant.symbol, "position")

@@ -271,17 +271,17 @@ def _find_time(
     # of two columns of one name the first is meant
     plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
     named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
-    if named:
-        # T_s may be a temperature, time_s is none
-        return min(named, key=lambda k: timed[k].base == "T"), None, []
+    clear = [k for k in named if timed[k].base != "T"]  # T_s may be the temperature of a surface
+    if clear:
+        return clear[0], None, []
     date = next((plain[name] for name in _DATES if name in plain), None)
     clock = next((plain[name] for name in _CLOCKS if name in plain), None)
     if date is not None and clock is not None:
         return clock, date, []
     names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
     bare = [plain[name] for name in names if name not in _NEEDS_UNIT]
-    if bare:
-        return bare[0], None, []
+    if bare or named:
+        return [*bare, *named][0], None, []
     if len(timed) == 1:
         index = next(iter(timed))
         return index, None, [f"{headings[index]!r} is taken as the time"]

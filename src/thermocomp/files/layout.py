@@ -65,9 +65,10 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     width = find_width(rows)
     columns = find_value_columns(rows, width)
     is_row = [_is_row(row, columns) for row in rows]
-    # a row of the numbers of channels, say, is no row of the table: text follows it
-    begins = [k for k in range(1, len(rows)) if is_row[k] and (k + 1 == len(rows) or is_row[k + 1])]
-    for begin in [*begins, *(k for k in range(1, len(rows)) if is_row[k])]:
+    for begin in range(1, len(rows)):
+        # a row of the numbers of channels, say, is no row of the table: units follow it
+        if not is_row[begin] or (begin + 1 < len(rows) and _is_units(rows[begin + 1])):
+            continue
         first = begin
         while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
             first -= 1
@@ -200,7 +201,8 @@ def _is_heading(row: Sequence[str]) -> bool:
 def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
     values = sum(k < len(row) and (_is_value(row[k]) or is_filler(row[k])) for k in columns)
     some = any(k < len(row) and _is_value(row[k]) for k in columns)
-    return some and values > _ROW * len(columns)
+    begins = bool(columns) and columns[0] < len(row) and (_is_value(row[columns[0]]) or is_filler(row[columns[0]]))
+    return begins and some and values > _ROW * len(columns)
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:

@@ -55,6 +55,8 @@ def why_left_out(heading: str) -> str:
             f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
             f"or {ignore}"
         )
+    if meant.quantity == "time":
+        return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is no time"
     return (
         f"{heading!r}: {symbol!r} counts as a unit of {meant.quantity} only by a mapping; write {mapped} "
         f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'

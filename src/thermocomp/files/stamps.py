@@ -114,7 +114,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parse
     elif whole and len(orders) > 1:
         notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is none otherwise",)
     best = whole[0] if whole else max(orders, key=lambda o: int(read[o].notna().sum()))
-    if shape["zone"] in _ZONES:
+    if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
         notes += (f"{shape['zone']} is taken as UTC{_ZONES[shape['zone']]}",)
     return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
 
@@ -125,8 +125,9 @@ def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
     parts = [text.iloc[k : k + _CHUNK] for k in range(0, len(text), _CHUNK)]
     found = [pd.to_datetime(p, format=form, utc=True, errors="coerce", cache=False) for p in parts]
     stamps = pd.concat(found)
-    if "%S.%f" in form and stamps.isna().any():  # a program may leave out a fraction of zero
-        stamps = stamps.fillna(pd.to_datetime(text, format=form.replace(".%f", ""), utc=True, errors="coerce"))
+    if stamps.isna().any():  # a program may leave out a fraction of zero
+        other = form.replace("%S.%f", "%S") if "%S.%f" in form else form.replace("%S", "%S.%f")
+        stamps = stamps.fillna(pd.to_datetime(text, format=other, utc=True, errors="coerce"))
     return stamps
 
 
@@ -142,7 +143,7 @@ def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
     if not (shape["a"].isdigit() and shape["b"].isdigit()):
         plain = plain.str.replace(r"[^\W\d_]{3,}(?=[ ,./-])", _month, regex=True)
     if shape["dot"] in (",", ":"):
-        plain = plain.str.replace(r"(:\d\d)[,:](\d+)(?=$|[^\d:])", r"\1.\2", regex=True)
+        plain = plain.str.replace(rf"(:\d\d:\d\d){shape['dot']}(\d+)", r"\1.\2", regex=True)
     if shape["half"]:
         plain = plain.str.replace(r" ?([AaPp])\.?[Mm]\.?(?=$| )", lambda m: f" {m[1].upper()}M", regex=True)
     if shape["zone"] and shape["zone"].isalpha():

@@ -210,7 +210,7 @@ def _read_clock(
     # exact where the file has no more than nanoseconds
     whole = np.rint(seconds * 1e9).astype(np.int64)
     steps = np.diff(whole)
-    usual = float(np.median(steps)) if steps.size else 0.0
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
     if not midnights.any() or whole.max() >= _DAY:
         return (whole - whole[0]) / 1e9, "", ()
