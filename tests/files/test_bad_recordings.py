@@ -22,7 +22,7 @@ GOOD = "time_s,t1_C,drift_um\n0,20.5,0\n15,20.6,1\n"
     [
         ("", ["the file is empty"]),
         ('time_s,t1_C,note\n0,20,"a\n1,21,b"\n', ["2 lines give 1 rows", "quotation mark"]),
-        ("time_s,t1_C\r0,20\r1,21\r", ["line 1", "carriage return"]),
+        ("time_s,t1_C\n" + "0,20\n" * 20_000 + "1,2\r1\n", ["line 20002", "carriage return"]),
         ("\n \n# only a remark\n", ["the file is empty"]),
         ("time_s,t1_C\n", ["no rows below", "empty"]),
         ("time_s\n0\n1\n", ["only one column, 'time_s'", "delimiter"]),
@@ -90,7 +90,7 @@ def test_a_mistyped_unit_is_told_with_the_nearest(tmp_path: Path, heading: str, 
         (b"PAR1\x15\x04", "a Parquet file"),
         (b"\x1f\x8b\x08", "a gzip file"),
         (b"\x89PNG\r\n\x1a\n\x00\x00\x00", "not text but binary"),
-        (GOOD.encode("utf-16"), "UTF-16; save it as UTF-8"),
+        (GOOD.encode("utf-16")[:64] + b"\x00\xd8,\x00", "written in UTF-16, but damaged"),
     ],
 )
 def test_a_binary_file_named_csv_is_told_as_what_it_is(tmp_path: Path, content: bytes, says: str) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
-from thermocomp.core.units import SPELLINGS, Unit, find_unit
+from thermocomp.core.units import SPELLINGS, Unit, find_unit, is_unit
 
 # What may stand behind the last underscore. Not m, in, Hz, 1: coolant_in, mains_Hz, t_1 mean other things.
 SUFFIXES = {
@@ -17,16 +17,161 @@ SUFFIXES = {
 }
 #: what may stand behind a name without brackets, as in "T1 °C", "T1 in °C", "T1 / °C" and "T1, °C": no letter alone
 _BEHIND = re.compile(
-    r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|deg ?|Grad )[CF]|℃"
-    r"|(?:\d[\d.,/]* ?)?(?:[µμu]m|mm)|[µμ]rad|rpm|(?:U|1|r|tr|rev)/min|min(?:-1|\^-1|⁻¹))"
+    r"(?P<base>.*?[^\s/,;:])(?:\s*[/,;:]\s*|\s+in\s+|\s+)(?P<unit>(?:°|º|˚|[dD]eg\.? ?|DEG ?|Grad "
+    r")[CF]|℃|(?:[cC]elsius|CELSIUS)"
+    r"|(?:\d[\d.,/]* ?)?(?:[µμu]m|mm|UM|MM)|[µμ]rad|rpm|RPM|(?:U|1|r|tr|rev)/(?:min|MIN)|(?:min|MIN)(?:-1|\^-1|⁻¹))"
     r"|(?P<base2>.*\S)\s+(?:/|in)\s+(?P<unit2>K|s|ms|min|h)"
+)
+#: units of what is no use here; they are no slips of the pen
+_OTHERS = frozenset(
+    (
+        *(
+            "%",
+            "°",
+            "deg",
+            "grad",
+            "rad",
+            "rev",
+            "v",
+            "mv",
+            "vdc",
+            "vac",
+            "a",
+            "ma",
+            "adc",
+            "aac",
+            "w",
+            "kw",
+            "va",
+            "wh",
+            "kwh",
+        ),
+        *(
+            "n",
+            "kn",
+            "nm",
+            "ncm",
+            "bar",
+            "mbar",
+            "pa",
+            "kpa",
+            "mpa",
+            "hpa",
+            "psi",
+            "l/min",
+            "l/h",
+            "m3/h",
+            "ml/min",
+            "gpm",
+        ),
+        *(
+            "kg",
+            "g",
+            "mg",
+            "ohm",
+            "ω",
+            "kohm",
+            "kω",
+            "mm/s",
+            "m/s",
+            "mm/rev",
+            "g/m3",
+            "db",
+            "dba",
+            "khz",
+            "mhz",
+            "%rh",
+            "%rf",
+        ),
+        *(
+            "% rh",
+            "% rf",
+            "bit",
+            "inc",
+            "counts",
+            "digits",
+            "w/m2",
+            "j",
+            "kj",
+            "var",
+            "cos phi",
+            "ppm",
+            "1/k",
+            "um/s",
+            "rad/s",
+        ),
+    )
 )
 # In brackets anything but what would turn any frequency into a spindle speed, or a number into a channel.
 _NOT_IN_BRACKETS = ("", "1")
 _FREQUENCIES = ("Hz", "1/s")
 HOUSE_SUFFIX = {"degC": "C", "um": "um", "urad": "urad", "1/min": "rpm", "mm": "mm", "mm/min": "mm_min", "s": "s"}
 BRACKETS = re.compile(r"(?P<base>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
+#: a unit before the name, as in "[°C] T1"; or a remark behind it, as in "T1 [°C] (front)"
+_EARLIER = re.compile(r"(?P<before>.*?)\[(?P<unit>[^\[\]]*)\]\s*(?P<after>.+)")
 _AXIS = re.compile(r"[xyzuvw]\d?")
+_TURNING = ("spindle", "speed", "spindel", "drehzahl", "broche", "mandrin", "husillo", "mandrino")
+#: names that say what is measured, whatever the unit
+_NAMES = {
+    "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
+    "temperature": re.compile(r"t\d+|tc ?\d+|.*\btemp(?:\b|[ _.\d]|er).*|.*temperatur.*"),
+    "displacement": re.compile(
+        r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"
+    ),
+}
+#: what counts from another temperature, and is no temperature
+_ELECTRIC = re.compile(r"(?i)capaci|kapaz|charge|ladung")  # F and C are farads and coulombs there
+_DIFFERENCE = re.compile(
+    r"Δ.*|.*\b(?:delta|diff\w*|rise|dT\d*|d[Tt]emp\w*)\b.*|.*(?:erwärmung|übertemp|temperaturdiff|-änderung).*", re.I
+)
+#: headings of a time column, without their unit, in several languages
+_TIMES = frozenset(
+    (
+        *("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed", "zeit", "zeitstempel", "messzeit"),
+        *(
+            "laufzeit",
+            "temps",
+            "horodatage",
+            "tempo",
+            "tiempo",
+            "timestamps",
+            "time stamp",
+            "date time",
+            "elapsed time",
+        ),
+        *("date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit", "datum und uhrzeit", "date/heure", "fecha/hora"),
+        *("data/ora", "date and time", "date & time", "date&time", "datumzeit", "datum_uhrzeit", "datetime64", "_time"),
+        *("zeitpunkt", "time (utc)", "utc", "utc time", "local time", "run time", "test time", "epoch", "unix time"),
+        *(
+            "unix",
+            "dauer",
+            "duration",
+            "durée",
+            "durata",
+            "duración",
+            "czas",
+            "čas",
+            "tijd",
+            "tid",
+            "time of measurement",
+        ),
+        *(
+            "dattim",
+            "date time stamp",
+            "datum",
+            "fecha",
+            "data",
+            "tag",
+            "day",
+            "messzeitpunkt",
+            "abs. time",
+            "rel. time",
+        ),
+        *("absolute time", "relative time", "relativzeit", "absolutzeit", "uhrzeit", "clock", "time of day", "x_value"),
+    )
+)
+#: letters of a date or time in a heading, such as hh:mm:ss and TT.MM.JJJJ
+_FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+")
 
 
 @dataclass(frozen=True)
@@ -60,36 +205,17 @@ def understand(heading: str) -> Meaning | None:
     UnitError
         The brackets hold what looks like a mistyped unit.
     """
-    heading = heading.strip()
-    found = BRACKETS.fullmatch(heading)
-    if found:
-        base, symbol = found["base"], (found["square"] or found["round"] or "").strip()
-        turning = any(word in base.casefold() for word in ("spindle", "speed", "spindel", "drehzahl", "broche"))
-        if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
-            return None
-        symbol = SUFFIXES.get(symbol, symbol)
-        try:
-            meant = find_unit(symbol)
-        except UnitError:
-            # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-            words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
-            if words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6):
-                raise
-            return None
-        said = _suffix(base)
-        if said and SUFFIXES[said] == meant.symbol:  # x_um [um]: twice
-            inner = understand(base)
-            if inner is not None and (inner.unit.scale, inner.unit.shift) == (1, 0):
-                return Meaning(base, inner.base, inner.unit)
-    else:
-        suffix = _suffix(heading)
-        behind = _BEHIND.fullmatch(heading)
-        if suffix:
-            base, meant = heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
-        elif behind:
-            base, meant = behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
-        else:
-            return None
+    heading = strip_heading(heading)
+    said = _in_brackets(heading) if "[" in heading or "(" in heading else _behind(heading)
+    if said is None:
+        return None
+    base, meant = said
+    inner = _behind(base) if heading.endswith((")", "]")) else None
+    if inner is not None and inner[1] == meant and (meant.scale, meant.shift) == (1, 0):
+        return understand(base)  # x_um [um]: said twice
+    other = (meant.symbol == "K" and _DIFFERENCE.fullmatch(base)) or _ELECTRIC.search(base)
+    if other or (meant.quantity == "time" and find_named_quantity(base)):
+        return None  # T1_min is the least of T1
     if meant.quantity == "displacement" and _is_position(base, meant.symbol):
         meant = find_unit(meant.symbol, "position")
     # one word, so that the name can go into a formula or a controller
@@ -107,3 +233,88 @@ def _is_position(base: str, symbol: str) -> bool:
     if any(w in ("pos", "position") for w in words):
         return True
     return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)
+
+
+def _in_brackets(heading: str) -> tuple[str, Unit] | None:
+    """Return name and unit of a heading with brackets: ``T1 [degC]``, ``[degC] T1``, ``T1 [degC] (front)``."""
+    found, earlier = BRACKETS.fullmatch(heading), _EARLIER.fullmatch(heading)
+    symbol = (found["square"] or found["round"] or "").strip() if found else ""
+    if earlier and is_unit(earlier["unit"]) and not (symbol and is_unit(symbol)):
+        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(earlier["unit"])
+    if found is None:
+        return _behind(heading)
+    base = found["base"]
+    turning = any(word in base.casefold() for word in _TURNING)
+    if symbol in _NOT_IN_BRACKETS or (symbol in _FREQUENCIES and not turning):
+        return None
+    symbol = SUFFIXES.get(symbol, symbol)
+    if symbol == "m" and is_time_name(base):
+        raise UnitError("'m' stands for metres; minutes are min")
+    try:
+        return base, find_unit(symbol)
+    except UnitError:
+        # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
+        other = symbol.casefold() in _OTHERS or _FORMAT.fullmatch(symbol)
+        words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
+        if not other and (words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)):
+            raise
+        return None
+
+
+def _behind(heading: str) -> tuple[str, Unit] | None:
+    """Return name and unit of a heading without brackets: ``t1_C``, ``T1 degC``, ``RPM``."""
+    ends = [s for s in SUFFIXES if heading.endswith(f"_{s}") and len(heading) > len(s) + 1]
+    if ends:
+        suffix = max(ends, key=len)
+        return heading[: -len(suffix) - 1], find_unit(SUFFIXES[suffix])
+    behind = _BEHIND.fullmatch(heading)
+    if behind:
+        return behind["base"] or behind["base2"], find_unit(behind["unit"] or behind["unit2"])
+    if is_unit(heading) and find_unit(heading).symbol == "1/min":  # a column that is called RPM
+        return "spindle", find_unit(heading)
+    return None
+
+
+def strip_heading(heading: str) -> str:
+    """Return a heading without blanks and colons around it."""
+    return heading.strip().rstrip(":").strip()
+
+
+def is_time_name(heading: str) -> bool:
+    """Return whether a heading, whose unit is taken off, is that of a time."""
+    return plain_name(heading) in _TIMES
+
+
+def plain_name(heading: str) -> str:
+    """Return a heading in small letters, without the letters of a format: ``Datum (TT.MM.JJJJ)`` is ``datum``."""
+    name = strip_heading(heading)
+    found = BRACKETS.fullmatch(name)
+    if found and _FORMAT.fullmatch((found["square"] or found["round"] or "").strip()):
+        name = found["base"]
+    return " ".join(name.casefold().split())
+
+
+def find_date_order(heading: str) -> str:
+    """Return the order of day, month and year that a heading states, such as ``dmy``; empty if it states none."""
+    found = BRACKETS.fullmatch(strip_heading(heading))
+    letters = re.findall(r"[a-z]+", ((found["square"] or found["round"]) if found else heading).casefold())
+    if not all(re.fullmatch(r"([dtgmyjahsf])\1*|[ap]m?", word) for word in letters):
+        return ""
+    german = any(word[0] == "t" for word in letters)
+    kinds = {"d": "d", "t": "d", "g": "d", "m": "m", "y": "y", "a": "y", "j": "y" if german else "d"}
+    order = "".join(kinds.get(word[0], "") for word in letters[:3])
+    return order if sorted(order) == ["d", "m", "y"] else ""
+
+
+def find_named_quantity(base: str) -> str:
+    """Return the quantity that a name without unit speaks of, such as temperature for ``T1``; empty if of none."""
+    name = " ".join(base.casefold().replace("_", " ").split())
+    return next((quantity for quantity, words in _NAMES.items() if words.fullmatch(name)), "")
+
+
+def is_understood(heading: str) -> bool:
+    """Return whether `understand` finds a unit in a heading."""
+    try:
+        return understand(heading) is not None
+    except UnitError:
+        return False

@@ -62,6 +62,8 @@ _UNITS = [
     Unit("mm", "displacement", "um", 1e3),
     Unit("m", "displacement", "um", 1e6),
     Unit("in", "displacement", "um", 25.4e3),
+    Unit("mil", "displacement", "um", 25.4),
+    Unit("uin", "displacement", "um", 25.4e-3),
     Unit("urad", "angle", "urad", 1.0),
     Unit("mrad", "angle", "urad", 1e3),
     Unit("arcsec", "angle", "urad", 4.84813681109536),
@@ -82,9 +84,17 @@ _UNITS = [
 _ALIASES = {
     "C": "degC",
     "°C": "degC",
+    "°c": "degC",
+    "C°": "degC",
     "F": "degF",
     "°F": "degF",
     "um/m": "urad",
+    "u": "um",
+    "MM": "mm",
+    "UM": "um",
+    "MIN": "min",
+    "SEC": "s",
+    "HRS": "h",
     "Hz": "1/s",
     "": "1",
 }
@@ -97,14 +107,20 @@ _WORDS = {
         "h": "hr hrs hour hours std stunde stunden heure heures ore horas",
         "d": "day days tag tage jour jours",
         "ms": "msec millisecond milliseconds millisekunden",
-        "degC": "celsius grad_c grad_celsius deg_c degc deg._c degree_c degrees_c degree_celsius degrees_celsius oc",
+        "degC": "celsius grad_c grad_celsius grd_c deg_c degc deg._c degree_c degrees_c degree_celsius "
+        "degrees_celsius oc "
+        "°celsius cel gradi_c degrés_c grados_c",
         "K": "kelvin",
         "degF": "fahrenheit deg_f degf degrees_f degree_f",
         "nm": "nanometer nanometers",
-        "um": "micron microns micrometer micrometers micrometre micrometres mikrometer mikron mkm",
+        "um": "micron microns micrometer micrometers micrometre micrometres mikrometer mikron mkm my mue_m",
         "mm": "millimeter millimeters millimetre millimetres",
         "in": "inch inches zoll",
-        "1/min": "rpm r/min rev/min revs/min u/min u_/_min upm umdr/min /min min-1 min^-1 1/minute tr/min giri/min",
+        "mil": "mils thou",
+        "uin": "uinch microinch microinches uinches u_in",
+        "1/min": "1/min rpm r/min rev/min revs/min u/min u_/_min upm umdr/min /min min-1 min^-1 1/minute tr/min "
+        "giri/min "
+        "rot/min obr/min ot/min o/min r.p.m umdr./min umdrehungen/min revolutions/min min**-1 min_-1",
         "1/s": "rps rev/s u/s s-1 s^-1",
         "mm/s2": "mm/s^2",
         "m/s2": "m/s^2",
@@ -114,9 +130,13 @@ _WORDS = {
 #: all spellings of words
 SPELLINGS = tuple(_WORDS)
 #: signs that stand for others, or are what a wrong encoding makes of them
-_SIGNS = str.maketrans({"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "·": "*"})
+_SIGNS = str.maketrans(
+    {"µ": "u", "μ": "u", "º": "°", "˚": "°", "²": "2", "−": "-", "⁻": "-", "¹": "1", "³": "3", "·": "*", "×": "*"}
+)
 #: a count of a unit, such as 0.001 mm, 1/1000 mm, 10 um
-_COUNT = re.compile(r"(\d+(?:[.,]\d+)?)(?:/(\d+))? ?([^\d\s/].*)")
+_COUNT = re.compile(r"(\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)(?:/(\d+))? ?\*? ?([^\d\s/*].*)")
+#: powers of ten in all their spellings: 10^-3 mm, 10-3 mm, 10**3 rpm, E-3 mm, x1000 rpm
+_POWER = re.compile(r"(?<![\d.])(?:10(?:\^|\*\*)?|[eE])([-+]\d)(?=[ *])|(?<![\d.])(?:10(?:\^|\*\*))(\d)(?=[ *])")
 
 #: a number and its unit, such as 12.5 mm, 1e-3urad or 6000 1/min
 _MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?|(?<=\s)1/.*?)\s*")
@@ -181,7 +201,7 @@ def is_unit(symbol: str) -> bool:
 def _name(symbol: str) -> str:
     """Return the symbol under which a unit is kept, of one of its spellings."""
     plain = " ".join(symbol.removeprefix("Â").replace("℃", "°C").replace("℉", "°F").translate(_SIGNS).split())
-    plain = plain.replace("° ", "°")
+    plain = _POWER.sub(lambda found: f"1e{found[1] or found[2]}", plain.replace("° ", "°").lstrip("x* "))
     word = plain.casefold().removesuffix(".").replace(" ", "_")
     return _ALIASES.get(plain) or _WORDS.get(word, plain)
 

@@ -9,29 +9,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
-from thermocomp.core.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, Meaning, understand
+from thermocomp.core.headings import (
+    BRACKETS,
+    Meaning,
+    is_time_name,
+    plain_name,
+    understand,
+)
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.files.mapping import ColumnMap, Mapping, Place
+from thermocomp.files.tables import tell_places
 
 FloatArray = NDArray[np.float64]
 
-#: places of cells that are listed
-_MOST_TOLD = 40
+#: below this no absolute temperature of a machine lies [K]
+_COLDEST = 200.0
+_SCPI_INFINITY = 9.9e37
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
-#: headings of a time column, without their unit, in several languages
-_TIMES = (
-    *("time", "timestamp", "date", "datetime", "date_time", "t", "elapsed", "zeit", "zeitstempel", "messzeit"),
-    *("laufzeit", "temps", "horodatage", "tempo", "tiempo", "timestamps", "time stamp", "date time", "elapsed time"),
-    *("date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit", "datum und uhrzeit", "date/heure", "fecha/hora"),
-    *("data/ora", "date and time", "date & time", "datumzeit"),
+#: headings of a time without unit, those that say more first
+_BARE = (
+    *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
+    *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
 )
-#: those that hold a number only if they say in which unit
-_NEEDS_UNIT = ("t", "elapsed")
+#: those that mean a time only beside a unit or another one
+_NEEDS_UNIT = ("t", "data", "tag", "day")
 #: headings of a date, and of the time of day beside it
 _DATES = ("date", "datum", "fecha", "data", "tag", "day")
-_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day")
+_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
+#: milliseconds beside a time of whole seconds
+_FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,17 @@ class Column:
     unit: Unit
     rule: ColumnMap
 
+    def refuse_doubtful(self, raw: FloatArray, heading: str, source: str) -> None:
+        """Refuse kelvins that are differences: nothing in a machine hall is colder than -73 degC."""
+        valid = np.abs(raw[np.isfinite(raw)])
+        if self.unit.symbol == "K" and not self.rule.unit and valid.size and float(np.median(valid)) < _COLDEST:
+            raise RecordingError(
+                f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
+                f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = '
+                f'"degC", '
+                'or role = "ignore"'
+            )
+
     def convert(
         self, raw: FloatArray, missing: Sequence[float] = (), place: Callable[[int], str] = "row {}".format
     ) -> tuple[FloatArray, tuple[str, ...]]:
@@ -64,7 +83,8 @@ class Column:
         if absent.any():
             found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
             notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
-        infinite = np.isinf(raw) & ~absent
+        # SCPI: 9.9E37 stands for infinity, 9.91E37 for what is no number
+        infinite = (np.abs(raw) >= _SCPI_INFINITY) & ~absent
         if infinite.any():
             notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")
         values = np.where(absent | infinite, np.nan, raw) if notes else raw
@@ -81,10 +101,9 @@ class Column:
             if beyond.size:
                 values = np.array(values)
                 values[beyond] = np.nan
-                where = ", ".join(place(int(k)) for k in beyond[:_MOST_TOLD]) + " ..." * (beyond.size > _MOST_TOLD)
                 notes.append(
                     f"{self.channel.name}: not within {low:g} to {high:g} {self.unit.symbol}, taken as missing, in "
-                    f"{beyond.size} of {len(raw)} cells: {where}"
+                    f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
                 )
         values = values if self.unit.scale == 1 else values * self.unit.scale
         return (values + self.unit.shift if self.unit.shift else values), tuple(notes)
@@ -102,6 +121,10 @@ class ColumnPlan:
         A unit of time, ``timestamp``, or empty if neither heading nor mapping says.
     date : int or None
         Position of a column of dates that goes with a time of day.
+    fraction : int or None
+        Position of a column of milliseconds that goes with whole seconds.
+    beside : tuple of int
+        Positions of further columns that must hold the same times: one beside each channel.
     cycle : int or None
         Position of the column of cycle labels.
     columns : tuple of Column
@@ -116,6 +139,8 @@ class ColumnPlan:
     time: int
     time_unit: str
     date: int | None
+    fraction: int | None
+    beside: tuple[int, ...]
     cycle: int | None
     columns: tuple[Column, ...]
     left_out: tuple[int, ...] = ()
@@ -142,13 +167,20 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     UnitError
         A unit is unknown, or the one in the heading cannot measure what the mapping states.
     """
-    _refuse_twins(headings, mapping, source)
     meanings = _understand_all(headings, mapping, source)
-    time, date, notes = _find_time(headings, meanings, mapping, source)
+    try:
+        time, date, notes = _find_time(headings, meanings, mapping, source)
+    except RecordingError:
+        _refuse_twins(headings, mapping, source)
+        raise
+    twins = [k for k, heading in enumerate(headings) if heading == headings[time] and k != time]
+    beside = () if mapping.time.column else tuple(twins)
+    _refuse_twins(headings, mapping, source, headings[time] if beside else "")
+    fraction = None if mapping.time.column else _find_fraction(headings, time)
     cycle = _find_cycle(headings, mapping, source)
     columns: list[Column] = []
     tables: dict[int, str] = {}
-    ignored = {k for k in (time, date, cycle) if k is not None}
+    ignored = {k for k in (time, date, fraction, cycle, *beside) if k is not None}
     for name, rule in mapping.columns.items():
         place = rule.column or name
         if rule.role == "ignore" and isinstance(place, str) and place not in headings:
@@ -182,30 +214,8 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     time_unit, note = _time_unit(headings[time], meanings[time], mapping, source)
     notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
-    return ColumnPlan(time, time_unit, date, cycle, tuple(columns), tuple(left_out), aliases, tuple(notes))
-
-
-def why_left_out(heading: str) -> str:
-    """Say what a heading that `understand` makes nothing of lacks, and what to do."""
-    found = BRACKETS.fullmatch(heading.strip())
-    symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
-    mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
-    ignore = 'role = "ignore" if it is of no use'
-    if not found and "_" not in heading:
-        return f"{heading!r} has no unit; put it behind the name (t1_C), or write {mapped} role and unit, or {ignore}"
-    try:
-        meant = find_unit(symbol)
-    except UnitError:
-        near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
-        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(HOUSE_SUFFIX)} and others"
-        return (
-            f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
-            f"or {ignore}"
-        )
-    return (
-        f"{heading!r}: {symbol!r} counts as a unit of {meant.quantity} only by a mapping; write {mapped} "
-        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
-    )
+    found = tuple(columns), tuple(left_out), aliases, tuple(notes)
+    return ColumnPlan(time, time_unit, date, fraction, beside, cycle, *found)
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:
@@ -259,17 +269,20 @@ def _find_time(
         date = _position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
         return _position(mapping.time.column, headings, "[time]", source), date, []
     timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
-    plain = {h.strip().casefold(): k for k, h in enumerate(headings)}
-    named = [k for k, m in timed.items() if m.base.casefold() in _TIMES]
-    if named:
-        return named[0], None, []
+    # of two columns of one name the first is meant
+    plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
+    named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
+    clear = [k for k in named if timed[k].base != "T"]  # T_s may be the temperature of a surface
+    if clear:
+        return clear[0], None, []
     date = next((plain[name] for name in _DATES if name in plain), None)
     clock = next((plain[name] for name in _CLOCKS if name in plain), None)
     if date is not None and clock is not None:
         return clock, date, []
-    bare = [plain[name] for name in (*_TIMES, "datum") if name in plain and name not in _NEEDS_UNIT]
-    if bare:
-        return bare[0], None, []
+    names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
+    bare = [plain[name] for name in names if name not in _NEEDS_UNIT]
+    if bare or named:
+        return [*bare, *named][0], None, []
     if len(timed) == 1:
         index = next(iter(timed))
         return index, None, [f"{headings[index]!r} is taken as the time"]
@@ -277,6 +290,18 @@ def _find_time(
         f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
         'time_h, timestamp) in the heading line, or give a mapping with [time] column = "..." and unit = "s"'
     )
+
+
+def _find_fraction(headings: Sequence[str], time: int) -> int | None:
+    """Find a column of milliseconds next to the time."""
+    after = time + 1
+    return after if after < len(headings) and _bare_name(headings[after]) in _FRACTIONS else None
+
+
+def _bare_name(heading: str) -> str:
+    """Return a heading in small letters without whatever stands in brackets."""
+    found = BRACKETS.fullmatch(heading.strip())
+    return plain_name(found["base"] if found else heading)
 
 
 def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: str) -> tuple[str, str]:
@@ -309,19 +334,29 @@ def _mapped(mapping: Mapping) -> set[Place]:
     return {rule.column or name for name, rule in mapping.columns.items()}
 
 
-def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str) -> None:
-    """Refuse columns of one heading, unless the mapping names them by number."""
+def _refuse_twins(headings: Sequence[str], mapping: Mapping, source: str, time: str = "") -> None:
+    """Refuse columns of one heading, unless it is that of the time or the mapping names them by number."""
     numbered = {*_mapped(mapping), mapping.time.column, mapping.time.date}
-    firsts: dict[str, int] = {}
-    for k, heading in enumerate(headings):
-        first = firsts.setdefault(heading, k)
+    places: dict[str, list[int]] = {}
+    for k, heading in enumerate(headings, start=1):
+        places.setdefault(heading, []).append(k)
+    found = {}
+    for heading, twins in places.items():
         alone = mapping.read.only_mapped and heading not in numbered
-        if heading and first < k and not alone and not numbered.issuperset((first + 1, k + 1)):
-            raise RecordingError(
-                f"{source}: columns {first + 1} and {k + 1} are both named {heading!r}; rename one of them, or name "
-                f"both by number in a mapping, such as [columns.NAME] column = {k + 1}",
-                [{"columns": _numbered(heading, first + 1, k + 1)}],
-            )
+        if heading not in ("", time) and len(twins) > 1 and not alone and not numbered.issuperset(twins):
+            found[heading] = twins
+    if found:
+        told = ", ".join(
+            f"columns {' and '.join(map(str, twins))} are {'both' if len(twins) == 2 else 'all'} named {heading!r}"
+            for heading, twins in found.items()
+        )
+        number = next(iter(found.values()))[1]
+        tables = [_numbered(heading, *twins) for heading, twins in found.items()]
+        raise RecordingError(
+            f"{source}: {told}; rename them, or name each by number in a mapping, such as [columns.NAME] column = "
+            f"{number}",
+            [{"columns": {name: said for table in tables for name, said in table.items()}}],
+        )
 
 
 def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:

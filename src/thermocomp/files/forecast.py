@@ -8,7 +8,7 @@ from pathlib import Path
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.core.units import Unit
-from thermocomp.files.columns import why_left_out
+from thermocomp.files.leftout import why_left_out
 
 _TIME = ("time", "t", "elapsed")
 

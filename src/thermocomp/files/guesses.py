@@ -116,7 +116,7 @@ def understand_or_none(heading: str) -> Meaning | None:
 def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
     """Return columns of numbers; those that hold text, or nothing, are left out."""
     try:
-        cells = table.load(columns, [])
+        cells, _ = table.load(columns, [])
         found = {k: cells[k].to_numpy(dtype=np.float64) for k in columns}
     except InputError:  # one of them holds text
         if len(columns) < 2:
@@ -158,7 +158,7 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
             if values is not None and len(values) > 1 and (np.diff(values) > 0).all():
                 return {"column": heading, "unit": "s"}
         else:
-            cells = table.load([], [k])[k].dropna().astype(str)
+            cells = table.load([], [k])[0][k].dropna().astype(str)
             if len(cells) and pd.to_datetime(cells.iloc[:1], format="ISO8601", utc=True, errors="coerce").notna().all():
                 return {"column": heading, "unit": "timestamp"}
     return {}

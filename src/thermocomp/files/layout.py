@@ -1,33 +1,54 @@
-"""Where in a file its headings, its units and its first row stand: loggers write more than a table."""
+"""Where in a file its headings, its units and its first and last row stand: loggers write more than a table."""
 
 import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from thermocomp.core.headings import BRACKETS
+from thermocomp.core.headings import BRACKETS, is_time_name, is_understood
 from thermocomp.core.units import is_unit
-from thermocomp.files.tables import MISSING_TEXT
+from thermocomp.files.numbers import is_filler, is_number_like
 
-#: numbers and times, in all their habits
-_VALUE = re.compile(
-    r"[-+]?[.,]?\d[\d.,:/\-+ eETZ]*(?: ?(?:[AaPp]\.?[Mm]\.?|UTC|GMT))?|\d{1,2}[-. ]\w{3,9}\.?[-. ]\d{2,4}[\d:., ]*"
+#: dates and times of day, in all their habits
+_TIME = re.compile(
+    r"'?(?:\d{1,4}[-./ ] ?(?:\d{1,2}|[^\W\d_]{3,9}\.?)[-./ ] ?\d{1,4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
+    r"|(?:\d+ days? )?\d{1,4}:\d\d)"
+    r"(?!\d)[-\dT.,:+ ]*(?:[AaPp]\.?[Mm]\.?)?(?: ?[A-Z]{1,4})?(?:[+-]\d\d:?\d\d)?|\d{8}T\d{4,6}[\dZ.,+:-]*"
 )
+#: characters of a date with a time of day
+_LONGEST = 60
 #: share of the columns of numbers that have one in a row of the table
 _ROW = 0.5
 #: what stands for no unit in a row of units
 _NO_UNIT = frozenset(("", "-", "--", "1"))
+#: text rows between the headings and the first row of numbers
+_MOST_BETWEEN = 12
+#: rows at the end of a file that may be none of its table
+MOST_REMARKS = 40
+#: words before a row of statistics, in small letters
+_STATISTICS = frozenset(
+    (
+        *("min", "max", "avg", "mean", "std", "stdev", "std dev", "sum", "total", "count", "range", "median", "rms"),
+        *("minimum", "maximum", "average", "standard deviation", "mittel", "mittelwert", "durchschnitt", "summe"),
+        *("anzahl", "spannweite", "standardabweichung", "stabw", "moyenne", "somme", "media", "promedio", "max-min"),
+        *("average value", "minwert", "maxwert", "minimalwert", "maximalwert", "ø", "sigma", "peak-peak", "delta"),
+    )
+)
 
 
 class Layout(NamedTuple):
     """Rows of a file, counted from 0 as they were given."""
 
     heading: int  #: of the headings
-    units: int  #: of units below them; that of the headings if there are none
+    units: int  #: of their units; that of the headings if there are none
+    begin: int  #: first row of the table
 
 
 def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
-    """Find the headings of a table: the first row that is text, has the table's width, and numbers below it.
+    """Find the headings of a table, its units, and its first row.
+
+    Above the first row of numbers stand rows of text. The headings are the first of those that name most columns of
+    numbers; a row of units is known by its units.
 
     Parameters
     ----------
@@ -41,15 +62,51 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     """
     if len(rows) < 2:
         return None
-    width = _find_width(rows)
-    columns = _find_number_columns(rows, width)
-    for k, names in enumerate(rows):
-        if not _is_heading(names, width) or _is_units(names):
+    width = find_width(rows)
+    columns = find_value_columns(rows, width)
+    is_row = [_is_row(row, columns) for row in rows]
+    for begin in range(1, len(rows)):
+        # a row of the numbers of channels, say, is no row of the table: units follow it
+        if not is_row[begin] or (begin + 1 < len(rows) and _is_units(rows[begin + 1])):
             continue
-        for below, row in enumerate(rows[k + 1 : k + 3], k + 1):
-            if _is_row(row, columns) and (below == k + 1 or _is_units(rows[k + 1])):
-                return Layout(k, below - 1)
+        first = begin
+        while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
+            first -= 1
+        above = range(first, begin)
+        units = [k for k in above if _is_units(rows[k])]
+        names = [k for k in above if k not in units and _is_heading(rows[k])]
+        if names:
+            known = [k for k in names if any(is_time_name(cell) or is_understood(cell) for cell in rows[k])]
+            # of rows that say nothing the first that is full; in two columns what stands above is a preamble
+            order = 1 if width == 2 else -1
+            heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
+            return Layout(heading, units[-1] if units else heading, begin)
     return None
+
+
+def find_end(rows: Sequence[Sequence[str]], columns: Sequence[int], width: int) -> int:
+    """Count the rows at the end of a file that are none of its table: remarks and statistics.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Cells of the last rows.
+    columns : sequence of int
+        That hold values.
+    width : int
+        Cells of a row of the table.
+
+    Returns
+    -------
+    int
+        A row that was cut off, or lacks its time, is not counted: it begins as one of the table.
+    """
+    count = 0
+    for row in reversed(rows):
+        if not _is_remark(row, columns, width):
+            break
+        count += 1
+    return count
 
 
 def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str, ...]:
@@ -68,54 +125,106 @@ def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str,
     tuple of str
     """
     found = []
-    if layout.heading:
-        few = layout.heading == 1
-        place = f"{word} {numbers[0]}" if few else f"{word}s {numbers[0]} to {numbers[layout.heading - 1]}"
-        found.append(f"{place} above the headings {'is' if few else 'are'} passed over")
-    if layout.units > layout.heading:
+    above = [numbers[k] for k in range(layout.heading) if k != layout.units]
+    between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
+    for passed, where in ((above, "above the headings"), (between, "between the headings and the table")):
+        if passed:
+            found.append(f"{tell_rows(passed, word)} {where} {'is' if len(passed) == 1 else 'are'} passed over")
+    if layout.units != layout.heading:
         found.append(f"{word} {numbers[layout.units]} holds the units")
     return tuple(found)
+
+
+def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
+    """Return in words which lines repeat the headings."""
+    places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
+    return (f"the headings come again, passed over, in line {places}",) if lines else ()
+
+
+def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
+    """Return in words which rows at the end are left out."""
+    what = "is no row" if len(numbers) == 1 else "are no rows"
+    return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
+
+
+def tell_rows(numbers: Sequence[int], word: str) -> str:
+    """Return places of neighbouring rows in words: ``line 3``, ``lines 3 to 7``."""
+    return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
 
 
 def join_units(headings: Sequence[str], units: Sequence[str]) -> list[str]:
     """Put the units of a row into the headings above them, where these have none."""
     found = []
     for k, heading in enumerate(headings):
-        unit = units[k].strip().strip("[]()") if k < len(units) else ""
-        found.append(heading if unit in _NO_UNIT or BRACKETS.fullmatch(heading) else f"{heading} [{unit}]")
+        unit = units[k].strip().strip("[]()").strip() if k < len(units) else ""
+        bare = unit in _NO_UNIT or is_time_name(unit) or not heading or BRACKETS.fullmatch(heading)
+        found.append(heading if bare else f"{heading} [{unit}]")
     return found
 
 
-def _find_width(rows: Sequence[Sequence[str]]) -> int:
+def name_stamps(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[list[str], tuple[str, ...]]:
+    """Name a first column without heading that holds dates, as the index of a data frame does, and say so."""
+    first = next((row[0].strip() for row in rows if row and row[0].strip()), "")
+    if headings and not headings[0] and is_stamp(first):
+        return ["timestamp", *headings[1:]], ("column 1 has no heading and holds dates: taken as the time",)
+    return list(headings), ()
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell holds a date or a time of day."""
+    return len(cell) < _LONGEST and _TIME.fullmatch(cell.strip()) is not None
+
+
+def find_width(rows: Sequence[Sequence[str]]) -> int:
     """Return the commonest number of cells in the later half of the rows, where a preamble is over."""
     counts = Counter(len(row) for row in rows[len(rows) // 2 :])
     return max(counts, key=lambda width: (counts[width], width))
 
 
-def _find_number_columns(rows: Sequence[Sequence[str]], width: int) -> list[int]:
+def find_value_columns(rows: Sequence[Sequence[str]], width: int) -> list[int]:
     """Return the columns that hold values in most of the later rows."""
     later = [row for row in rows[len(rows) // 2 :] if len(row) == width]
     counts = Counter(k for row in later for k, cell in enumerate(row) if _is_value(cell))
     return [k for k in range(width) if 2 * counts[k] >= len(later) and counts[k]]
 
 
-def _is_heading(row: Sequence[str], width: int) -> bool:
-    filled = [cell for cell in row if cell.strip()]
+def _is_text(row: Sequence[str], width: int) -> bool:
     # a logger may end its rows, but not its headings, with a delimiter
-    return len(row) in (width, width - 1) and len(filled) >= min(2, width) and not any(map(_is_value, filled))
+    return len(row) in (width, width - 1) and any(cell.strip() for cell in row)
+
+
+def _is_heading(row: Sequence[str]) -> bool:
+    filled = [cell for cell in row if cell.strip()]
+    return len(filled) >= min(2, len(row)) and not any(map(_is_value, filled))
 
 
 def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
-    values = sum(k < len(row) and (_is_value(row[k]) or row[k].strip().casefold() in MISSING_TEXT) for k in columns)
+    values = sum(k < len(row) and (_is_value(row[k]) or is_filler(row[k])) for k in columns)
     some = any(k < len(row) and _is_value(row[k]) for k in columns)
-    return some and values > _ROW * len(columns)
+    begins = bool(columns) and columns[0] < len(row) and (_is_value(row[columns[0]]) or is_filler(row[columns[0]]))
+    return begins and some and values > _ROW * len(columns)
+
+
+def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
+    """Return whether a row at the end is words or a statistic: no row of the table begins so."""
+    words = [k for k, cell in enumerate(row) if cell.strip() and not _is_value(cell) and not is_filler(cell)]
+    if not words or not columns:
+        return False
+    values = any(k < len(row) and _is_value(row[k]) for k in columns)
+    timed = columns[0] < len(row) and _is_value(row[columns[0]])
+    counted = any(row[k].strip().strip(":.").casefold() in _STATISTICS for k in words)
+    return not values or (not timed and (counted or (len(row) < width - 1 and columns[0] in words)))
 
 
 def _is_units(row: Sequence[str]) -> bool:
     """Return whether most of a row's filled cells are units."""
-    filled = [cell.strip().strip("[]()") for cell in row if cell.strip() not in _NO_UNIT]
+    filled = [cell.strip().strip("[]()").strip() for cell in row if cell.strip() not in _NO_UNIT]
     return bool(filled) and 2 * sum(map(is_unit, filled)) > len(filled)
 
 
+def _count_filled(row: Sequence[str], columns: Sequence[int]) -> int:
+    return sum(k < len(row) and bool(row[k].strip()) for k in columns)
+
+
 def _is_value(cell: str) -> bool:
-    return _VALUE.fullmatch(cell.strip()) is not None
+    return is_number_like(cell) or is_stamp(cell)

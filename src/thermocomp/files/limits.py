@@ -12,6 +12,7 @@ _UNPACKED_FREE: Final = 64 << 20
 #: what each limit counts, for messages
 _COUNTED: Final = {
     "file_bytes": "bytes",
+    "recoded_bytes": "bytes of a text in another encoding",
     "line_bytes": "bytes in a line or a text",
     "cell_characters": "characters in a cell",
     "heading_characters": "characters in a heading",
@@ -37,6 +38,8 @@ class Limits:
     ----------
     file_bytes : int
         Of any file: beyond the memory of a workshop's computer.
+    recoded_bytes : int
+        Of a file of text that has to be brought to UTF-8, or to the line ends of today, in memory.
     line_bytes : int
         Of a line of text, or of a text in a workbook: 10,000 columns of 400 characters.
     cell_characters : int
@@ -65,6 +68,7 @@ class Limits:
     """
 
     file_bytes: int = 8 << 30
+    recoded_bytes: int = 1 << 30
     line_bytes: int = 4_000_000
     cell_characters: int = 32_767
     heading_characters: int = 1_000

@@ -12,13 +12,15 @@ import pandas as pd
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
 from thermocomp.files.limits import Limits
+from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.tables import (
     EMBEDDED,
     FileTable,
+    as_floats,
     check_headings,
     clean_heading,
+    convert_all,
     first_is_number,
-    load_column,
 )
 
 if TYPE_CHECKING:
@@ -26,6 +28,10 @@ if TYPE_CHECKING:
     from pyarrow.parquet import ParquetFile
 
 _TEXTS = ("string", "large_string", "binary", "large_binary")
+_TIMES = ("timestamp", "duration")
+#: an index that has no name
+_INDEX = "__index_level_0__"
+_FIRST = 100  # cells that tell whether a column holds numbers
 _BATCH = 65_536  # rows that are unpacked at a time
 _BUFFER = 1 << 18  # bytes of a column that are read at a time; else all of a row group are
 #: where pandas keeps what belongs to a table
@@ -47,6 +53,8 @@ class ParquetTable:
     n_rows : int
     embedded : str
     limits : Limits
+    decimal : str
+        Decimal sign of numbers that are texts, if it is known beforehand.
     notes : tuple of str
     """
 
@@ -57,6 +65,7 @@ class ParquetTable:
     n_rows: int
     embedded: str
     limits: Limits
+    decimal: str = ""
     notes: tuple[str, ...] = ()
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
@@ -64,14 +73,15 @@ class ParquetTable:
         for batch in self._batches([column]):
             filled = batch.column(0).drop_null()
             if len(filled):
-                return first_is_number(filled.slice(0, 1).to_pandas(), empty=empty)
+                return first_is_number(filled.slice(0, _FIRST).to_pandas(), empty=empty)
         return empty
 
-    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `thermocomp.files.tables.FileTable.load`."""
         wanted = [*numbers, *texts]
-        values = {k: np.empty(self.n_rows) for k in numbers}
-        parts: dict[int, list[pd.Series[Any]]] = {k: [] for k in texts}
+        written = [k for k in numbers if self.names[k] in self.texts]
+        values = {k: np.empty(self.n_rows) for k in numbers if k not in written}
+        parts: dict[int, list[pd.Series[Any]]] = {k: [] for k in (*texts, *written)}
         row = size = 0
         with _translated(self.path):
             for batch in self._batches(wanted):
@@ -83,14 +93,16 @@ class ParquetTable:
                     if isinstance(cells.dtype, pd.CategoricalDtype):
                         cells = cells.astype(object)
                     if k in values:
-                        values[k][row:stop] = load_column(self, str(self.path), cells, k, row)
+                        values[k][row:stop] = as_floats(cells)
                     else:
                         parts[k].append(cells)
                 row = stop
         if row != self.n_rows:
             raise RecordingError(f"{self.path}: says it has {self.n_rows} rows, and has {row}; write it anew")
-        data = {**values, **{k: pd.concat(p, ignore_index=True) for k, p in parts.items()}}
-        return pd.DataFrame({k: data[k] for k in wanted}, copy=False)
+        columns = {k: pd.concat(p, ignore_index=True) for k, p in parts.items()}
+        numbered, notes = convert_all(self, str(self.path), {k: columns[k] for k in written}, self.decimal)
+        data = {**columns, **values, **numbered}
+        return pd.DataFrame({k: data[k] for k in wanted}, copy=False), notes
 
     def place(self, row: int) -> str:
         """Say in which row of the file, counted from 1, a row stands."""
@@ -121,12 +133,13 @@ def _translated(path: Path) -> Iterator[None]:
         ) from e
 
 
-def open_parquet(path: Path, limits: Limits) -> FileTable:
+def open_parquet(path: Path, options: ReadOptions, limits: Limits) -> FileTable:
     """Open a Parquet file.
 
     Parameters
     ----------
     path : Path
+    options : ReadOptions
     limits : Limits
 
     Raises
@@ -148,9 +161,22 @@ def open_parquet(path: Path, limits: Limits) -> FileTable:
         names = _names(file)
         texts = [f.name for f in schema if str(f.type) in _TEXTS]
         embedded = _embedded(schema.metadata or {})
-    headings = [clean_heading("index" if name == "__index_level_0__" else name) for name in names]
+        times = [f.name for f in schema if str(f.type).startswith(_TIMES)]
+    index = "timestamp" if _INDEX in times else "index"
+    notes = ("the index has no name and holds times: taken as the time",) if _INDEX in times else ()
+    headings = [clean_heading(index if name == _INDEX else name) for name in names]
     check_headings(path, headings, about.num_rows, limits)
-    return ParquetTable(path, tuple(names), tuple(headings), tuple(texts), about.num_rows, embedded, limits)
+    return ParquetTable(
+        path=path,
+        names=tuple(names),
+        headings=tuple(headings),
+        texts=tuple(texts),
+        n_rows=about.num_rows,
+        embedded=embedded,
+        limits=limits,
+        decimal=options.decimal,
+        notes=notes,
+    )
 
 
 def _names(file: "ParquetFile") -> list[str]:

@@ -73,7 +73,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     columns = {role: k for role in NAMES if (k := _find(table, role)) is not None}
     numbers = {role: columns[role] for role in ("position", "deviation")}
     texts = {role: k for role, k in columns.items() if role not in numbers}
-    cells = table.load(list(numbers.values()), list(texts.values()))
+    cells, _ = table.load(list(numbers.values()), list(texts.values()))
     values = {}
     for role, column in numbers.items():
         raw, meant = cells[column].to_numpy(dtype=np.float64), _unit(table, column, role)

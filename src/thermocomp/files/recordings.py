@@ -16,8 +16,9 @@ from pydantic import ValidationError
 from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
 from thermocomp.core.headings import understand
-from thermocomp.files.columns import Column, ColumnPlan, plan, why_left_out
+from thermocomp.files.columns import Column, ColumnPlan, plan
 from thermocomp.files.guesses import guess
+from thermocomp.files.leftout import refuse_nameless, why_left_out
 from thermocomp.files.limits import Limits, check_file
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.files.parquet import open_parquet
@@ -116,22 +117,26 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         raise
     notes.extend(columns.notes)
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
-    numbers = [c.index for c in columns.columns] + ([] if is_stamp else [columns.time])
+    numbers = [c.index for c in columns.columns]
     more = {h: table.headings.index(h) for h in extra if h in table.headings}
-    texts = [
-        k for k in (columns.time if is_stamp else None, columns.date, columns.cycle, *more.values()) if k is not None
-    ]
-    cells = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
-    time, start = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
-    if not is_stamp and not columns.time_unit:
-        notes.append(f"{table.headings[columns.time]!r} has no unit and is taken as seconds")
+    if is_stamp and columns.fraction is not None:
+        numbers.append(columns.fraction)
+    times = [columns.time, *columns.beside]
+    numbers += [] if is_stamp else times
+    texts = [k for k in (*(times if is_stamp else ()), columns.date, columns.cycle, *more.values()) if k is not None]
+    cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
+    notes.extend(told)
+    time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+    notes.extend(told)
     data, changed = {}, list[str]()
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
+        column.refuse_doubtful(raw, table.headings[column.index], str(source))
         data[column.channel.name], found = _convert(column, raw, mapping.read.missing, table)
         changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
+    refuse_nameless([table.headings[k] for k in numeric], str(source))
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
     texts_only = [table.headings[k] for k in left_out if k not in set(numeric)]
     if texts_only:
@@ -284,7 +289,7 @@ def _opened(path: Path, options: ReadOptions, limits: Limits) -> tuple[FileTable
         if ending in (".xlsx", ".ods"):
             return open_workbook(path, options, limits), sha256
         if ending == ".parquet":
-            return open_parquet(path, limits), sha256
+            return open_parquet(path, options, limits), sha256
         return open_csv(path, options, limits), sha256
     except FileNotFoundError as e:
         others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
@@ -332,18 +337,18 @@ def _times(
     *,
     is_stamp: bool,
     rising: bool,
-) -> tuple[FloatArray, str]:
+) -> tuple[FloatArray, str, tuple[str, ...]]:
     where = f"{source}: column {table.headings[columns.time]!r}"
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            time, start = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
+            time, start, notes = read_times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     except (ValueError, OverflowError, TypeError) as e:  # a format that is none, a year that no clock has
         raise RecordingError(
             f"{where}: the times cannot be read ({e}); correct [time] format in the mapping or in the file's first line"
         ) from e
     if not np.isfinite(time).all():
         raise RecordingError(f"{where}: the times are too far apart for a number; correct them")
-    return time, start
+    return time, start, notes
 
 
 def _convert(

@@ -1,22 +1,26 @@
 """Raw tables, their cells not yet understood: what all kinds of files share."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, Remedy
 from thermocomp.files.limits import Limits
+from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like, is_word
+
+FloatArray = NDArray[np.float64]
 
 #: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
-
-#: texts that stand for a missing value, besides an empty cell
-MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
+#: places of cells that are listed
+_MOST_TOLD = 40
+_UNGROUPED = re.compile(r"[-+]?\d{4}")
 
 #: what a spreadsheet calculates, perhaps behind apostrophes
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n\u240d\u240a]")
@@ -43,8 +47,10 @@ class FileTable(Protocol):
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
 
-    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
-        """Read some columns, as float64 and as they are; the table's columns are named by position.
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read some columns, as float64 and as they are, and say what was made of their cells.
+
+        The table's columns are named by position.
 
         Raises
         ------
@@ -71,6 +77,8 @@ class FrameTable:
         Row in the file of each row of `frame`, from 1.
     embedded : str
     notes : tuple of str
+    decimal : str
+        Decimal sign of numbers that are texts, if it is known beforehand.
     """
 
     source: str
@@ -79,17 +87,20 @@ class FrameTable:
     rows: Sequence[int]
     embedded: str = ""
     notes: tuple[str, ...] = ()
+    decimal: str = ""
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
         return first_is_number(self.frame[column], empty=empty)
 
-    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
-        """Read columns; see `Table.load`."""
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read columns; see `FileTable.load`."""
         data = {k: self.frame[k] for k in texts}
+        written = {k: self.frame[k] for k in numbers if not pd.api.types.is_numeric_dtype(self.frame[k].dtype)}
+        values, notes = convert_all(self, self.source, written, self.decimal)
         for k in numbers:
-            data[k] = load_column(self, self.source, self.frame[k], k)
-        return pd.DataFrame(data, copy=False)
+            data[k] = pd.Series(values[k] if k in written else as_floats(self.frame[k]))
+        return pd.DataFrame(data, copy=False), notes
 
     def place(self, row: int) -> str:
         """Say in which row of the sheet or file, counted from 1, a row stands."""
@@ -98,27 +109,14 @@ class FrameTable:
 
 def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
     """Return whether the first filled cell is a number; `empty` if there is none."""
-    filled = cells.dropna()
-    return empty if filled.empty else is_float(str(filled.iloc[0]))
+    filled = (str(cell) for cell in cells.dropna())
+    first = next((cell for cell in filled if not is_filler(cell)), None)
+    return empty if first is None else is_number_like(first)
 
 
-def load_column(
-    table: FileTable, source: str, cells: "pd.Series[Any]", column: int, first: int = 0
-) -> "pd.Series[float]":
-    """Return the cells of a column as numbers; the first of them stands in row `first` of the table.
-
-    Raises
-    ------
-    RecordingError
-        One of them is no number.
-    """
-    if cells.dtype == np.float64:
-        return cells
-    bad = not_numbers(cells).to_numpy()
-    if bad.any():
-        row = int(np.flatnonzero(bad)[0])
-        refuse_cell(table, source, first + row, column, cells.iloc[row])
-    return pd.to_numeric(cells, errors="coerce").astype(np.float64)
+def as_floats(cells: "pd.Series[Any]") -> FloatArray:
+    """Return the cells of a column of numbers; nan where there is none."""
+    return cells.to_numpy(dtype=np.float64, na_value=np.nan)
 
 
 def clean_heading(cell: object) -> str:
@@ -206,15 +204,119 @@ def skip_row(table: FileTable, row: int) -> Remedy:
     return {"read": {"skip": [int(table.place(row).split()[-1])]}}
 
 
-def not_numbers(cells: "pd.Series[Any]") -> "pd.Series[bool]":
-    """Return where a cell is filled with something that is not a number."""
-    filled = cells.notna()
-    if pd.api.types.is_datetime64_any_dtype(cells.dtype):
-        return filled
-    bad = filled & pd.to_numeric(cells, errors="coerce").isna()
-    if bad.any():
-        bad &= ~cells.astype(str).str.strip().str.casefold().isin(MISSING_TEXT)
-    return bad
+def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
+    """Return how the numbers of a file are written; see `Signs.decide`."""
+    try:
+        return signs.decide(stated, delimiter) or Notation(".")
+    except RecordingError as e:
+        raise RecordingError(f"{source}: {e}") from e
+
+
+def convert_all(
+    table: FileTable, source: str, columns: Mapping[int, "pd.Series[Any]"], decimal: str
+) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
+    """Read the numbers of columns whose cells are texts, all in one notation; see `convert`.
+
+    Parameters
+    ----------
+    table : FileTable
+    source : str
+        The file.
+    columns : mapping of int to Series
+        By their position in `table`.
+    decimal : str
+        Decimal sign, if it is known beforehand.
+    """
+    signs = Signs()
+    for cells in columns.values():
+        signs.add(cell for cell in cells if isinstance(cell, str))
+    notation = decide(signs, decimal, "", source)
+    values, notes = dict[int, FloatArray](), list[str]()
+    for k, cells in columns.items():
+        values[k], found = convert(table, source, k, cells, notation)
+        notes += found
+    return values, (*tell_notation(notation), *notes)
+
+
+def tell_notation(notation: Notation) -> tuple[str, ...]:
+    """Say how numbers are written, where not as in Python."""
+    notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
+    if notation.thousands:
+        notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
+    return notes
+
+
+def convert(
+    table: FileTable, source: str, column: int, cells: "pd.Series[Any]", notation: Notation
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Read the numbers of a column whose cells are texts.
+
+    Parameters
+    ----------
+    table : FileTable
+    source : str
+        The file.
+    column : int
+        Position of the column in `table`.
+    cells : Series
+        Numbers, texts, and None where there is nothing.
+    notation : Notation
+
+    Returns
+    -------
+    values : ndarray of shape (n_rows,)
+        nan where a word stands for a missing number.
+    notes : tuple of str
+        Which words, and where.
+
+    Raises
+    ------
+    RecordingError
+        A cell holds anything else; the message names it.
+    """
+    values = np.full(len(cells), np.nan)
+    words: dict[str, list[int]] = {}
+    grouped = -1
+    for row, cell in enumerate(cells):
+        if not isinstance(cell, str):
+            if cell is not None and not pd.isna(cell):
+                try:
+                    values[row] = float(cell)
+                except (TypeError, ValueError) as e:
+                    refuse_cell(table, source, row, column, cell, e)
+            continue
+        number = notation.read(cell)
+        if number is not None:
+            values[row] = number
+            if grouped < 0 and notation.thousands and any(s in cell.strip() for s in notation.thousands):
+                grouped = row
+        elif is_word(cell):
+            words.setdefault(cell.strip(), []).append(row)
+        elif cell.strip().casefold() not in MISSING_TEXT:
+            refuse_cell(table, source, row, column, cell)
+    if grouped >= 0:
+        _refuse_mixed(table, source, column, cells, grouped)
+    return values, tuple(
+        f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: "
+        f"{tell_places(rows, table.place)}"
+        for word, rows in words.items()
+    )
+
+
+def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
+    """List where rows stand, not too many of them."""
+    return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
+
+
+def _refuse_mixed(table: FileTable, source: str, column: int, cells: "pd.Series[Any]", grouped: int) -> None:
+    """Refuse thousands with and without separator in one column: the separator may be a decimal sign there."""
+    for row, cell in enumerate(cells):
+        if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
+            raise RecordingError(
+                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} "
+                f"with a "
+                f"separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
+            )
 
 
 def is_float(text: str) -> bool:

@@ -1,42 +1,43 @@
 """CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
 
-import csv
-import re
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
+from thermocomp.files.encodings import bring_to_utf8, find_encoding
+from thermocomp.files.layout import (
+    MOST_REMARKS,
+    Layout,
+    find_end,
+    find_layout,
+    find_value_columns,
+    find_width,
+    join_units,
+    name_stamps,
+    tell_again,
+    tell_end,
+    tell_layout,
+)
 from thermocomp.files.limits import Limits
 from thermocomp.files.mapping import ReadOptions
-from thermocomp.files.tables import (
-    EMBEDDED,
-    MISSING_TEXT,
-    check_headings,
-    clean_heading,
-    is_float,
-    not_numbers,
-    refuse_cell,
-)
+from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
+from thermocomp.files.tables import check_headings, clean_heading, convert, decide, tell_notation
+from thermocomp.files.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
 
 #: lines that tell how the file is written; fewer if they are long
 _SAMPLE_LINES = 100
 _SAMPLE_BYTES = 2 << 20
 _CHUNK = 100_000  # rows that are text in memory at a time
-_BOM = b"\xef\xbb\xbf"
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
-_SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
-#: a spreadsheet puts quotation marks around the line
-_OWN = (f"# {EMBEDDED}: ".encode(), f'"# {EMBEDDED}: '.encode())
-_POINT = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 # pandas before 3.1 may read the last digit wrong unless told
 _PANDAS = tuple(int(n) for n in pd.__version__.split(".")[:2])
 _EXACT: dict[str, Any] = {} if _PANDAS >= (3, 1) else {"float_precision": "round_trip"}
@@ -54,58 +55,87 @@ class CsvTable:
         Cells of the first rows.
     delimiter : str
         One character; a space stands for any white space.
-    decimals : str
-        Decimal signs to try, in this order.
+    decimal : str
+        Decimal sign, if it is known beforehand.
     encoding : str
+    errors : {'strict', 'replace'}
+        What is done about bytes that are none of that encoding.
     skipped : tuple of int
         Lines that are no rows (headings, comments, blank ones), from 0.
     n_rows : int
     embedded : str
     notes : tuple of str
+    data : bytes or None
+        The whole file in UTF-8, where it had to be brought to that.
     """
 
     path: Path
     headings: tuple[str, ...]
     sample: tuple[tuple[str, ...], ...]
     delimiter: str
-    decimals: str
+    decimal: str
     encoding: str
+    errors: str
     skipped: tuple[int, ...]
     n_rows: int
     embedded: str
     notes: tuple[str, ...] = ()
+    data: bytes | None = None
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if the first rows have none."""
-        cells = (row[column].strip() for row in self.sample if column < len(row))
-        first = next((c for c in cells if c.casefold() not in MISSING_TEXT), None)
-        return empty if first is None else is_float(first.replace(",", "."))
+        cells = (row[column] for row in self.sample if column < len(row))
+        first = next((c for c in cells if not is_filler(c)), None)
+        return empty if first is None else is_number_like(first)
 
-    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
+    def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `thermocomp.files.tables.FileTable.load`."""
+        signs = Signs()
+        for row in self.sample:
+            signs.add(row[k] for k in numbers if k < len(row))
+        decimal = self.decimal or ("," if signs.proven[","] > signs.proven["."] else ".")
+        if self.decimal or signs.proven or (self.delimiter == "," and not signs.open):
+            with suppress(ValueError):
+                return self._load_plain(numbers, texts, decimal), tell_notation(Notation(decimal))
+        return self._load_anyhow(numbers, texts)
+
+    def _load_plain(self, numbers: Sequence[int], texts: Sequence[int], decimal: str) -> pd.DataFrame:
+        """Read columns of numbers that are all written in one way; a ValueError if they are not."""
         types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
-        options = self._options(types)
-        failure: ValueError = ValueError("nothing tried")
-        for decimal in self.decimals:
-            try:
-                with pd.read_csv(self.path, decimal=decimal, **options, **_EXACT) as chunks:
-                    frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
-                if len(frame) != self.n_rows:
-                    raise RecordingError(
-                        f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
-                        "goes over the end of its line; close it, or delete the mark"
-                    )
-                return frame
-            except UnicodeDecodeError as e:
-                raise RecordingError(
-                    f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
-                    "[read] encoding"
-                ) from e
-            except ValueError as e:
-                failure = e
-        with suppress(ValueError):  # pandas' own reasons; what is wrong with a cell comes as a RecordingError
-            self._refuse_text(numbers, failure)
-        raise RecordingError(f"{self.path}: cannot be read as a table: {failure}") from failure
+        return self._read_frame(types, decimal=decimal, **_EXACT)
+
+    def _load_anyhow(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+        """Read columns cell by cell: slowly, with whatever may stand in place of a number."""
+        try:
+            frame = self._read_frame(dict.fromkeys((*texts, *numbers), str))
+        except ValueError as e:
+            raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
+        signs = Signs()
+        for k in numbers:
+            signs.add(frame[k].dropna())
+        notation = decide(signs, self.decimal, self.delimiter, str(self.path))
+        notes = tell_notation(notation)
+        for k in numbers:
+            values, found = convert(self, str(self.path), k, frame[k], notation)
+            frame[k] = values
+            notes += found
+        return frame, notes
+
+    def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
+        try:
+            with pd.read_csv(BytesIO(self.data) if self.data else self.path, **self._options(types), **more) as chunks:
+                frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
+        except UnicodeDecodeError as e:
+            raise RecordingError(
+                f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
+                "[read] encoding"
+            ) from e
+        if len(frame) != self.n_rows:
+            raise RecordingError(
+                f"{self.path}: {self.n_rows} lines give {len(frame)} rows: a quotation mark opens a cell that "
+                "goes over the end of its line; close it, or delete the mark"
+            )
+        return frame
 
     def place(self, row: int) -> str:
         """Say in which line of the file, counted from 1, a row stands."""
@@ -125,20 +155,11 @@ class CsvTable:
             "skiprows": list(self.skipped),
             "skipinitialspace": True,
             "encoding": self.encoding,
+            "encoding_errors": self.errors,
             "chunksize": _CHUNK,
             "keep_default_na": False,
             "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
         }
-
-    def _refuse_text(self, numbers: Sequence[int], cause: Exception) -> None:
-        """Name the first cell that is not a number; slow, but only met on the way to an error."""
-        with pd.read_csv(self.path, **self._options(dict.fromkeys(numbers, str))) as chunks:
-            for chunk in chunks:
-                bad = np.logical_and.reduce([_not_numbers(chunk, decimal) for decimal in self.decimals])
-                if bad.any():
-                    row, k = (int(v) for v in np.argwhere(bad)[0])
-                    column: Any = chunk.columns[k]
-                    refuse_cell(self, str(self.path), int(chunk.index[row]), column, chunk.iloc[row, k], cause)
 
 
 def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> CsvTable:
@@ -156,55 +177,93 @@ def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> Csv
     RecordingError
         Empty, binary, no heading line, no rows, one column, rows of unequal length, or over a limit.
     """
-    skipped: list[int] = []
-    top = options.heading - 1
-    content = partial(_content, path, options, limits=limits, returns=_refuse_binary(path))
-    first = _sample(content([]), top)
-    if not first:
-        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
-    sample = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
-    delimiter, layout = _find_table(path, sample, options.delimiter or _separator(path), limits)
-    ending = delimiter.encode()
-    heading, begin = first[layout.heading][1], 1 + max(layout)
-    plain = delimiter != " "
-    width, is_utf8, n_rows, long = _cells(heading, delimiter), True, -begin, limits.cell_characters
-    for number, line in content(skipped):
-        is_utf8 = is_utf8 and (line.isascii() or _is_utf8(line))
-        n_rows += number >= top
-        if n_rows <= 0:  # what stands above the rows
-            skipped.append(number)
-            continue
-        cells = line.count(ending) + 1 if plain and b'"' not in line else _cells(line, delimiter)
-        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
-            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        if cells != width:
-            text = _ragged(path, number + 1, cells, width, line, delimiter)
-            raise RecordingError(text, [{"read": {"skip": [number + 1]}}])
-        if len(line) > long:
-            most = max(map(len, _split(line.decode("latin-1"), delimiter)))
-            limits.check("cell_characters", most, f"{path}: line {number + 1}")
-    encoding = options.encoding or ("utf-8" if is_utf8 else "latin-1")
+    data, told = bring_to_utf8(path, limits)
+    lines = open_lines(path, data, options, limits)
+    head = _read_head(lines)
+    delimiter, layout, first = head.delimiter, head.layout, head.lines
+    body = _scan(lines, head)
+    encoding = options.encoding or (find_encoding(body.odd) if body.odd else "utf-8")
+
+    def split(line: bytes, errors: str = "replace") -> list[str]:
+        return split_line(line.decode(encoding, errors), delimiter)
+
+    rows = [split(line) for _, line in first[layout.begin :]]
+    remarks = list[int]()
+    if rows and body.n_rows > 1:
+        last = [split(line) for _, line in body.tail]
+        count = find_end(last, find_value_columns(rows, find_width(rows)), body.width)
+        remarks = [number for number, _ in body.tail][len(last) - min(count, body.n_rows - 1) :]
+    if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
+        raise RecordingError(body.ragged[1], [{"read": {"skip": [body.ragged[0] + 1]}}])
     try:
-        headings = [clean_heading(h) for h in _split(heading.decode(encoding), delimiter)]
+        headings = [
+            clean_heading(h) for h in split(first[layout.heading][1], "strict" if options.encoding else "replace")
+        ]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
-    headings += [""] * (width - len(headings))
-    check_headings(path, headings, n_rows, limits)
-    if layout.units > layout.heading:
-        headings = join_units(headings, _split(first[layout.units][1].decode(encoding), delimiter))
-    rows = tuple(tuple(_split(line, delimiter)) for line in sample[begin:])
+    headings += [""] * (body.width - len(headings))
+    check_headings(path, headings, body.n_rows, limits)
+    if layout.units != layout.heading:
+        headings = join_units(headings, split(first[layout.units][1]))
+    headings, named = name_stamps(headings, rows)
+    if body.odd and not options.encoding:
+        told += (f"written in {encoding}, not in UTF-8",)
+    if head.in_remark:
+        told += (f"line {first[0][0] + 1} holds the headings, behind {options.comment!r}",)
     return CsvTable(
         path=path,
+        data=data,
         headings=tuple(headings),
-        sample=rows,
+        sample=tuple(map(tuple, rows)),
         delimiter=delimiter,
-        decimals=options.decimal or _sniff_decimal(rows, delimiter),
+        decimal=options.decimal,
         encoding=encoding,
-        skipped=tuple(skipped),
-        n_rows=n_rows,
-        embedded=_embedded(path, limits),
-        notes=tell_layout([number + 1 for number, _ in first], layout, "line"),
+        errors="strict" if options.encoding else "replace",
+        skipped=tuple(sorted((*body.skipped, *remarks))),
+        n_rows=body.n_rows - len(remarks),
+        embedded=lines.embedded(),
+        notes=(
+            *told,
+            *tell_layout([number + 1 for number, _ in first], layout, "line"),
+            *named,
+            *tell_again(body.again),
+            *tell_end([number + 1 for number in remarks], "line"),
+        ),
     )
+
+
+class _Head(NamedTuple):
+    """What the first lines of a file say."""
+
+    lines: list[tuple[int, bytes]]  #: with their numbers from 0
+    delimiter: str
+    layout: Layout
+    in_remark: bool  #: the headings stand in a comment, as numpy writes them
+
+
+class _Body(NamedTuple):
+    """What a pass over all lines of a file finds."""
+
+    skipped: list[int]  #: lines that are no rows, from 0
+    width: int
+    n_rows: int
+    odd: list[bytes]  #: lines that are not UTF-8
+    again: list[int]  #: lines that repeat the headings, from 1
+    tail: deque[tuple[int, bytes]]  #: the last rows
+    ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
+
+
+def _read_head(lines: Lines) -> _Head:
+    options, limits, path = lines.options, lines.limits, lines.path
+    first = _sample(lines.content([]), options.heading - 1)
+    if not first:
+        raise RecordingError(f"{path}: the file is empty; a recording has a heading line and rows of numbers below it")
+    delimiter, layout = _find_table(path, first, options.delimiter or lines.separator(), limits)
+    remark = lines.remark_above(first[0][0]) if layout is None else None
+    if remark is not None:
+        first = [remark, *first]
+        delimiter, layout = _find_table(path, first, options.delimiter, limits)
+    return _Head(first, delimiter, layout or Layout(0, 0, 1), remark is not None)
 
 
 def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
@@ -220,70 +279,39 @@ def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, b
     return found
 
 
-def _content(
-    path: Path, options: ReadOptions, skipped: list[int], *, limits: Limits, returns: bool
-) -> Iterator[tuple[int, bytes]]:
-    """Yield number and text of each line that is neither blank nor a comment; tell the others in `skipped`."""
-    blank = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
-    comment, most = options.comment.encode(), limits.line_bytes
-    with path.open("rb") as f:
-        for number, raw in enumerate(iter(partial(f.readline, most + 1), b"")):
-            if len(raw) > most:
-                limits.check("line_bytes", len(raw), f"{path}: line {number + 1}")
-            line = raw.removeprefix(_BOM) if number == 0 else raw
-            if returns and line.count(b"\r") > line.endswith(b"\r\n"):  # pandas would count lines otherwise than we do
-                raise RecordingError(
-                    f"{path}: line {number + 1} holds a carriage return that does not end it, as in files of old "
-                    "Macintoshes; save the file with the line ends of Unix or Windows"
-                )
-            if number and line[:1].isalnum() and line[:1] != comment[:1] and not options.skip:
-                yield number, line
-                continue
-            text = line.lstrip()
-            remark = (comment and text.startswith(comment)) or (
-                number == 0 and (text.startswith(_OWN) or _SEPARATOR.fullmatch(raw))
-            )
-            if remark or not text.strip(blank) or options.skips(number + 1):
-                skipped.append(number)
-                limits.check("skipped_lines", len(skipped), path)
-            else:
-                yield number, line
+def _scan(lines: Lines, head: _Head) -> _Body:
+    heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
+    skipped, odd, again = list[int](), list[bytes](), list[int]()
+    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
+    width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
+    top, plain, long = lines.options.heading - 1, delimiter != " ", lines.limits.cell_characters
+    for number, line in lines.content(skipped):
+        if not line.isascii() and len(odd) < _SAMPLE_LINES and not is_utf8(line):
+            odd.append(line)
+        n_rows += number >= top
+        if n_rows <= 0 or line == heading:  # what stands above the rows; or of a logger that was started again
+            again += [number + 1] if n_rows > 0 else []
+            n_rows -= n_rows > 0
+            skipped.append(number)
+            continue
+        cells = line.count(ending) + 1 if plain and b'"' not in line else count_cells(line, delimiter)
+        if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
+            width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
+        tail.append((number, line))
+        if cells != width and ragged is None:
+            ragged = number, describe_ragged(lines.path, number + 1, cells, width, line, delimiter)
+        if len(line) > long:
+            most = max(map(len, split_line(line.decode("latin-1"), delimiter)))
+            lines.limits.check("cell_characters", most, f"{lines.path}: line {number + 1}")
+    return _Body(skipped, width, n_rows, odd, again, tail, ragged)
 
 
-def _embedded(path: Path, limits: Limits) -> str:
-    """Return the description that thermocomp writes into the first line of its own files."""
-    with path.open("rb") as f:
-        line = f.readline(limits.line_bytes).removeprefix(_BOM)
-    if not line.startswith(_OWN):
-        return ""
-    text = line.decode("utf-8", "replace").rstrip(" \t\r\n,;|")
-    if text.startswith('"'):
-        text = _split(text, ";")[0]
-    return text.partition(": ")[2].strip()
-
-
-def _refuse_binary(path: Path) -> bool:
-    """Refuse what is no text; return whether there are carriage returns that end no line."""
-    kinds = {b"PK\x03\x04": "a workbook or zip file", b"PAR1": "a Parquet file", b"\x1f\x8b": "a gzip file"}
-    returns, last = 0, b""
-    with path.open("rb") as f:
-        while block := f.read(1 << 20):
-            if not last and block.startswith((b"\xff\xfe", b"\xfe\xff")):
-                raise RecordingError(f"{path}: is written in UTF-16; save it as UTF-8 (in a spreadsheet: CSV UTF-8)")
-            kind = "" if last else next((k for magic, k in kinds.items() if block.startswith(magic)), "")
-            if kind or b"\x00" in block:
-                raise RecordingError(
-                    f"{path}: is not text but {kind or 'binary'}; export the recording as CSV, or correct the file's "
-                    "ending"
-                )
-            returns += block.count(b"\r") - block.count(b"\r\n") - (last == b"\r" and block.startswith(b"\n"))
-            last = block[-1:]
-    return returns > 0
-
-
-def _find_table(path: Path, lines: Sequence[str], delimiter: str, limits: Limits) -> tuple[str, Layout]:
+def _find_table(
+    path: Path, first: Sequence[tuple[int, bytes]], delimiter: str, limits: Limits
+) -> tuple[str, Layout | None]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
-    best, best_layout, best_fit = delimiter or ",", Layout(0, 0), (False, 0.0, 0)
+    lines = [line.decode("utf-8" if is_utf8(line) else "latin-1") for _, line in first]
+    best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
     widest = 0
     for tried in delimiter or "\t;|, ":
         if tried == " " and not delimiter:  # it stands inside headings and timestamps too: the last resort
@@ -294,72 +322,13 @@ def _find_table(path: Path, lines: Sequence[str], delimiter: str, limits: Limits
         if cells > limits.columns + 1:  # one more may be empty
             widest = max(widest, cells)
             continue
-        rows = [_split(line, tried) for line in lines]
+        rows = [split_line(line, tried) for line in lines]
         found = find_layout(rows)
-        layout = found or Layout(0, 0)
-        width = len(rows[layout.heading])
-        fits = [len(row) in (width, width + 1) for row in rows[1 + max(layout) :]]
+        width = len(rows[found.heading if found else 0])
+        fits = [len(row) in (width, width + 1) for row in rows[found.begin if found else 1 :]]
         fit = (found is not None, sum(fits) / len(fits) if fits else 1.0, width)
         if delimiter or (width > 1 and fit > best_fit and (fit[1] > 0 or tried != " ")):
-            best, best_layout, best_fit = tried, layout, fit
+            best, best_layout, best_fit = tried, found, fit
     if best_fit == (False, 0.0, 0):
         limits.check("columns", widest, path)
     return best, best_layout
-
-
-def _separator(path: Path) -> str:
-    """Return the delimiter that a spreadsheet writes into the first line of a file (``sep=;``), if it does."""
-    with path.open("rb") as f:
-        found = _SEPARATOR.fullmatch(f.readline(16))
-    return found[1].decode() if found else ""
-
-
-def _sniff_decimal(rows: Sequence[Sequence[str]], delimiter: str) -> str:
-    if delimiter == ",":
-        return "."
-    cells = [c.strip() for row in rows for c in row]
-    points = sum(_POINT.fullmatch(c) is not None for c in cells)
-    commas = sum("." not in c and _POINT.fullmatch(c.replace(",", ".", 1)) is not None for c in cells)
-    if points == commas == 0:
-        return ".,"  # whole numbers so far: try both
-    return "," if commas > points else "."
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    if delimiter == " ":
-        return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
-    try:
-        return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:  # a cell is larger than the reader takes: no number and no name is
-        return line.rstrip("\r\n").split(delimiter)
-
-
-def _cells(line: bytes, delimiter: str) -> int:
-    if delimiter == " " or b'"' in line:
-        return len(_split(line.decode("latin-1"), delimiter))
-    return line.count(delimiter.encode()) + 1
-
-
-def _ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    start = line[:60].decode("latin-1").strip()
-    text = f"{path}: line {number} has {cells} cells where the heading has {width}: {start!r}"
-    if delimiter == "," and cells > width:
-        return f"{text}; if it has decimal commas, export with ';' between the columns"
-    if not line.endswith(b"\n"):
-        return f"{text}; it is the last line, perhaps cut off while it was written: complete or delete it"
-    return f"{text}; complete or delete the line"
-
-
-def _not_numbers(cells: pd.DataFrame, decimal: str) -> Any:
-    if decimal == ",":
-        # a point is no part of a number where the comma is the decimal sign
-        cells = cells.apply(lambda c: c.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False))
-    return cells.apply(not_numbers).to_numpy()
-
-
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True

@@ -1,5 +1,6 @@
-"""Times of a recording: numbers with a unit, or timestamps."""
+"""Times of a recording: numbers with a unit, timestamps, or times of day."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +12,24 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.units import find_unit
 from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
-from thermocomp.files.tables import FileTable
+from thermocomp.files.stamps import AmbiguousDatesError, Parsed, parse, parse_stamps
+from thermocomp.files.tables import FileTable, tell_places
 
 FloatArray = NDArray[np.float64]
 
-_CHUNK = 100_000
-# Only what cannot be read in two ways: 06/07/2021 needs a mapping. The last two tell the time of day only.
-_FORMATS = (
-    "ISO8601",
-    "%Y/%m/%d %H:%M:%S",
-    "%Y/%m/%d-%H:%M:%S",
-    "%d.%m.%Y %H:%M:%S",
-    "%d.%m.%Y %H:%M:%S.%f",
-    "%d.%m.%Y %H:%M",
-    "%H:%M:%S",
-    "%H:%M:%S.%f",
+#: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
+_CLOCK = re.compile(
+    r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,]\d+)?))?"
 )
+_HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
+#: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
+_EPOCH = 946684800.0, 4102444800.0
+_PARTS = {1: "seconds", 1000: "milliseconds", 1000000: "microseconds", 1000000000: "nanoseconds"}
+#: days since 1899-12-30, as spreadsheets count, between the same years
+_SERIAL = 36526.0, 73050.0
+_SERIAL_BEGIN = -25569 * 86400
+_DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
+_DAY = 86_400_000_000_000  # [ns]
 
 
 def read_times(
@@ -38,7 +41,7 @@ def read_times(
     *,
     is_stamp: bool,
     rising: bool,
-) -> tuple[FloatArray, str]:
+) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read the times of a recording's rows.
 
     Parameters
@@ -62,25 +65,47 @@ def read_times(
         Seconds since the first row [s].
     start : str
         ISO timestamp of the first row; empty if it is not known.
+    notes : tuple of str
+        How it was read, where that is not plain.
 
     Raises
     ------
     RecordingError
-        A time is missing, cannot be read, or does not rise.
+        A time is missing, cannot be read, can be read in two ways, or does not rise.
     """
+    heading = table.headings[columns.time]
     shown = cells[columns.time]
-    start = ""
+    for k in columns.beside:
+        other = np.flatnonzero(((cells[k] != shown) & ~(cells[k].isna() & shown.isna())).to_numpy())
+        if other.size:
+            raise RecordingError(
+                f"{source}: columns {columns.time + 1} and {k + 1} are both named {heading!r} and hold different "
+                f"times, such "
+                f"as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in {table.place(int(other[0]))}; channels "
+                f"that "
+                "were sampled at different times are no recording: resample them to one time"
+            )
+    notes: tuple[str, ...] = ()
+    if columns.beside:
+        notes = (
+            f"columns {', '.join(str(k + 1) for k in columns.beside)} hold the same times as column {columns.time + 1}",
+        )
     if is_stamp:
         if columns.date is not None:
-            shown = cells[columns.date].astype(str).str[:10] + " " + shown.astype(str)
-        stamps, start = _timestamps(shown, mapping.time.format, table, source, table.headings[columns.time])
-        time = np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=np.float64)
+            shown = _date(cells[columns.date]) + " " + _clock(shown)
+        time, start, found = _read_stamps(shown, columns, mapping, table, source, rising=rising)
     else:
         raw = shown.to_numpy(dtype=np.float64)
-        time = (raw - raw[0]) * find_unit(columns.time_unit or "s", "time").scale
         missing = np.flatnonzero(~np.isfinite(raw))
         if missing.size:
-            _refuse_missing(table, source, int(missing[0]), table.headings[columns.time])
+            _refuse_missing(table, source, int(missing[0]), heading)
+        time, start, found = _read_numbers(raw, heading, columns, mapping, source)
+    notes += found
+    if columns.fraction is not None and is_stamp:
+        part = cells[columns.fraction].to_numpy(dtype=np.float64)
+        if part.any() and (time % 1 == 0).all():
+            time = ((time * 1000 + part) - part[0]) / 1000
+            notes += (f"{table.headings[columns.fraction]!r} is added to the time",)
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0) if rising else steps < 0) + 1
     if wrong.size:
@@ -92,43 +117,175 @@ def read_times(
         if is_stamp and falls_by_an_hour and pd.Timestamp(start).tzinfo is None:
             more += ", perhaps as the clock was set back (daylight saving): use UTC, or timestamps with an offset"
         raise RecordingError(
-            f"{source}: {table.place(row)}, column {table.headings[columns.time]!r}: time {shown.iloc[row]} {what}, in "
+            f"{source}: {table.place(row)}, column {heading!r}: time {shown.iloc[row]} {what}, in "
             f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests"
         )
-    return time, start
+    if is_stamp and start and pd.Timestamp(start).tzinfo is None:
+        _refuse_set_forward(time, steps, start, table, source, heading)
+    return time, start, notes
 
 
-def _timestamps(
-    cells: "pd.Series[Any]", wanted: str, table: FileTable, source: Path, heading: str
-) -> tuple["pd.Series[pd.Timestamp]", str]:
-    """Parse timestamps; mixed offsets (summer time) are brought to one clock."""
+def _read_stamps(
+    cells: "pd.Series[Any]", columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path, *, rising: bool
+) -> tuple[FloatArray, str, tuple[str, ...]]:
+    """Read timestamps, times of day, or durations; mixed offsets (summer time) are brought to one clock."""
+    heading, wanted = table.headings[columns.time], mapping.time.format
     if cells.isna().any():
         _refuse_missing(table, source, int(np.flatnonzero(cells.isna())[0]), heading)
+    if pd.api.types.is_timedelta64_dtype(cells.dtype):
+        return _seconds(cells - cells.iloc[0]), "", ()
     if pd.api.types.is_datetime64_any_dtype(cells.dtype):
-        return cells, cells.iloc[0].isoformat()
+        return _seconds(cells - cells.iloc[0]), cells.iloc[0].isoformat(), ()
     text = cells.astype(str)
-    first = text.iloc[:1]
-    formats = [wanted] if wanted else _FORMATS
-    fitting = [f for f in formats if pd.to_datetime(first, format=f, utc=True, errors="coerce").notna().all()]
-    if not fitting:
+    first = text.iloc[0].strip()
+    if not wanted and columns.date is None and (_CLOCK.fullmatch(first) or _HALF.fullmatch(first)):
+        return _read_clock(text, table, source, heading)
+    if wanted:
+        begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
+        dated = any(letter in wanted for letter in ("%d", "%j", "%x", "%c", "%D", "%F")) and not pd.isna(begin)
+        found: Parsed | None = Parsed(parse(text, wanted), begin.isoformat() if dated else "", ())
+    else:
+        titles = [table.headings[k] for k in (columns.date, columns.time) if k is not None]
+        try:
+            found = parse_stamps(text, titles[0], rising=rising)
+        except AmbiguousDatesError as e:
+            ways = " or ".join(f'format = "{form}"' for form in e.formats)
+            where = f'column = "{heading}"' + (f', date = "{titles[0]}"' if columns.date is not None else "")
+            raise RecordingError(
+                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e.orders}, and no row "
+                f"tells which; say how it is written in a mapping: [time] {where} and {ways}"
+            ) from e
+    if found is None or pd.isna(found.stamps.iloc[0]):
         hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
         raise RecordingError(
-            f"{source}: {table.place(0)}, column {heading!r}: {first.iloc[0]!r} {hint}; say how it is written in a "
+            f"{source}: {table.place(0)}, column {heading!r}: {first!r} {hint}; say how it is written in a "
             f'mapping: [time] column = "{heading}" and format = "%d/%m/%Y %H:%M:%S"'
         )
-    # in parts, and without a cache of the texts seen: pandas makes objects of them, far bigger than the times
-    parts = [text.iloc[k : k + _CHUNK] for k in range(0, len(text), _CHUNK)]
-    stamps = pd.concat(pd.to_datetime(p, format=fitting[0], utc=True, errors="coerce", cache=False) for p in parts)
+    stamps, start, notes = found
     bad = np.flatnonzero(stamps.isna())
     if bad.size:
         row = int(bad[0])
         raise RecordingError(
             f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a timestamp like "
-            f"{first.iloc[0]!r}; correct or delete the row"
+            f"{first!r}; correct or delete the row"
         )
-    if fitting[0].startswith("%H"):
-        return stamps, ""
-    return stamps, pd.to_datetime(first, format=fitting[0]).iloc[0].isoformat()
+    return _seconds(stamps - stamps.iloc[0]), start, notes
+
+
+def _read_clock(
+    text: "pd.Series[Any]", table: FileTable, source: Path, heading: str
+) -> tuple[FloatArray, str, tuple[str, ...]]:
+    """Read times of day, or times that have passed: neither says the day."""
+    first = text.iloc[0].strip()
+    halves = _HALF.fullmatch(first) is not None
+    parts = text.str.strip().str.extract(_CLOCK)
+    if not halves and pd.isna(parts["seconds"].iloc[0]):
+        raise RecordingError(
+            f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as "
+            f"minutes and "
+            f'seconds; say how it is written in a mapping: [time] column = "{heading}" and format = "%H:%M" or '
+            f"format = "
+            '"%M:%S"'
+        )
+    if halves:
+        upper = text.str.strip().str.upper().str.replace(r" ?([AP])\.?M\.?$", r" \1M", regex=True)
+        form = "%I:%M:%S %p" if first.count(":") == 2 else "%I:%M %p"
+        stamps = parse(upper, form.replace("%S", "%S.%f") if "." in first.upper().rstrip("M.PA ") else form)
+        seconds = ((stamps - stamps.dt.normalize()).dt.total_seconds()).to_numpy(dtype=np.float64)
+    else:
+        texts = parts["seconds"].str.replace(",", ".", regex=False)
+        days, hours, minutes, rest = (
+            pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64)
+            for c in (parts["days"].fillna("0"), parts["hours"], parts["minutes"], texts)
+        )
+        seconds = ((days * 24 + hours) * 60 + minutes) * 60 + rest
+    bad = np.flatnonzero(~np.isfinite(seconds))
+    if bad.size:
+        row = int(bad[0])
+        raise RecordingError(
+            f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a time like {first!r}; "
+            f"correct or "
+            "delete the row"
+        )
+    # exact where the file has no more than nanoseconds
+    whole = np.rint(seconds * 1e9).astype(np.int64)
+    steps = np.diff(whole)
+    usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
+    if not midnights.any() or whole.max() >= _DAY:
+        return (whole - whole[0]) / 1e9, "", ()
+    places = tell_places((np.flatnonzero(midnights) + 1).tolist(), table.place)
+    days_on = np.concatenate([[0], np.cumsum(midnights)])
+    return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day goes over midnight in {places}",)
+
+
+def _read_numbers(
+    raw: FloatArray, heading: str, columns: ColumnPlan, mapping: Mapping, source: Path
+) -> tuple[FloatArray, str, tuple[str, ...]]:
+    """Read times that are numbers: seconds that passed, or counted from 1970 or as spreadsheets count days."""
+    if columns.time_unit:
+        unit = find_unit(columns.time_unit, "time")
+        time = (raw - raw[0]) * unit.scale if unit.scale >= 1 else (raw - raw[0]) / round(1 / unit.scale)
+        known = unit.scale in (1, 1e-3)
+        counted = known and _EPOCH[0] <= raw[0] * unit.scale < _EPOCH[1] and not mapping.time.start
+        if not counted:
+            return time, "", ()
+        note = f"{heading!r} counts from 1970-01-01 UTC"
+        return time, pd.Timestamp(raw[0] * unit.scale, unit="s", tz="UTC").isoformat(), (note,)
+    for parts, word in _PARTS.items():
+        if _EPOCH[0] * parts <= raw.min() and raw.max() < _EPOCH[1] * parts:
+            # whole microseconds are exact
+            time = raw - raw[0] if parts == 1 else (raw - raw[0]) / parts
+            start = pd.Timestamp(raw[0] / parts, unit="s", tz="UTC").isoformat()
+            return time, start, (f"{heading!r} is taken as {word} since 1970-01-01 UTC",)
+    if _SERIAL[0] <= raw.min() and raw.max() < _SERIAL[1] and any(w in heading.casefold() for w in _DATE_WORDS):
+        milliseconds = np.rint(raw * 86400e3)
+        start = pd.Timestamp(milliseconds[0] / 1e3 + _SERIAL_BEGIN, unit="s").isoformat()
+        return (
+            (milliseconds - milliseconds[0]) / 1e3,
+            start,
+            (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
+        )
+    raise RecordingError(
+        f"{source}: column {heading!r} holds numbers from {raw[0]:.10g} to {raw[-1]:.10g} and says no unit: seconds, "
+        f"minutes, "
+        f'hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] column = '
+        f'"{heading}" and unit = "s"'
+    )
+
+
+def _refuse_set_forward(
+    time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
+) -> None:
+    """Refuse a gap of an hour where clocks are set forward: the file does not say whether an hour passed."""
+    usual = float(np.median(steps)) if steps.size else np.inf
+    if not usual <= 900:
+        return
+    for row in np.flatnonzero(np.abs(steps - usual - 3600) < min(usual, 60)) + 1:
+        before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
+        spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
+        if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
+            raise RecordingError(
+                f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
+                f"{after}, perhaps "
+                "as the clock was set forward (daylight saving), perhaps as nothing was recorded: use UTC, or "
+                "timestamps "
+                "with an offset, or split the file into tests"
+            )
+
+
+def _seconds(passed: "pd.Series[pd.Timedelta]") -> FloatArray:
+    return np.asarray(passed.dt.total_seconds(), dtype=np.float64)
+
+
+def _date(cells: "pd.Series[Any]") -> "pd.Series[str]":
+    """Return dates, of which a spreadsheet may have made midnights."""
+    return cells.astype(str).str.strip().str.replace(r"[ T]00:00:00(?:\.0+)?$", "", regex=True)
+
+
+def _clock(cells: "pd.Series[Any]") -> "pd.Series[str]":
+    """Return times of day, to which a spreadsheet may have given the day from which it counts."""
+    return cells.astype(str).str.strip().str.replace(r"^1(?:899-12-3[01]|904-01-01)[ T]", "", regex=True)
 
 
 def _refuse_missing(table: FileTable, source: Path, row: int, heading: str) -> None:

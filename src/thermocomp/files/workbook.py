@@ -3,6 +3,7 @@
 import re
 import warnings
 import zipfile
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from datetime import date, datetime, time
@@ -15,7 +16,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
-from thermocomp.files.layout import Layout, find_layout, join_units, tell_layout
+from thermocomp.files.layout import (
+    MOST_REMARKS,
+    Layout,
+    find_end,
+    find_layout,
+    find_value_columns,
+    find_width,
+    join_units,
+    tell_end,
+    tell_layout,
+)
 from thermocomp.files.limits import Limits
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.tables import FrameTable, check_headings, clean_heading
@@ -114,6 +125,7 @@ def _table(
     """Return the table of a sheet: its heading row, and the rows below it."""
     where = f"{path}: sheet {name!r}"
     places, first, body, cells = list[int](), list[Row](), _Body(), 0
+    tail = deque[Row](maxlen=MOST_REMARKS)
     for place, row in enumerate(rows, 1):
         limits.check("sheet_rows", place, where)
         if not _holds_cells(row) or place < options.heading or options.skips(place):
@@ -123,6 +135,7 @@ def _table(
             limits.check("columns", len(row), f"{where}, row {place}")
         limits.check("cells", cells, where)
         places.append(place)
+        tail.append(row)
         if len(first) < _SAMPLE:
             first.append(row)
         else:
@@ -131,20 +144,34 @@ def _table(
                 limits.check_unpacked(8 * cells, path)
     if not first:
         raise RecordingError(f"{where} is empty; a recording has a heading row and rows of numbers")
-    layout = find_layout(_sample(first)) or Layout(0, 0)
-    begin = 1 + max(layout)
+    layout = find_layout(_sample(first)) or Layout(0, 0, 1)
+    begin = layout.begin
     headings = [_text(cell).strip() for cell in first[layout.heading]]
-    if layout.units > layout.heading:
+    if layout.units != layout.heading:
         headings = join_units(headings, [_text(cell) for cell in first[layout.units]])
+    remarks = _count_remarks(first[begin:], list(tail)[-max(len(places) - begin, 1) :])
     columns = body.close(first[begin:])
+    n_rows = len(places) - begin - remarks
     headings += [""] * (len(columns) - len(headings))
     headings = [clean_heading(h) for h in headings]
-    n_rows = len(places) - begin
     check_headings(path, headings, n_rows, limits)
     empty = np.full(n_rows, np.nan)
-    frame = pd.DataFrame({k: columns[k] if k < len(columns) else empty for k in range(len(headings))}, copy=False)
-    told = (*notes, *tell_layout(places, layout, "row"))
-    return FrameTable(str(path), tuple(headings), frame, places[begin:], notes=told)
+    frame = pd.DataFrame(
+        {k: columns[k][:n_rows] if k < len(columns) else empty for k in range(len(headings))}, copy=False
+    )
+    told = (*notes, *tell_layout(places, layout, "row"), *tell_end(places[begin + n_rows :], "row"))
+    return FrameTable(
+        str(path), tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal
+    )
+
+
+def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
+    """Count the rows at the end of a sheet that are none of its table."""
+    if not head:
+        return 0
+    first, last = ([[_text(c) for c in row] for row in part] for part in (head, tail))
+    # a row may be short for empty cells at its end: width says nothing here
+    return min(find_end(last, find_value_columns(first, find_width(first)), 0), len(tail) - 1)
 
 
 class _Body:

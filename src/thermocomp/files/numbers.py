@@ -1,0 +1,143 @@
+"""How numbers are written: the decimal sign, separators of thousands, and words in place of a number."""
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from thermocomp.core.exceptions import RecordingError
+
+#: texts that stand for a missing value, besides an empty cell
+MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
+#: what loggers and spreadsheets write where they have no number, in small letters
+_FILLERS = frozenset(
+    (
+        *("ol", "+ol", "-ol", "over", "+over", "-over", "under", "overload", "overflow", "overrange", "over range"),
+        *("underrange", "under range", "ovld", "ovl", "ovrng", "burnout", "burn out", "b.out", "open", "open tc"),
+        *("no sensor", "sensor error", "error", "err", "invalid", "no data", "nodata", "missing", "bad", "skip"),
+        *("fehler", "bruch", "fühlerbruch", "ungültig", "kein fühler", "fehlt", "erreur", "nat", "n.a.", "#nv"),
+        *(
+            "#n/v",
+            "#wert!",
+            "#value!",
+            "#div/0!",
+            "#ref!",
+            "#bezug!",
+            "#name?",
+            "#num!",
+            "#zahl!",
+            "#null!",
+            "#valeur!",
+        ),
+        *("nan(ind)", "-nan(ind)", "nan(snan)", "-1.#ind", "1.#ind", "1.#qnan", "-1.#qnan", "1.#inf", "-1.#inf"),
+    )
+)
+_RUN = re.compile(r"([-+*?#.])\1*|err:\d+")
+#: separators of thousands besides point and comma
+_SPACES = "'’\u00a0\u202f "
+_PLAIN = re.compile(r"[-+]? ?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?")
+_GROUPED = re.compile(rf"[-+]?[1-9]\d{{0,2}}(?:([.,{_SPACES}])\d{{3}})(?:\1\d{{3}})*(?:(?!\1)[.,]\d*)?")
+_OPEN = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+
+
+class Notation(NamedTuple):
+    """How the numbers of a file are written."""
+
+    decimal: str  #: point or comma
+    thousands: str = ""  #: separators that may stand between groups of three digits
+
+    def read(self, cell: str) -> float | None:
+        """Return the number in a cell; None if it is none."""
+        text = cell.strip()
+        grouped = _GROUPED.fullmatch(text)
+        if grouped and grouped[1] in self.thousands:
+            text = text.replace(grouped[1], "")
+        elif not _PLAIN.fullmatch(text):
+            return None
+        if {".": ",", ",": "."}[self.decimal] in text:
+            return None
+        return float(text.replace(self.decimal, ".").replace(" ", ""))
+
+
+class Signs:
+    """What the cells of a file say about its decimal sign.
+
+    A sign that a zero or more than three digits precede, or that other than three digits follow, is a decimal sign; one
+    that comes twice separates thousands. ``1,234`` alone may be either.
+    """
+
+    def __init__(self) -> None:
+        #: cells that prove a decimal sign
+        self.proven: Counter[str] = Counter()
+        #: of each sign the first cell in which it may be either
+        self.open: dict[str, str] = {}
+        #: separators of thousands that were seen
+        self.groups: set[str] = set()
+
+    def add(self, cells: Iterable[str]) -> None:
+        """Take cells into account."""
+        for cell in cells:
+            text = cell.strip()
+            grouped = _GROUPED.fullmatch(text)
+            if _OPEN.fullmatch(text):
+                self.open.setdefault("." if "." in text else ",", text)
+            elif grouped:
+                self.groups.add(grouped[1])
+                rest = text[grouped.end(1) :].replace(grouped[1], "")
+                other = next((s for s in ".," if s in rest), {".": ",", ",": "."}.get(grouped[1], ""))
+                self.proven.update([other] if other else [])
+            elif _PLAIN.fullmatch(text) and ("." in text or "," in text):
+                self.proven["." if "." in text else ","] += 1
+
+    def decide(self, stated: str, delimiter: str) -> Notation | None:
+        """Return how the numbers are written; None if no cell says.
+
+        Parameters
+        ----------
+        stated : str
+            The decimal sign, if it is known beforehand.
+        delimiter : str
+            Of the columns: where it is a comma, the decimal sign is a point unless a cell proves the opposite.
+
+        Raises
+        ------
+        RecordingError
+            They can be read in two ways.
+        """
+        decimal = stated
+        if not decimal and self.proven:
+            decimal = self.proven.most_common(1)[0][0]
+        if not decimal and self.open:
+            if delimiter != "," or "," in self.open:
+                cell = next(iter(self.open.values())) if delimiter != "," else self.open[","]
+                sign = "." if "." in cell else ","
+                whole, part = cell.replace(sign, ""), cell.replace(sign, ".")
+                raise RecordingError(
+                    f"{cell!r} can be read as {whole} or as {part}, and no other number tells which; say what the "
+                    f"decimal "
+                    f'sign is in a mapping: [read] decimal = "," or decimal = "."'
+                )
+            decimal = "."
+        if not decimal:
+            return None
+        other = {".": ",", ",": "."}[decimal]
+        thousands = "".join(sorted((self.groups | {other} & set(self.open)) - {decimal}))
+        return Notation(decimal, thousands)
+
+
+def is_filler(cell: str) -> bool:
+    """Return whether a cell holds what stands for a missing number."""
+    text = cell.strip().casefold()
+    return text in MISSING_TEXT or is_word(text)
+
+
+def is_word(cell: str) -> bool:
+    """Return whether a cell holds a word of loggers or spreadsheets for a number that is not there."""
+    text = cell.strip().casefold()
+    return text in _FILLERS or _RUN.fullmatch(text) is not None
+
+
+def is_number_like(cell: str) -> bool:
+    """Return whether a cell holds a number, in whatever notation."""
+    text = cell.strip()
+    return _PLAIN.fullmatch(text) is not None or _GROUPED.fullmatch(text) is not None
