@@ -1,5 +1,4 @@
-"""Recordings as loggers, Excel, LibreOffice and Python write them: each is the same as its plain CSV, to the last "
-"digit."""
+"""Recordings as loggers, Excel, LibreOffice and Python write them: each is its plain CSV, to the last digit."""
 
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import pytest
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.files.mapping import read_mapping
+from thermocomp.files.mending import read_or_offer
 from thermocomp.files.recordings import read
 from thermocomp.recording.recording import Recording
 
@@ -226,8 +226,12 @@ def test_it_is_read_at_once_and_says_what_was_done(name: str) -> None:
 def test_what_can_be_read_in_two_ways_is_asked_for(name: str, tmp_path: Path) -> None:
     plain, start, question, answer = ASKED[name]
     with pytest.raises(RecordingError) as caught:
-        read(FOLDER / name)
+        read_or_offer(FOLDER / name)
     assert str(caught.value) == f"{FOLDER / name}: {question}"
-    mapping = tmp_path / "mapping.toml"
-    mapping.write_text(answer, encoding="utf-8")
-    same(read(FOLDER / name, read_mapping(mapping)), plain, start)
+    (offer,) = caught.value.__notes__
+    words, _, offered = offer.partition("\n\n")
+    assert words.startswith("by this mapping it is read")
+    for text in (offered, answer):
+        mapping = tmp_path / "mapping.toml"
+        mapping.write_text(text, encoding="utf-8")
+        same(read_or_offer(FOLDER / name, read_mapping(mapping)), plain, start)

@@ -26,6 +26,8 @@ FloatArray = NDArray[np.float64]
 #: below this no absolute temperature of a machine lies [K]
 _COLDEST = 200.0
 _SCPI_INFINITY = 9.9e37
+#: what numbers may be that are too small for kelvins
+_DOUBTFUL = ({"unit": "degC"}, {"role": "ignore"})
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
 #: headings of a time without unit, those that say more first
@@ -69,8 +71,8 @@ class Column:
             raise RecordingError(
                 f"{source}: column {heading!r}: values about {float(np.median(valid)):.3g} K are no temperatures but "
                 f'differences, or in degC; say which in a mapping, [columns.NAME] column = "{heading}" and unit = '
-                f'"degC", '
-                'or role = "ignore"'
+                '"degC", or role = "ignore"',
+                [{"columns": {self.channel.name: {"column": heading, **said}}} for said in _DOUBTFUL],
             )
 
     def convert(

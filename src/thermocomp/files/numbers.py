@@ -114,8 +114,8 @@ class Signs:
                 whole, part = cell.replace(sign, ""), cell.replace(sign, ".")
                 raise RecordingError(
                     f"{cell!r} can be read as {whole} or as {part}, and no other number tells which; say what the "
-                    f"decimal "
-                    f'sign is in a mapping: [read] decimal = "," or decimal = "."'
+                    'decimal sign is in a mapping: [read] decimal = "," or decimal = "."',
+                    [{"read": {"decimal": mark}} for mark in (sign, {".": ",", ",": "."}[sign])],
                 )
             decimal = "."
         if not decimal:

@@ -1,7 +1,8 @@
 """Recordings as files: CSV, XLSX and Parquet in, CSV and Parquet out."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime, timedelta
 from difflib import get_close_matches
@@ -110,11 +111,8 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         described, note = _described(table.embedded, source)
         mapping = mapping.over(described)
         notes.extend(note)
-    try:
+    with _guessing(table, mapping):
         columns = plan(table.headings, mapping, str(source))
-    except (RecordingError, UnitError) as e:
-        e.remedies = e.remedies or guess(table, mapping)
-        raise
     notes.extend(columns.notes)
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns]
@@ -136,7 +134,8 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         changed.extend(found)
     left_out = [k for k in columns.left_out if k not in more.values()]
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
-    refuse_nameless([table.headings[k] for k in numeric], str(source))
+    with _guessing(table, mapping):
+        refuse_nameless([table.headings[k] for k in numeric], str(source))
     notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
     texts_only = [table.headings[k] for k in left_out if k not in set(numeric)]
     if texts_only:
@@ -326,6 +325,16 @@ def _zeroed(rows: Rows, columns: ColumnPlan) -> Rows:
 def _later(start: str, seconds: float) -> str:
     """Return a timestamp some seconds later."""
     return (datetime.fromisoformat(start) + timedelta(seconds=seconds)).isoformat() if start and seconds else start
+
+
+@contextmanager
+def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
+    """Let errors about columns carry a guess of what these are."""
+    try:
+        yield
+    except (RecordingError, UnitError) as e:
+        e.remedies = e.remedies or guess(table, mapping)
+        raise
 
 
 def _times(

@@ -209,7 +209,7 @@ def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
     try:
         return signs.decide(stated, delimiter) or Notation(".")
     except RecordingError as e:
-        raise RecordingError(f"{source}: {e}") from e
+        raise RecordingError(f"{source}: {e}", e.remedies) from e
 
 
 def convert_all(
@@ -313,9 +313,8 @@ def _refuse_mixed(table: FileTable, source: str, column: int, cells: "pd.Series[
     for row, cell in enumerate(cells):
         if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
             raise RecordingError(
-                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} "
-                f"with a "
-                f"separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
+                f"{source}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} with "
+                f"a separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
             )
 
 

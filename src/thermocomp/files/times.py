@@ -13,7 +13,7 @@ from thermocomp.core.units import find_unit
 from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.stamps import AmbiguousDatesError, Parsed, parse, parse_stamps
-from thermocomp.files.tables import FileTable, tell_places
+from thermocomp.files.tables import FileTable, skip_row, tell_places
 
 FloatArray = NDArray[np.float64]
 
@@ -80,10 +80,9 @@ def read_times(
         if other.size:
             raise RecordingError(
                 f"{source}: columns {columns.time + 1} and {k + 1} are both named {heading!r} and hold different "
-                f"times, such "
-                f"as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in {table.place(int(other[0]))}; channels "
-                f"that "
-                "were sampled at different times are no recording: resample them to one time"
+                f"times, such as {shown.iloc[other[0]]} and {cells[k].iloc[other[0]]} in "
+                f"{table.place(int(other[0]))}; channels that were sampled at different times are no recording: "
+                "resample them to one time"
             )
     notes: tuple[str, ...] = ()
     if columns.beside:
@@ -118,7 +117,8 @@ def read_times(
             more += ", perhaps as the clock was set back (daylight saving): use UTC, or timestamps with an offset"
         raise RecordingError(
             f"{source}: {table.place(row)}, column {heading!r}: time {shown.iloc[row]} {what}, in "
-            f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests"
+            f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests",
+            [skip_row(table, row)],
         )
     if is_stamp and start and pd.Timestamp(start).tzinfo is None:
         _refuse_set_forward(time, steps, start, table, source, heading)
@@ -150,10 +150,12 @@ def _read_stamps(
             found = parse_stamps(text, titles[0], rising=rising)
         except AmbiguousDatesError as e:
             ways = " or ".join(f'format = "{form}"' for form in e.formats)
-            where = f'column = "{heading}"' + (f', date = "{titles[0]}"' if columns.date is not None else "")
+            place = {"column": heading, **({"date": titles[0]} if columns.date is not None else {})}
+            where = ", ".join(f'{key} = "{title}"' for key, title in place.items())
             raise RecordingError(
                 f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e.orders}, and no row "
-                f"tells which; say how it is written in a mapping: [time] {where} and {ways}"
+                f"tells which; say how it is written in a mapping: [time] {where} and {ways}",
+                [{"time": {**place, "format": form}} for form in e.formats],
             ) from e
     if found is None or pd.isna(found.stamps.iloc[0]):
         hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
@@ -167,7 +169,8 @@ def _read_stamps(
         row = int(bad[0])
         raise RecordingError(
             f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a timestamp like "
-            f"{first!r}; correct or delete the row"
+            f"{first!r}; correct or delete the row",
+            [skip_row(table, row)],
         )
     return _seconds(stamps - stamps.iloc[0]), start, notes
 
@@ -182,10 +185,9 @@ def _read_clock(
     if not halves and pd.isna(parts["seconds"].iloc[0]):
         raise RecordingError(
             f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as "
-            f"minutes and "
-            f'seconds; say how it is written in a mapping: [time] column = "{heading}" and format = "%H:%M" or '
-            f"format = "
-            '"%M:%S"'
+            f'minutes and seconds; say how it is written in a mapping: [time] column = "{heading}" and format = '
+            '"%H:%M" or format = "%M:%S"',
+            [{"time": {"column": heading, "format": form}} for form in ("%H:%M", "%M:%S")],
         )
     if halves:
         upper = text.str.strip().str.upper().str.replace(r" ?([AP])\.?M\.?$", r" \1M", regex=True)
@@ -204,8 +206,8 @@ def _read_clock(
         row = int(bad[0])
         raise RecordingError(
             f"{source}: {table.place(row)}, column {heading!r}: {text.iloc[row]!r} is not a time like {first!r}; "
-            f"correct or "
-            "delete the row"
+            "correct or delete the row",
+            [skip_row(table, row)],
         )
     # exact where the file has no more than nanoseconds
     whole = np.rint(seconds * 1e9).astype(np.int64)
@@ -248,9 +250,9 @@ def _read_numbers(
         )
     raise RecordingError(
         f"{source}: column {heading!r} holds numbers from {raw[0]:.10g} to {raw[-1]:.10g} and says no unit: seconds, "
-        f"minutes, "
-        f'hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] column = '
-        f'"{heading}" and unit = "s"'
+        f'minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] '
+        f'column = "{heading}" and unit = "s"',
+        [{"time": {"column": heading, "unit": unit}} for unit in ("s", "min", "h", "ms")],
     )
 
 
@@ -267,10 +269,8 @@ def _refuse_set_forward(
         if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
             raise RecordingError(
                 f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
-                f"{after}, perhaps "
-                "as the clock was set forward (daylight saving), perhaps as nothing was recorded: use UTC, or "
-                "timestamps "
-                "with an offset, or split the file into tests"
+                f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
+                "use UTC, or timestamps with an offset, or split the file into tests"
             )
 
 
@@ -290,5 +290,6 @@ def _clock(cells: "pd.Series[Any]") -> "pd.Series[str]":
 
 def _refuse_missing(table: FileTable, source: Path, row: int, heading: str) -> None:
     raise RecordingError(
-        f"{source}: {table.place(row)}, column {heading!r}: the time is missing; fill it in or delete the row"
+        f"{source}: {table.place(row)}, column {heading!r}: the time is missing; fill it in or delete the row",
+        [skip_row(table, row)],
     )
