@@ -174,3 +174,28 @@ def test_a_real_study(capsys: pytest.CaptureFixture[str]) -> None:
     ids = {i for c in study["claims"] for i in c["ids"]}
     assert {"H-16", "H-18"} <= ids
     assert study["numbers"]["models_tried_without_grouping"] == 8191
+
+
+def test_a_study_that_fails_leaves_the_others(
+    asked: list[tuple[str, int]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, (first, second, *_) = studies.run, studies.STUDIES
+
+    def some(name: str, *, seed: int, progress: Progress) -> Study:
+        if name == first:
+            raise ZeroDivisionError("by <zero>")
+        return made(name, seed=seed, progress=progress)
+
+    monkeypatch.setattr(studies, "run", some)
+    page = tmp_path / "papers.html"
+    assert run(["papers", first, second, "-o", str(page)]) == 1
+    printed = capsys.readouterr().out
+    assert f"{first}: not redone" in printed
+    assert "ZeroDivisionError: by <zero>" in printed
+    assert f"Title of {second}" in printed
+    text = page.read_text(encoding="utf-8")
+    assert "ZeroDivisionError: by &lt;zero&gt;" in text
+    assert f"Title of {second}" in text
+    assert run(["papers", first, "--json"]) == 1
+    (told,) = json.loads(capsys.readouterr().out)["studies"]
+    assert told["claims"][0]["finding"] == "ZeroDivisionError: by <zero>"

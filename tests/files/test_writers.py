@@ -16,6 +16,7 @@ from allwriters import WRITERS, Writer
 
 import thermocomp
 from thermocomp.cli.app import run
+from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.scratch import is_scratch
 from thermocomp.files import mending
@@ -276,3 +277,11 @@ def test_what_comes_into_being_during_the_work_is_not_replaced(
     assert run(["check", str(tmp_path / "drift.csv"), "-o", str(page)]) == 2
     assert "check.html: exists already" in " ".join(capsys.readouterr().err.split())
     assert page.read_text() == "precious"
+
+
+def test_a_new_file_is_there_in_one_step_too(tmp_path: Path, opened: list[tuple[str, int]]) -> None:
+    write_text("whole", tmp_path / "new.txt", overwrite=False)
+    written = [Path(p) for p, flags in opened if flags & (os.O_WRONLY | os.O_RDWR) and Path(p).is_relative_to(tmp_path)]
+    assert written
+    assert all(is_scratch(path.relative_to(tmp_path).parts[0]) for path in written)
+    assert (tmp_path / "new.txt").read_text() == "whole"

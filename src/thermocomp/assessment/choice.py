@@ -145,6 +145,8 @@ class Choice:
         What a user should know before he relies on it.
     details : object
         The numbers behind it, for figures.
+    failure : str
+        Why nothing could be chosen; empty if something was.
     """
 
     method: str
@@ -154,3 +156,4 @@ class Choice:
     tables: tuple[Table, ...]
     notes: tuple[str, ...] = ()
     details: object = None
+    failure: str = ""

@@ -2,22 +2,22 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
 from thermocomp.assessment.judge import cap_alike_units, drop_unreadable, judge, refuse_method
 from thermocomp.assessment.leaks import refuse_leaks
+from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
 from thermocomp.assessment.refit import refit_accepted
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.assessment.robustness import pool_robustness
 from thermocomp.core.correction import Limits
-from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.numerics.leastsquares import effective_sample_size
@@ -88,14 +88,11 @@ def compare(
     by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
-    work = (
-        delayed(_assess_method)(samples, name, k, split, rules, support, robustness, limits)
-        for k, name, split in pieces
-    )
+    work = partial(_assess_method, samples, rules, support, robustness, limits)
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = [_inners(names, own, rules) for own in by_target]
     try:
-        for a in Parallel(n_jobs=jobs, return_as="generator")(work):
+        for a in work_through(work, pieces, partial(_refused, samples), jobs=jobs):
             progress(f"{a.target} {a.model} {a.block}")
             done.append(a)
         scores = _scores(samples, names, by_target, inners, jobs, progress)
@@ -176,11 +173,10 @@ def _scores(
     """Return the inner scores per target and method that may be chosen."""
     kept = [name for name in names if deployable(name)]
     pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
-    work = (delayed(score)(samples, name, k, by_target[k], inner) for k, name, inner in pieces)
     found: dict[int, dict[str, list[list[float]]]] = {
         k: {name: [] for name in kept} for k, own in enumerate(inners) if own
     }
-    results = Parallel(n_jobs=jobs, return_as="generator")(work)
+    results = work_through(partial(_score, samples, by_target), pieces, _no_score, jobs=jobs)
     for (k, name, inner), values in zip(pieces, results, strict=True):
         progress(f"{samples.targets[k].name} {name} without {inner.split.block}")
         found[k][name].append(values)
@@ -233,31 +229,42 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
 
 def _assess_method(
     samples: Samples,
-    name: str,
-    target: int,
-    split: Split,
     rules: Rules,
     support: Support,
     robustness: bool,
     limits: Limits | None,
+    piece: tuple[int, str, Split],
 ) -> Assessment:
-    try:
-        told = robustness or support.policy != "clip"
-        trained = train(name, samples, target, split.learn, support=support, joint=told)
-        first = int(np.argmax(split.judge))
-        return judge(
-            name,
-            trained.model,
-            samples,
-            split,
-            learned=samples.learned(target, split.learn & samples.valid, before=first),
-            rules=rules,
-            fit_s=trained.seconds,
-            robustness=robustness,
-            limits=limits,
-        )
-    except FitError as e:  # also of one that can be fitted, and fails on what noise makes of its inputs
-        return refuse_method(samples, name, target, split, str(e))
+    target, name, split = piece
+    told = robustness or support.policy != "clip"
+    trained = train(name, samples, target, split.learn, support=support, joint=told)
+    first = int(np.argmax(split.judge))
+    return judge(
+        name,
+        trained.model,
+        samples,
+        split,
+        learned=samples.learned(target, split.learn & samples.valid, before=first),
+        rules=rules,
+        fit_s=trained.seconds,
+        robustness=robustness,
+        limits=limits,
+    )
+
+
+def _refused(samples: Samples, piece: tuple[int, str, Split], why: str) -> Assessment:
+    """Return the assessment of a method that failed, in its fit or on what noise makes of its inputs."""
+    target, name, split = piece
+    return refuse_method(samples, name, target, split, why)
+
+
+def _score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
+    target, name, inner = piece
+    return score(samples, name, target, by_target[target], inner)
+
+
+def _no_score(piece: tuple[int, str, Inner], _: str) -> list[float]:
+    return [np.inf] * len(piece[2].scores)
 
 
 def _together(parts: Sequence[Assessment]) -> Assessment:

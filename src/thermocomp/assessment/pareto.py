@@ -1,17 +1,18 @@
 """The sensor budget: what each further sensor buys on thermal cycles that were not seen."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
+from joblib import effective_n_jobs
 from numpy.typing import NDArray
 
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.diagnostics import collinearity
 from thermocomp.assessment.metrics import rms
+from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.methods import expand
@@ -55,6 +56,8 @@ class Budget:
         Condition number of the correlation matrix of `sensors`.
     proven : bool
         Every set is the best of its size for sure.
+    failures : mapping of str to str
+        Why a model could not be judged somewhere, by model.
     """
 
     target: str
@@ -68,6 +71,7 @@ class Budget:
     frequency: FloatArray
     condition: FloatArray
     proven: bool = True
+    failures: Mapping[str, str] = field(default_factory=dict)
 
     def pooled(self) -> FloatArray:
         """Return the RMS over all unseen blocks together, (n_models, n_sizes) [um]."""
@@ -190,16 +194,21 @@ def budget(
     n_sizes = min(len(sets) for sets, _ in results)
     # the last of each is all temperatures
     chosen = [[*sets[: n_sizes - 1], sets[-1]] for sets, _ in results]
-    work = (
-        delayed(_unseen_rms)(samples, target, split, sensors[size], name)
+    pieces = [
+        (split, sensors[size], name)
         for split, sensors in zip(splits, chosen[1:], strict=True)
         for name in names
         for size in range(n_sizes)
-    )
+    ]
     found = []
-    for value in Parallel(n_jobs=jobs, return_as="generator")(work):
+    failures: dict[str, str] = {}
+    for piece, value in zip(
+        pieces, work_through(partial(_unseen_rms, samples, target), pieces, _why, jobs=jobs), strict=True
+    ):
         progress(f"{samples.targets[target].name}: judged")
-        found.append(value)
+        found.append(np.nan if isinstance(value, str) else value)
+        if isinstance(value, str):
+            failures.setdefault(piece[2], value)
     judged = [split.judge & np.isfinite(deviation) for split in splits]
     return Budget(
         target=samples.targets[target].name,
@@ -213,6 +222,7 @@ def budget(
         frequency=np.mean([[[n in s for n in temperatures] for s in sensors] for sensors in chosen[1:]], axis=0),
         condition=_conditions(samples, chosen[0]),
         proven=all(proven for _, proven in results),
+        failures=failures,
     )
 
 
@@ -263,7 +273,7 @@ def choose(
     )
     recommended = found.recommended()
     if recommended is None:
-        raise FitError(f"{candidates.target}: none of {', '.join(found.models)} could be judged in every block")
+        raise FitError(f"{candidates.target}: none of the models could be judged in every block: {_failed(found)}")
     model, place = recommended
     sensors = found.sensors[place]
     notes = [
@@ -273,6 +283,8 @@ def choose(
     ]
     if not found.proven:
         notes.append("Not all of these sets are proven to be the best of their size.")
+    if found.failures:
+        notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
     if len(found.blocks) < len(judging.splits):
         notes.append(
             f"{len(judging.splits) - len(found.blocks)} block(s) without a number of the target were left out."
@@ -288,6 +300,10 @@ def choose(
         tuple(notes),
         found,
     )
+
+
+def _failed(found: Budget) -> str:
+    return "; ".join(f"{model}: {why}" for model, why in found.failures.items())
 
 
 def _errors(found: Budget, judging: Judging, place: int) -> Table:
@@ -402,12 +418,14 @@ def _best(
     return best if len(best[-1]) == len(everything) else [*best, everything], found.proven
 
 
-def _unseen_rms(samples: Samples, target: int, split: Split, sensors: Sequence[str], name: str) -> float:
+def _unseen_rms(samples: Samples, target: int, piece: tuple[Split, Sequence[str], str]) -> float | str:
+    split, sensors, name = piece
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
     reduced = samples.only([*sensors, *speeds])
-    try:
-        model = train(name, reduced, target, split.learn, joint=False).model
-    except FitError:
-        return float("nan")
+    model = train(name, reduced, target, split.learn, joint=False).model
     rows = split.judge & np.isfinite(samples.deviations[:, target])
     return rms(samples.deviations[rows, target], replay_compensated(model, reduced, rows).compensated)
+
+
+def _why(_: tuple[Split, Sequence[str], str], why: str) -> float | str:
+    return why

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm
-from thermocomp.core.exceptions import FitError
 from thermocomp.models.training import fit_method
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.splits import Judging, Split
@@ -94,12 +93,14 @@ def score(samples: Samples, name: str, target: int, judging: Judging, inner: Inn
     Returns
     -------
     list of float
-        Infinite if it cannot be fitted [um].
+        [um]
+
+    Raises
+    ------
+    FitError
+        It cannot be fitted.
     """
-    try:
-        predicted = fit_method(name, samples, target, inner.split.learn).predicted
-    except FitError:
-        return [np.inf] * len(inner.scores)
+    predicted = fit_method(name, samples, target, inner.split.learn).predicted
     found = []
     for _, v in inner.scores:
         residual = (samples.deviations[:, target] - predicted)[judging.splits[v].judge]
@@ -144,7 +145,7 @@ def recommend(
     parts : mapping of str to sequence of Verdict
         Per method, on each left-out unit.
     inner : mapping of str to sequence of sequence of float
-        Per method, from `score` for each of `inners`.
+        Per method, from `score` for each of `inners`; infinite where it failed.
     inners : sequence of Inner
         From `inner_splits`.
 

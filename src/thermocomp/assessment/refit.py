@@ -5,13 +5,13 @@ It has seen more than the models that were judged, and may lean on a sensor as t
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 
+from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.robustness import stress, worse
-from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
@@ -60,15 +60,17 @@ def refit_accepted(judged: Sequence[Assessment], samples: Samples, support: Supp
     list of Assessment
         The same, less sure of what noise or a lost sensor would make worse than none.
     """
-    work = (delayed(_refit)(a, samples, support) for a in judged if a.overall and a.accepted and deployable(a.model))
-    tried = {(a.target, a.model): a for a in Parallel(n_jobs=jobs)(work)}
+    wanted = [a for a in judged if a.overall and a.accepted and deployable(a.model)]
+    found = work_through(partial(_refit, samples, support), wanted, _not_refitted, jobs=jobs)
+    tried = {(a.target, a.model): a for a in found}
     return [tried.get((a.target, a.model), a) if a.overall else a for a in judged]
 
 
-def _refit(judged: Assessment, samples: Samples, support: Support) -> Assessment:
+def _refit(samples: Samples, support: Support, judged: Assessment) -> Assessment:
     k = [t.name for t in samples.targets].index(judged.target)
-    try:
-        written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
-        return stress_written(judged, written.model, samples)
-    except FitError as e:
-        return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {e}",)))
+    written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
+    return stress_written(judged, written.model, samples)
+
+
+def _not_refitted(judged: Assessment, why: str) -> Assessment:
+    return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {why}",)))

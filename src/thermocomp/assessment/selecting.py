@@ -12,6 +12,7 @@ from thermocomp.assessment import pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.leaks import refuse_leaks
+from thermocomp.assessment.pieces import explain
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
@@ -87,17 +88,18 @@ def select(
     Returns
     -------
     tuple of Choice
-        One per target; for ``ace`` one for all targets together.
+        One per target; for ``ace`` one for all targets together. Where a method fails it is one without sensors, with
+        `Choice.failure`.
 
     Raises
     ------
     InputError
         Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
+    Exception
+        What the method fails with, if it does for all targets.
     """
-    targets = range(len(samples.targets))
     if method == "pareto":
         refuse_leaks(samples, judging)
-        return tuple(pareto.choose(samples, k, judging, settings, jobs=jobs, progress=progress) for k in targets)
     if method == "ace":
         return (_by_maximal_correlation(samples, settings, jobs=jobs, progress=progress),)
     choosers: dict[str, Callable[[Candidates], Choice]] = {
@@ -106,10 +108,21 @@ def select(
         "partial-f": lambda c: _by_steps(c, "partial-f"),
         "stepwise": lambda c: _by_steps(c, "stepwise"),
     }
-    found = []
-    for candidates in [Candidates.of(samples, k) for k in targets]:
-        found.append(choosers[method](candidates))
-        progress(f"{candidates.target}: chosen")
+    found: list[Choice] = []
+    errors: list[Exception] = []
+    for k, target in enumerate(samples.targets):
+        try:
+            if method == "pareto":
+                found.append(pareto.choose(samples, k, judging, settings, jobs=jobs, progress=progress))
+            else:
+                found.append(choosers[method](Candidates.of(samples, k)))
+                progress(f"{target.name}: chosen")
+        except Exception as e:  # noqa: BLE001 - whatever fails for one target, the others have their choice
+            errors.append(e)
+            why = explain(e)
+            found.append(Choice(method, target.name, (), f"could not be chosen: {why}", (), failure=why))
+    if len(errors) == len(found):
+        raise errors[0]
     return tuple(found)
 
 

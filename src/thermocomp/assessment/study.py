@@ -1,6 +1,7 @@
 """Whole jobs: fit one method with its honest error, judge model files on recordings."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,14 +10,17 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import compare, split_by_cycle
+from thermocomp.assessment.do_no_harm import Verdict
 from thermocomp.assessment.judge import cap_alike_units, judge
 from thermocomp.assessment.leaks import find_learned_rows
+from thermocomp.assessment.pieces import explain
 from thermocomp.assessment.refit import stress_written
 from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
+from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.validity import Validity
@@ -221,8 +225,8 @@ def assess(
     Raises
     ------
     InputError
-        There is no model, a channel the models need is not in the recordings, or it cannot be told how one of these
-        begins.
+        There is no model, a channel that all models need is not in the recordings, or it cannot be told how one of
+        these begins. A model that fails where others do not is refused.
     """
     if not models:
         raise InputError("no model given: name a model file, or give at least one model")
@@ -233,28 +237,78 @@ def assess(
     if starts is None:
         starts = find_starts(
             recordings,
-            [r.channel(m.target) for r in recordings[:1] for m in models],
+            _known_targets(models, recordings),
             zeroing=models[0].zeroing,
             absolute=are_absolute(models),
         )
     told: tuple[tuple[str, Start], ...] = ()
+    errors: list[Exception] = []
     for model in models:
         progress(f"{model.target} {model.family}")
-        samples = stack(
-            recordings,
-            [model.target],
-            [i.name for i in model.inputs],
-            rezero=any(i.rezero for i in model.inputs),
-            zeroing=model.zeroing,
-            starts=starts,
-        )
-        samples = drop_unsound(samples, recordings)
+        try:
+            samples = _stacked(model, recordings, starts)
+            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits)
+            covered = covered or coverage.find_validity(samples, judged, recordings)
+            cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
+        except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
+            errors.append(e)
+            found.append(_refused(model, explain(e)))
+            continue
         told = tuple(zip(samples.test_names, samples.starts, strict=True))
-        overall, judged = _assess(model, _called_as_in(model, samples), rules, limits)
-        covered = covered or coverage.find_validity(samples, judged, recordings)
-        cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         found += [*cut, overall] if len(cut) > 1 else [overall]
+    if len(errors) == len(models):
+        raise errors[0]
     return Judged(tuple(models), tuple(found), seen, covered, told)
+
+
+def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:
+    """Return the targets that the first recording has; it must have one."""
+    found = []
+    for recording in recordings[:1]:
+        for model in models:
+            with suppress(InputError):
+                found.append(recording.channel(model.target))
+        if not found:
+            recording.channel(models[0].target)
+    return found
+
+
+def _stacked(model: ErrorModel, recordings: Sequence[Recording], starts: Start | Sequence[Start]) -> Samples:
+    """Return what a model needs of recordings, without rows in trouble."""
+    samples = stack(
+        recordings,
+        [model.target],
+        [i.name for i in model.inputs],
+        rezero=any(i.rezero for i in model.inputs),
+        zeroing=model.zeroing,
+        starts=starts,
+    )
+    return drop_unsound(samples, recordings)
+
+
+def _refused(model: ErrorModel, why: str) -> Assessment:
+    """Return the assessment of a model for which there was nothing to judge it on."""
+    nothing, nowhere = np.empty(0), np.empty(0, np.intp)
+    return Assessment(
+        model=_name(model),
+        target=model.target,
+        block="all cycles",
+        measured=nothing,
+        predicted=nothing,
+        row=nowhere,
+        test=nowhere,
+        cycle=nowhere,
+        verdict=Verdict((), refusal=why),
+        sensors=(),
+        fit_s=0.0,
+        n_effective=float("nan"),
+        failure=why,
+        overall=True,
+    )
+
+
+def _name(model: ErrorModel) -> str:
+    return model.provenance.method if model.provenance else model.family
 
 
 def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
@@ -294,8 +348,7 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    name = model.provenance.method if model.provenance else model.family
-    found = judge(name, model, samples, split, rules=rules, limits=limits)
+    found = judge(_name(model), model, samples, split, rules=rules, limits=limits)
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging

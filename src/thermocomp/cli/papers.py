@@ -1,6 +1,7 @@
 """``thermocomp papers``: the papers' studies redone, their number beside ours."""
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -21,6 +22,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.report.layout import Column, Layout, Toned
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from thermocomp.papers.study import Claim, Study, StudyTable
     from thermocomp.papers.study import Progress as Told
     from thermocomp.recording.recording import Recording
@@ -82,7 +85,7 @@ def papers(
     Returns
     -------
     int
-        0 the studies ran, whatever holds; 2 unusable input.
+        0 the studies ran, whatever holds; 1 one of them failed; 2 unusable input.
     """
     if seed < 0:
         raise InputError(f"--seed {seed}: must not be negative")
@@ -105,9 +108,12 @@ def papers(
     for number, name in enumerate(chosen, start=1):
         begin = time.perf_counter()
         with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
-            study = (
-                _cross(seed, progress, tests, models, target) if name == CROSS else _run(name, seed, repeats, progress)
+            run = (
+                partial(_cross, seed, tests=tests, models=models, targets=target)
+                if name == CROSS
+                else partial(_run, name, seed, repeats)
             )
+            study = _tried(name, run, progress)
         done.append((study, time.perf_counter() - begin))
         if not json:
             _show(*done[-1])
@@ -119,7 +125,20 @@ def papers(
             console.print(f"Page: {output}", soft_wrap=True)
     if json:
         print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]})
-    return 0
+    return 1 if any(not study.ran for study, _ in done) else 0
+
+
+def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
+    """Return a study; one that says why if it fails: the others are run all the same."""
+    from thermocomp.assessment.pieces import explain
+    from thermocomp.papers.studies import not_redone
+
+    try:
+        return run(progress)
+    except InputError:  # what was asked for cannot be
+        raise
+    except Exception as e:  # noqa: BLE001 - whatever fails in one study, the others have their results
+        return not_redone(name, explain(e))
 
 
 def _run(name: str, seed: int, repeats: int, progress: "Told") -> "Study":

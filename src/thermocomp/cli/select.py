@@ -53,7 +53,7 @@ def select(
     Returns
     -------
     int
-        0 done, 2 unusable input.
+        0 done, 1 nothing could be chosen for one of several targets, 2 unusable input.
     """
     settings.check(method)
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")
@@ -68,4 +68,4 @@ def select(
 
         html.write_choices(choices, ready.tests, output, overwrite=overwrite)
     out.show_choices(choices, output, ready.trouble, console, as_json=json)
-    return 0
+    return 1 if any(c.failure for c in choices) else 0

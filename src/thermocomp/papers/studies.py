@@ -60,6 +60,22 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = t
     return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
 
 
+def not_redone(name: str, why: str) -> Study:
+    """Return what stands for a study that failed.
+
+    Parameters
+    ----------
+    name : str
+    why : str
+
+    Returns
+    -------
+    Study
+    """
+    claim = Claim(("-",), "The study can be redone here", "", "it failed", False, why)
+    return Study(name, f"{name}: not redone", (claim,), (), (), {}, ran=False)
+
+
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
     """Return a claim that knows its other runs, and what was found where it does not hold."""
     same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]

@@ -236,6 +236,8 @@ class Study:
     figures : tuple of Figure
     numbers : mapping of str to float
         Figures that the gallery page asserts, by a name that says the unit (``mae_ann_x_um``).
+    ran : bool
+        False: it failed, and its one claim says why.
     """
 
     name: str
@@ -244,6 +246,7 @@ class Study:
     tables: tuple[StudyTable, ...]
     figures: tuple[Figure, ...]
     numbers: dict[str, float]
+    ran: bool = True
 
     @classmethod
     def of(cls, name: str, title: str, *parts: Part) -> "Study":

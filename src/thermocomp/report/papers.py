@@ -173,9 +173,11 @@ def write(studies: Sequence[Study], path: Path, *, seed: int, overwrite: bool = 
 
     Parameters
     ----------
-    studies, seed
+    studies : sequence of Study
+    path : Path
+    seed : int
         See `render`.
-    path, overwrite
+    overwrite : bool
         See `thermocomp.core.draft.drafts`.
     """
     write_text(render(studies, seed=seed), path, overwrite=overwrite)
