@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails, SchemaValidator
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.draft import draft
-from thermocomp.files.plaintext import read_text
+from thermocomp.files.plaintext import list_errors, read_text
 
 #: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
 MOST = 64_000_000
@@ -20,8 +20,6 @@ MOST = 64_000_000
 _COUNTS = {",": 5_000_000, "[": 500_000, "{": 100_000, '"': 1_000_000}
 #: digits of an integer
 _DIGITS = 18
-#: errors that are listed
-_LISTED = 20
 #: characters of a text from a file that an error repeats
 _REPEATED = 60
 
@@ -100,7 +98,8 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> lis
     try:
         found: list[Any] = reader.validate_json(text).models  # the text: keys in the order of the file
     except ValidationError as e:
-        raise _explain(e, content, source) from e
+        errors = [_tell(error, content) for error in e.errors(include_url=False)]
+        raise ModelFileError(list_errors(source, errors)) from e
     return found
 
 
@@ -222,15 +221,6 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
 
 
 # -- what is wrong with the models -------------------------------------------------------------------------------------
-
-
-def _explain(failure: ValidationError, content: Any, source: str) -> ModelFileError:
-    """Return the error that tells all places, up to `_LISTED`."""
-    told = list(dict.fromkeys(_tell(e, content) for e in failure.errors(include_url=False)))
-    if len(told) == 1:
-        return ModelFileError(f"{source}: {told[0]}")
-    more = [f"and {len(told) - _LISTED:,} more"] if len(told) > _LISTED else []
-    return ModelFileError("\n  ".join([f"{source}: {len(told):,} errors", *told[:_LISTED], *more]))
 
 
 def _tell(error: ErrorDetails, content: Any) -> str:

@@ -13,7 +13,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
-from thermocomp.files.tomlfile import read_toml
+from thermocomp.files.tomlfile import as_json, read_toml
 
 #: a column by its heading, or by its number from 1
 Place = str | int
@@ -195,7 +195,7 @@ class Mapping:
 
 
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
-ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
+ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Mapping))
 
 _TABLES: dict[str, type] = {"time": TimeColumn, "columns": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
 
@@ -241,7 +241,7 @@ def read_mapping(path: str | Path) -> Mapping:
     source = Path(path)
     content = read_toml(source, "mapping file")
     try:
-        return ADAPTER.validate_python(content)
+        return ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
         raise InputError(f"{source}: {_explain(e)}") from e
     except InputError as e:
@@ -259,7 +259,7 @@ def _explain(failure: ValidationError) -> str:
     key = loc[-1]
     if error["type"] != "unexpected_keyword_argument":
         reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
-        return f"{table}: key {key!r} = {error['input']!r}: {reasons}"
+        return f"{table}: key {key!r} = {error['input']!r:.80}: {reasons}"
     known = [f.name for f in fields(inside or Mapping)]
     near = get_close_matches(key, known, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}? " if near else ""
