@@ -60,7 +60,23 @@ def pack(kind: Format, body: list[Any]) -> str:
         A number is not finite.
     """
     content = {"format": kind.name, "version": kind.version, "sha256": digest(body), "models": body}
-    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    text = _lay_out(content) + "\n"
+    if len(text) > MOST:
+        raise InputError(f"{kind.words}: {len(text):,} characters, more than the {MOST:,} that can be read again")
+    return text
+
+
+def _lay_out(value: Any, depth: int = 1) -> str:
+    """Return JSON with a line per key, and per entry of a list of tables; other lists take one line."""
+    if isinstance(value, dict) and value:
+        parts = [f"{json.dumps(k, ensure_ascii=False)}: {_lay_out(v, depth + 1)}" for k, v in value.items()]
+    elif isinstance(value, list | tuple) and any(isinstance(v, dict) for v in value):
+        parts = [_lay_out(v, depth + 1) for v in value]
+    else:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    first, last = "{}" if isinstance(value, dict) else "[]"
+    line = "\n" + " " * depth
+    return f"{first}{line}{f',{line}'.join(parts)}{line[:-1]}{last}"
 
 
 def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> list[Any]:
