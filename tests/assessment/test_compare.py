@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from driftmodels import judged
 from smallmachine import small_machine
 
 from thermocomp.assessment import study
@@ -149,7 +150,7 @@ def test_replay_is_what_the_compensator_commands(samples: Samples) -> None:
     rows = np.arange(len(samples)) < 120
     predicted, _ = replay(model, samples, rows)
     limits = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
-    compensator = Compensator.of([model], limits)
+    compensator = Compensator.of([judged(model, 2.0)], limits)
     state = compensator.start()
     names = [c.name for c in samples.inputs]
     for k in range(120):
@@ -164,7 +165,7 @@ def test_judged_is_what_would_run(recording: Recording, samples: Samples) -> Non
     everything = np.ones(len(samples), np.bool_)
     model = train("dynamic", samples, 0, everything).model
     limits = Limits(magnitude=8.0, rate=0.002, dead_band=0.5)
-    compensator = Compensator.of([model], limits)
+    compensator = Compensator.of([judged(model, 2.0)], limits)
     state, names, commanded = compensator.start(), [c.name for c in samples.inputs], []
     for k in range(len(samples)):
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k].tolist(), strict=True)))

@@ -10,10 +10,10 @@ import pytest
 
 from thermocomp.cli.app import run
 from thermocomp.core.components import COMPONENTS
-from thermocomp.files import machines
+from thermocomp.files import machinekeys
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-TABLES = {"The machine": machines._MACHINE, "axes.X": machines._AXIS, "spindle": {"measured_tool"}}
+TABLES = {"The machine": machinekeys.MACHINE, "axes.X": machinekeys.AXIS, "spindle": {"measured_tool"}}
 
 
 def test_every_key_of_a_machine_file_is_described_and_no_other() -> None:
@@ -26,8 +26,8 @@ def test_every_key_of_a_machine_file_is_described_and_no_other() -> None:
     }
     tables = {"axes", "spindle", "components"}
     assert described == {**{name: set(known) - tables for name, known in TABLES.items()}, "components": set()}
-    assert tables < set(machines._MACHINE)
-    assert all(key in sections[-1] for key in machines._COMPONENT)
+    assert tables < set(machinekeys.MACHINE)
+    assert all(key in sections[-1] for key in machinekeys.COMPONENT)
 
 
 @pytest.mark.parametrize("page", [p.name for p in sorted(DOCS.glob("*.rst")) if ".. cli-run::" in p.read_text("utf-8")])

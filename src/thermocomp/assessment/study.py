@@ -145,16 +145,20 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
     """
     if overall.failure:
         raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
+    rms, none = overall.metric("rms"), overall.none_metric("rms")
+    word, reason = overall.word, overall.reason
+    if word == "accepted" and rms > none:  # one long cycle, within the margin, against many short ones
+        word, reason = "unproven", f"{reason}; over all rows RMS {rms:.2f}, {none:.2f} without compensation"
     return HonestError(
         protocol=judging.name,
         mae=overall.metric("mae"),
-        rms=overall.metric("rms"),
+        rms=rms,
         max_abs=overall.metric("max_abs"),
         none_mae=overall.none_metric("mae"),
-        none_rms=overall.none_metric("rms"),
+        none_rms=none,
         cycles={u.name: u.rms for u in overall.verdict.units},
-        verdict=overall.word,
-        reason=overall.reason,
+        verdict=word,
+        reason=reason,
         units=len(overall.verdict.units),
         tried=overall.verdict.tried,
         rules=RULES,

@@ -93,6 +93,8 @@ class Additive(ErrorModel):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     variables : tuple of Variable
         Linear combinations of the inputs: single sensors, or projections.
     curves : tuple of Curve

@@ -206,6 +206,8 @@ class Autoregressive(Ticking):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     a : tuple of float
         a_1 .. a_k, of the past deviations.
     b : tuple of tuple of float
@@ -279,6 +281,8 @@ class AutoregressiveNet(Ticking):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     k, m : int
         How many past deviations, and how many past values of each input.
     net : Perceptron

@@ -77,7 +77,21 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
 
 
 def check_between(owner: str, least: float, most: float, **numbers: Any) -> None:
-    """Refuse numbers, or sequences of them, that are not between two bounds, as `check_finite` does."""
+    """Refuse numbers that are not between two bounds.
+
+    Parameters
+    ----------
+    owner : str
+        Whose they are.
+    least, most : float
+    **numbers : float or nested sequence of float
+        By what they are called.
+
+    Raises
+    ------
+    SettingError
+        Names all that hold such a number, and the first of each.
+    """
     wrong = []
     for name, values in numbers.items():
         table = np.asarray(values, dtype=np.float64).ravel()
@@ -89,14 +103,36 @@ def check_between(owner: str, least: float, most: float, **numbers: Any) -> None
 
 
 def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
-    """Refuse sequences of more entries than `most`, as `check_finite` does."""
+    """Refuse what is too much.
+
+    Parameters
+    ----------
+    owner : str
+        Whose they are.
+    most : int
+    **entries : sequence
+        Of at most so many entries, by what they are called.
+
+    Raises
+    ------
+    SettingError
+        Names all that have more.
+    """
     wrong = [f"{len(found):,} {name}, at most {most:,}" for name, found in entries.items() if len(found) > most]
     if wrong:
         raise SettingError(f"{owner}: {'; '.join(wrong)}")
 
 
 def check_name(what: str, name: str, most: int = NAME) -> None:
-    """Refuse what is no name: empty, longer than `most`, or with characters that break a line or a terminal.
+    """Refuse what is no name: empty, too long, or with characters that break a line or a terminal.
+
+    Parameters
+    ----------
+    what : str
+        What it is the name of.
+    name : str
+    most : int
+        Characters it may have.
 
     Raises
     ------

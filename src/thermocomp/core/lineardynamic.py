@@ -25,6 +25,8 @@ class LinearDynamic(ErrorModel):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     signals : tuple of tuple of int
         Each the indices of the inputs it multiplies.
     direct : tuple of float

@@ -49,6 +49,8 @@ class ErrorModel(ABC):
 
     Parameters
     ----------
+    family : str
+        Which of the families it is: its word in a file.
     target : str
         Displacement channel (or error component) it predicts.
     unit : str
@@ -81,7 +83,7 @@ class ErrorModel(ABC):
 
     remembers: ClassVar[bool]  #: False: the deviation depends on the last reading alone
 
-    family: str  #: which of the families it is; each has its own word for it
+    family: str
     target: str
     unit: str
     inputs: tuple[Input, ...]
@@ -180,7 +182,7 @@ class ErrorModel(ABC):
         """
         if not np.isfinite(inputs).all() or not 0.0 <= dt < np.inf:
             raise ReadingError(f"model of {self.target}: inputs {inputs} or time step {dt} s not finite")
-        inputs, dt = np.minimum(np.maximum(inputs, -READING), READING), min(dt, GAP)
+        inputs, dt = _bounded(inputs), min(dt, GAP)
         reference = state.reference
         memory = state.memory
         if memory is None:
@@ -213,7 +215,7 @@ class ErrorModel(ABC):
         """
         if self.joint is None:
             return np.zeros(np.shape(inputs)[:-1])
-        return self.joint.distance(inputs - state.reference)
+        return self.joint.distance(_bounded(inputs) - state.reference)
 
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
@@ -371,3 +373,8 @@ class ErrorModel(ABC):
                 f"model of {self.target} is unproven and runs in shadow only: {found.why}. To take it all the same: "
                 '--accept-unproven "NAME, REASON", in Python taken("NAME, REASON") of the model'
             )
+
+
+def _bounded(inputs: FloatArray) -> FloatArray:
+    """Return a reading, no number of it so large that a difference to it is none."""
+    return np.minimum(np.maximum(inputs, -READING), READING)

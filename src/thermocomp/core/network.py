@@ -216,6 +216,8 @@ class Network(ErrorModel):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     net : Perceptron
         With one output.
     input_scaling : Affine

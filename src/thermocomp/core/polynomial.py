@@ -22,6 +22,8 @@ class Polynomial(ErrorModel):
 
     Parameters
     ----------
+    family : str
+        Its word in a file.
     variables : tuple of Variable
         Linear combinations of the inputs (C-12).
     terms : tuple of tuple of int

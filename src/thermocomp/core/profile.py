@@ -33,6 +33,8 @@ class PolynomialProfile:
 
     Parameters
     ----------
+    kind : str
+        Its word in a file.
     exponents : tuple of (int, int, int)
         i, j, k of each term.
     coefficients : tuple of float
@@ -131,6 +133,8 @@ class SplineProfile:
 
     Parameters
     ----------
+    kind : str
+        Its word in a file.
     axis : {'X', 'Y', 'Z'}
     knots : tuple of float
         Ends of the pieces, rising [mm]; beyond the first and the last the value there holds.

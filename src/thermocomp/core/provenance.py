@@ -135,9 +135,6 @@ class HonestError:
     @property
     def why(self) -> str:
         """The reason as it counts today."""
-        why = (
-            self.reason
-            if self.current
-            else f"judged by {'older' if self.rules < RULES else 'newer'} rules: {self.reason}"
-        )
+        other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
+        why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Taken by {self.taken}" if self.taken else why

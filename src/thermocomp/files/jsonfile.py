@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails, SchemaValidator
 from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
-from thermocomp.files.plaintext import read_text
+from thermocomp.files.plaintext import list_errors, read_text
 
 #: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
 MOST = 64_000_000
@@ -20,8 +20,6 @@ MOST = 64_000_000
 _COUNTS = {",": 5_000_000, "[": 500_000, "{": 100_000, '"': 1_000_000}
 #: digits of an integer
 _DIGITS = 18
-#: errors that are listed
-_LISTED = 20
 #: characters of a text from a file that an error repeats
 _REPEATED = 60
 
@@ -62,7 +60,23 @@ def pack(kind: Format, body: list[Any]) -> str:
         A number is not finite.
     """
     content = {"format": kind.name, "version": kind.version, "sha256": digest(body), "models": body}
-    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    text = _lay_out(content) + "\n"
+    if len(text) > MOST:
+        raise InputError(f"{kind.words}: {len(text):,} characters, more than the {MOST:,} that can be read again")
+    return text
+
+
+def _lay_out(value: Any, depth: int = 1) -> str:
+    """Return JSON with a line per key, and per entry of a list of tables; other lists take one line."""
+    if isinstance(value, dict) and value:
+        parts = [f"{json.dumps(k, ensure_ascii=False)}: {_lay_out(v, depth + 1)}" for k, v in value.items()]
+    elif isinstance(value, list | tuple) and any(isinstance(v, dict) for v in value):
+        parts = [_lay_out(v, depth + 1) for v in value]
+    else:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    first, last = "{}" if isinstance(value, dict) else "[]"
+    line = "\n" + " " * depth
+    return f"{first}{line}{f',{line}'.join(parts)}{line[:-1]}{last}"
 
 
 def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> list[Any]:
@@ -100,7 +114,8 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> lis
     try:
         found: list[Any] = reader.validate_json(text).models  # the text: keys in the order of the file
     except ValidationError as e:
-        raise _explain(e, content, source) from e
+        errors = [_tell(error, content) for error in e.errors(include_url=False)]
+        raise ModelFileError(list_errors(source, errors)) from e
     return found
 
 
@@ -218,15 +233,6 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
 
 
 # -- what is wrong with the models -------------------------------------------------------------------------------------
-
-
-def _explain(failure: ValidationError, content: Any, source: str) -> ModelFileError:
-    """Return the error that tells all places, up to `_LISTED`."""
-    told = list(dict.fromkeys(_tell(e, content) for e in failure.errors(include_url=False)))
-    if len(told) == 1:
-        return ModelFileError(f"{source}: {told[0]}")
-    more = [f"and {len(told) - _LISTED:,} more"] if len(told) > _LISTED else []
-    return ModelFileError("\n  ".join([f"{source}: {len(told):,} errors", *told[:_LISTED], *more]))
 
 
 def _tell(error: ErrorDetails, content: Any) -> str:

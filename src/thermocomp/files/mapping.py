@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.limits import Limits
-from thermocomp.files.tomlfile import read_toml
+from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
 
 #: a column by its heading, or by its number from 1
@@ -212,7 +212,7 @@ class Mapping:
 
 
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files
-ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Mapping))
+ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Mapping))
 
 _STEPS: dict[str, type] = {step.do: step for step in (Cut, Shift, Rezero, Swap, Resample)}
 _TABLES: dict[str, type] = {
@@ -280,7 +280,7 @@ def check_content(content: dict[str, Any], owner: str) -> Mapping:
         See `read_mapping`.
     """
     try:
-        return ADAPTER.validate_python(content)
+        return ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
         raise InputError(f"{owner}: {_explain(e)}") from e
     except InputError as e:
@@ -300,7 +300,7 @@ def _explain(failure: ValidationError) -> str:
     key = loc[-1]
     if error["type"] != "unexpected_keyword_argument":
         reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
-        return f"{table}: key {key!r} = {error['input']!r}: {reasons}"
+        return f"{table}: key {key!r} = {error['input']!r:.80}: {reasons}"
     return _unknown_key(table, key, inside or Mapping)
 
 
@@ -318,7 +318,7 @@ def _explain_step(error: ErrorDetails) -> str:
     key = str(loc[3])
     if error["type"] == "unexpected_keyword_argument":
         return _unknown_key(table, key, _STEPS[str(loc[2])])
-    return f"{table}: key {key!r} = {error['input']!r}: {error['msg']}"
+    return f"{table}: key {key!r} = {error['input']!r:.80}: {error['msg']}"
 
 
 def _unknown_key(table: str, key: str, inside: type) -> str:

@@ -1,9 +1,16 @@
-"""Small text files, read whole: of a bounded size, no pipes and devices, UTF-8."""
+"""Small text files, read whole: of a bounded size, no pipes and devices, UTF-8; and what is said of their errors."""
 
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.shown import replace_unprintable
+
+#: errors that are listed
+_LISTED = 20
+#: characters of one that are told
+_MOST = 600
 
 
 def read_text(path: str | Path, what: str, most: int, failure: type[InputError] = InputError) -> str:
@@ -44,3 +51,12 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
         raise failure(f"{source}: cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
         raise failure(f"{str(source)!a}: is no name of a {what}: {e}") from e
+
+
+def list_errors(source: str | Path, errors: Sequence[str]) -> str:
+    """Return one text of all errors of a file, up to `_LISTED`, fit to be printed."""
+    told = [replace_unprintable(e if len(e) <= _MOST else f"{e[:_MOST]}...") for e in dict.fromkeys(errors)]
+    if len(told) == 1:
+        return f"{source}: {told[0]}"
+    more = [f"and {len(told) - _LISTED:,} more"] if len(told) > _LISTED else []
+    return "\n  ".join([f"{source}: {len(told):,} errors", *told[:_LISTED], *more])

@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from thermocomp.core.exceptions import InputError, SettingError, UnitError, explain_unknown
 from thermocomp.core.units import read_with_unit
-from thermocomp.files.tomlfile import read_toml
+from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.simulation.climate import CLIMATES, Climate
 from thermocomp.simulation.instruments import Touch
 from thermocomp.simulation.protocol import Experiment, Plan
@@ -20,7 +20,7 @@ from thermocomp.simulation.segments import Path as Keys
 from thermocomp.simulation.sensors import Fault
 
 #: the one door for a protocol from outside
-ADAPTER = TypeAdapter(with_config(ConfigDict(extra="forbid", allow_inf_nan=False))(Experiment))
+ADAPTER = TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Experiment))
 
 #: keys that hold a time, which is written with its unit
 TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
@@ -90,7 +90,7 @@ def read_protocol(path: str | Path) -> Experiment:
         _check_types(content, ())
         given = _in_house_units(content)
         try:
-            return ADAPTER.validate_python({"name": source.stem, **given})
+            return ADAPTER.validate_json(as_json({"name": source.stem, **given}))
         except ValidationError as e:
             keys, message = _explain(e, given)
             raise SettingError(message, keys) from e

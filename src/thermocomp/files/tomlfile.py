@@ -1,5 +1,6 @@
 """What the files of settings share: TOML, and what is said if it is none."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -12,6 +13,8 @@ from thermocomp.files.plaintext import read_text
 MOST = 1_500_000
 #: dots of a key: the standard library's reader takes time and memory by their square
 DOTS = 32
+#: tables and lists within each other
+DEPTH = 32
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
@@ -40,8 +43,24 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         if any(part.count(".") > DOTS for part in parts):
             raise InputError(f"{source}: line {n}: a key of more than {DOTS} parts")
     try:
-        return tomllib.loads(text)
+        content = tomllib.loads(text)
+        if _depth(content) > DEPTH:
+            raise RecursionError
+        return content
     except RecursionError as e:
         raise InputError(f"{source}: not a {what}: nested too deeply") from e
     except ValueError as e:  # TOMLDecodeError, and an integer of too many digits
         raise InputError(f"{source}: not valid TOML: {e}") from e
+
+
+def _depth(value: Any) -> int:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + max(map(_depth, inner), default=0)
+
+
+def as_json(content: dict[str, Any]) -> str:
+    """Return the content of a TOML file as pydantic takes it strictly: a list for a tuple, but no text for a number.
+
+    A date, which JSON has not, becomes a list: nothing that takes a text takes it.
+    """
+    return json.dumps(content, default=lambda date: [str(date)])

@@ -11,6 +11,7 @@ from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
+from thermocomp.models.ace_thinning import thin
 from thermocomp.models.base import FloatArray, StaticRegressor
 
 _NOTHING = Curve((), (0.0,), "step")
@@ -78,12 +79,13 @@ class TransformRegressor(StaticRegressor):
 
     def _frozen(self, inputs: Sequence[Input], header: dict[str, Any]) -> Additive:
         active = [j for j, curve in enumerate(self._curves) if curve != _NOTHING]
+        curves, response = thin([self._curves[j] for j in active], self._inverse, [self._rows[:, j] for j in active])
         return Additive(
             **header,
             inputs=tuple(inputs[j] for j in active),
             variables=tuple(Variable.single(inputs[j].name, k) for k, j in enumerate(active)),
-            curves=tuple(self._curves[j] for j in active),
-            response=self._inverse,
+            curves=curves,
+            response=response,
         )
 
     def _keep(
@@ -98,6 +100,7 @@ class TransformRegressor(StaticRegressor):
         """Keep the transformations; `theta` and `total`, the sum of phi, are by row, `curves` by input."""
         self._curves = tuple(curves.get(j, _NOTHING) for j in range(X.shape[1]))
         self._inverse = inverse
+        self._rows = X  # what is frozen says the same for them
         by_y = np.argsort(y, kind="stable")
         self.theta_ = SampledFunction(y[by_y], theta[by_y])
         self.sum_phi_ = SampledFunction(theta[by_y], total[by_y])
@@ -118,6 +121,8 @@ class ACE(TransformRegressor):
     normalised, phi is not (E-W3). At the ends of the rank list the boxcar holds the ranks that there are; values of
     tied ranks, ordered as the rows are, get the mean of what the boxcar gives them (E-W4). The functions are those of
     the last sweep.
+
+    Frozen, tables of many steps are thinned (`thermocomp.models.ace_thinning`).
 
     theta need not be monotone, and then has no inverse: see ``falling_theta_`` (E-W5) and
     `thermocomp.models.ace_monotone.MonotoneACE`.

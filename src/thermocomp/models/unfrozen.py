@@ -72,6 +72,8 @@ class EstimatorModel(ErrorModel):
 
     Parameters
     ----------
+    family : str
+        No file has a word for it.
     estimator : UnfrozenRegressor
         Fitted.
     fingerprint : str

@@ -1,0 +1,172 @@
+"""The keys of a machine file: what each must be, and how it becomes house units; all that is wrong is kept."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from thermocomp.core.bounds import RANGE, check_name
+from thermocomp.core.exceptions import SettingError, UnitError, explain_unknown
+from thermocomp.core.structure import Structure
+from thermocomp.core.units import read_with_unit
+
+Keys = tuple[str | int, ...]
+#: turns what stands under a key into house units; gets the key's path for its error
+Convert = Callable[[Any, Keys], Any]
+
+#: what a value with a unit is called, and an example of it
+_SAID = {
+    "position": ("length", "600 mm"),
+    "displacement": ("length", "12 um"),
+    "angle": ("angle", "12 urad"),
+    "temperature": ("temperature", "20 degC"),
+    "feed": ("speed", "30 m/min"),
+    "acceleration": ("acceleration", "3 m/s2"),
+}
+QUANTITY = {"um": "displacement", "urad": "angle"}
+
+
+class ManyError(SettingError):
+    """All that is wrong, and what was found beside it."""
+
+    def __init__(self, errors: Sequence[SettingError], found: dict[str, Any]) -> None:
+        super().__init__(str(errors[0]))
+        self.errors, self.found = list(errors), found
+
+
+@contextmanager
+def kept(errors: list[SettingError]) -> Iterator[None]:
+    """Go on behind an error, and keep it."""
+    try:
+        yield
+    except SettingError as e:
+        errors += e.errors if isinstance(e, ManyError) else [e]
+
+
+def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[str, Any]:
+    """Return what becomes of each value; if some cannot be used, `ManyError` with all of them."""
+    errors: list[SettingError] = []
+    found = {}
+    for key, value in values.items():
+        try:
+            found[key] = convert(key, value)
+        except ManyError as e:
+            errors, found[key] = [*errors, *e.errors], e.found
+        except SettingError as e:
+            errors.append(e)
+    if errors:
+        raise ManyError(errors, found)
+    return found
+
+
+def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
+    """Return a table in house units."""
+    if not isinstance(value, dict):
+        raise SettingError(f"{value!r}: must be a table", where)
+
+    def read(key: str, inner: Any) -> Any:
+        if key not in known:
+            raise explain_unknown("key", key, known, (*where, key))
+        return known[key](inner, (*where, key))
+
+    return each(value, read)
+
+
+def measure(quantity: str) -> Convert:
+    """Return what reads a text with a number and a unit."""
+    what, example = _SAID[quantity]
+
+    def convert(value: Any, where: Keys) -> float:
+        try:
+            number = read_with_unit(value, quantity)
+        except UnitError as e:
+            raise SettingError(f'"{value}": {e}', where) from e
+        if number is None:
+            shown = json.dumps(value) if isinstance(value, str | float | int) else repr(value)
+            raise SettingError(
+                f'{shown}: write a{"n" * (what[0] in "a")} {what} with its unit, such as "{example}"', where
+            )
+        if abs(number) > RANGE:
+            raise SettingError(f'"{value}": more than any machine has', where)
+        return number
+
+    return convert
+
+
+def _several(convert: Convert, n: int, example: str) -> Convert:
+    """Return what reads a list of n values."""
+
+    def converted(value: Any, where: Keys) -> tuple[Any, ...]:
+        if not isinstance(value, list) or len(value) != n:
+            raise SettingError(f"{value!r}: write {n} values, such as {example}", where)
+        return tuple(convert(v, where) for v in value)
+
+    return converted
+
+
+def _text(value: Any, where: Keys) -> str:
+    if not isinstance(value, str) or not value:
+        raise SettingError(f"{value!r}: must be a text in quotes", where)
+    try:
+        check_name("text", value)
+    except SettingError as e:
+        raise SettingError(str(e), where) from e
+    return value
+
+
+def _structure(value: Any, where: Keys) -> Structure:
+    try:
+        return Structure.parse(_text(value, where))
+    except SettingError as e:
+        raise SettingError(str(e), where) from e
+
+
+def _rows(value: Any, where: Keys) -> list[Any]:
+    if not isinstance(value, list):
+        raise SettingError('must be a list of points, such as [["0 mm", "0 um"], ["600 mm", "2 um"]]', where)
+    return value
+
+
+def _same(value: Any, where: Keys) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise SettingError(f"{value!r}: must be a table", where)
+    return value
+
+
+def _axes(value: Any, where: Keys) -> dict[str, Any]:
+    return each(_same(value, where), lambda name, inner: read_table(inner, AXIS, (*where, name)))
+
+
+TRAVEL: Keys = ("travel",)
+_LENGTH = measure("position")
+_VECTOR = _several(_LENGTH, 3, '["0 mm", "0 mm", "-150 mm"]')
+AXIS: dict[str, Convert] = {
+    "travel": _several(_LENGTH, 2, '["0 mm", "600 mm"]'),
+    "reference_position": _LENGTH,
+    "measured_at": _VECTOR,
+    "measured_tool": _VECTOR,
+    "measured_on": _text,
+    "rapid": measure("feed"),
+    "acceleration": measure("acceleration"),
+}
+#: keys that say from where the lever of a component in urad counts
+COUNTED_FROM = {
+    "axis": ("measured_at", "measured_tool"),
+    "squareness": ("reference_position",),
+    "spindle": ("measured_tool",),
+}
+PLACES = {
+    "measured_at": "where X, Y and Z stood while it was measured",
+    "measured_tool": "the way from the gauge point to where the translations were measured",
+    "reference_position": "the position at which it moves nothing",
+}
+COMPONENT: dict[str, Convert] = {"model": _text, "target": _text, "profile": _rows}
+MACHINE: dict[str, Convert] = {
+    "name": _text,
+    "structure": _structure,
+    "reference_temperature": measure("temperature"),
+    "tool": _VECTOR,
+    "axes": _axes,
+    "spindle": lambda value, where: read_table(value, {"measured_tool": _VECTOR}, where),
+    "components": _same,
+}
