@@ -3,11 +3,10 @@
 import csv
 import re
 from bisect import bisect_right
-from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -37,6 +36,7 @@ from thermocomp.files.tables import EMBEDDED, check_headings, convert, decide, t
 #: bytes of a line that are read at most
 MOST_LINE = 4_000_000
 _SAMPLE_LINES = 100
+_TAIL = 65536  # bytes at the end of a file in which remarks are looked for
 _CHUNK = 100_000  # rows that are text in memory at a time
 _BOM = b"\xef\xbb\xbf"
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
@@ -250,7 +250,7 @@ class _Body(NamedTuple):
     n_rows: int
     odd: list[bytes]  #: lines that are not UTF-8
     again: list[int]  #: lines that repeat the headings, from 1
-    tail: deque[tuple[int, bytes]]  #: the last rows
+    tail: list[tuple[int, bytes]]  #: the last rows
     ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
 
 
@@ -270,7 +270,7 @@ def _read_head(path: Path, data: bytes | None, options: ReadOptions) -> _Head:
 def _scan(path: Path, data: bytes | None, comment: bytes, top: int, head: _Head) -> _Body:
     heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
     skipped, odd, again = list[int](), list[bytes](), list[int]()
-    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
+    number, ragged = 0, None
     width, n_rows = _cells(heading, delimiter), int(head.in_remark) - head.layout.begin
     for number, line in _content(path, data, comment, skipped):
         if not line.isascii() and len(odd) < _SAMPLE_LINES and not _is_utf8(line):
@@ -284,10 +284,22 @@ def _scan(path: Path, data: bytes | None, comment: bytes, top: int, head: _Head)
         cells = _cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        tail.append((number, line))
         if cells != width and ragged is None:
             ragged = number, _ragged(path, number + 1, cells, width, line, delimiter)
-    return _Body(skipped, width, n_rows, odd, again, tail, ragged)
+    tail = _read_tail(path, data, 1 + max(number, *skipped[-1:]), skipped)
+    return _Body(skipped, width, n_rows, odd, again, tail[-n_rows:] if n_rows > 0 else [], ragged)
+
+
+def _read_tail(path: Path, data: bytes | None, n_lines: int, skipped: list[int]) -> list[tuple[int, bytes]]:
+    """Return the last lines of a file with their numbers, without going through it again."""
+    with _open(path, data) as f:
+        size = f.seek(0, SEEK_END)
+        f.seek(max(0, size - _TAIL))
+        lines = f.read().splitlines(keepends=True)
+    lines = lines[1:] if size > _TAIL else lines
+    passed = set(skipped[-len(lines) :])
+    numbered = enumerate(lines, n_lines - len(lines))
+    return [(number, line) for number, line in numbered if number not in passed][-MOST_REMARKS:]
 
 
 def _open(path: Path, data: bytes | None) -> BinaryIO:
