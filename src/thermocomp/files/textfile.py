@@ -1,6 +1,5 @@
 """CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
 
-import csv
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -21,14 +20,13 @@ from thermocomp.files.layout import (
     Layout,
     find_end,
     find_layout,
-    find_value_columns,
-    find_width,
     join_units,
     name_stamps,
     tell_again,
     tell_end,
     tell_layout,
 )
+from thermocomp.files.lines import count_cells, explain_ragged, is_utf8, split_line
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
 from thermocomp.files.tables import EMBEDDED, check_headings, convert, decide, tell_notation
@@ -188,14 +186,11 @@ def open_csv(path: Path, options: ReadOptions) -> CsvTable:
     encoding = options.encoding or (find_encoding(body.odd) if body.odd else "utf-8")
 
     def split(line: bytes, errors: str = "replace") -> list[str]:
-        return _split(line.decode(encoding, errors), delimiter)
+        return split_line(line.decode(encoding, errors), delimiter)
 
     rows = [split(line) for _, line in first[layout.begin :]]
-    remarks = list[int]()
-    if rows and body.n_rows > 1:
-        last = [split(line) for _, line in body.tail]
-        count = find_end(last, find_value_columns(rows, find_width(rows)), body.width)
-        remarks = [number for number, _ in body.tail][len(last) - min(count, body.n_rows - 1) :]
+    n_remarks = find_end(rows, [split(line) for _, line in body.tail])
+    remarks = [number for number, _ in body.tail][len(body.tail) - n_remarks :]
     if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
         raise RecordingError(body.ragged[1])
     try:
@@ -271,9 +266,9 @@ def _scan(path: Path, data: bytes | None, comment: bytes, top: int, head: _Head)
     heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
     skipped, odd, again = list[int](), list[bytes](), list[int]()
     number, ragged = 0, None
-    width, n_rows = _cells(heading, delimiter), int(head.in_remark) - head.layout.begin
+    width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
     for number, line in _content(path, data, comment, skipped):
-        if not line.isascii() and len(odd) < _SAMPLE_LINES and not _is_utf8(line):
+        if not line.isascii() and len(odd) < _SAMPLE_LINES and not is_utf8(line):
             odd.append(line)
         n_rows += number >= top
         if n_rows <= 0 or line == heading:  # what stands above the rows; or of a logger that was started again
@@ -281,11 +276,11 @@ def _scan(path: Path, data: bytes | None, comment: bytes, top: int, head: _Head)
             n_rows -= n_rows > 0
             skipped.append(number)
             continue
-        cells = _cells(line, delimiter)
+        cells = count_cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
         if cells != width and ragged is None:
-            ragged = number, _ragged(path, number + 1, cells, width, line, delimiter)
+            ragged = number, explain_ragged(path, number + 1, cells, width, line, delimiter)
     tail = _read_tail(path, data, 1 + max(number, *skipped[-1:]), skipped)
     return _Body(skipped, width, n_rows, odd, again, tail[-n_rows:] if n_rows > 0 else [], ragged)
 
@@ -362,12 +357,12 @@ def _refuse_binary(path: Path, data: bytes | None) -> None:
 
 def _find_table(first: Sequence[tuple[int, bytes]], delimiter: str) -> tuple[str, Layout | None]:
     """Choose the delimiter, unless it is given, under which most rows have as many cells as the headings."""
-    lines = [line.decode("utf-8" if _is_utf8(line) else "latin-1") for _, line in first]
+    lines = [line.decode("utf-8" if is_utf8(line) else "latin-1") for _, line in first]
     best, best_layout, best_fit = delimiter or ",", None, (False, 0.0, 0)
     for tried in delimiter or "\t;|, ":
         if tried == " " and best_fit > (False, 0.0, 0) and not delimiter:
             continue  # white space stands inside headings and timestamps too: the last resort
-        rows = [_split(line, tried) for line in lines]
+        rows = [split_line(line, tried) for line in lines]
         found = find_layout(rows)
         width = len(rows[found.heading if found else 0])
         fits = [len(row) in (width, width + 1) for row in rows[found.begin if found else 1 :]]
@@ -382,36 +377,3 @@ def _separator(path: Path, data: bytes | None) -> str:
     with _open(path, data) as f:
         found = _SEPARATOR.fullmatch(f.readline(16))
     return found[1].decode() if found else ""
-
-
-def _split(line: str, delimiter: str) -> list[str]:
-    if delimiter == " ":
-        return re.split("[ \t]+", line.strip(" \t\r\n"))  # str.split takes more for white space than pandas
-    try:
-        return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True))
-    except csv.Error:  # a cell is larger than the reader takes: no number and no name is
-        return line.rstrip("\r\n").split(delimiter)
-
-
-def _cells(line: bytes, delimiter: str) -> int:
-    if delimiter == " " or b'"' in line:
-        return len(_split(line.decode("latin-1"), delimiter))
-    return line.count(delimiter.encode()) + 1
-
-
-def _ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    start = line[:60].decode("latin-1").strip()
-    text = f"{path}: line {number} has {cells} cells where the heading has {width}: {start!r}"
-    if delimiter == "," and cells > width:
-        return f"{text}; if it has decimal commas, export with ';' between the columns"
-    if not line.endswith(b"\n"):
-        return f"{text}; it is the last line, perhaps cut off while it was written: complete or delete it"
-    return f"{text}; complete or delete the line"
-
-
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return True

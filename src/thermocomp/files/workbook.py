@@ -18,8 +18,6 @@ from thermocomp.files.layout import (
     Layout,
     find_end,
     find_layout,
-    find_value_columns,
-    find_width,
     join_units,
     tell_end,
     tell_layout,
@@ -135,7 +133,9 @@ def _table(path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], o
     if layout.units != layout.heading:
         headings = join_units(headings, [_text(cell) for cell in content[layout.units]])
     below = content[begin:]
-    remarks = _count_remarks(below)
+    width = max(map(len, below), default=0)
+    ends = below[:_SAMPLE], below[-MOST_REMARKS:]
+    remarks = find_end(*([[*map(_text, row), *[""] * (width - len(row))] for row in part] for part in ends))
     left_out = places[len(places) - remarks :]
     below = below[: len(below) - remarks]
     width = max(map(len, below), default=0)
@@ -144,13 +144,6 @@ def _table(path: Path, name: str, rows: Iterator[Row], notes: tuple[str, ...], o
     frame = pd.DataFrame([row + (None,) * (len(headings) - len(row)) for row in below], dtype=object)
     told = (*notes, *tell_layout(places, layout, "row"), *tell_end(left_out, "row"))
     return FrameTable(str(path), tuple(headings), frame, places[begin:], notes=told, decimal=options.decimal)
-
-
-def _count_remarks(rows: Sequence[Row]) -> int:
-    """Count the rows at the end of a sheet that are none of its table."""
-    first, last = ([[_text(c) for c in row] for row in part] for part in (rows[:_SAMPLE], rows[-MOST_REMARKS:]))
-    # a row may be short for empty cells at its end: width says nothing here
-    return min(find_end(last, find_value_columns(first, find_width(first)), 0), len(rows) - 1) if rows else 0
 
 
 def _holds_cells(row: Row) -> bool:
