@@ -197,7 +197,7 @@ def test_three_digits_behind_a_sign_are_asked_for(tmp_path: Path, delimiter: str
 def test_the_sign_may_be_proven_late_and_doubted_late(tmp_path: Path) -> None:
     times = [str(k) for k in range(300)]
     assert read(table(tmp_path, "time_s", times, ["20,512"] * 299 + ["20,5"])).table.iloc[0, 0] == 20.512
-    with pytest.raises(InputError, match="'20,512' can be read as 20512 or as 20.512"):
+    with pytest.raises(InputError, match=r"'20,512' can be read as 20512 or as 20\.512"):
         read(table(tmp_path, "time_s", times, ["20"] * 299 + ["20,512"]))
 
 
@@ -219,6 +219,20 @@ def test_a_word_for_no_number_is_missing_and_told(tmp_path: Path, word: str) -> 
     assert told(recording, f"T1 [C]: {word!r}, taken as missing, in 1 of 3 cells: line 3")
     with pytest.raises(InputError, match=r"line 3, column 'T1 \[C\]': 'warm' is not a number"):
         read(table(tmp_path, "time_s", ["0", "1", "2"], ["20.5", "warm", word]))
+
+
+@pytest.mark.parametrize("cells", [["True", "False"], ["20.5", "True"], ["0x10", "20.5"], ["1_0", "20.5"]])
+def test_what_python_would_take_for_a_number_is_none(tmp_path: Path, cells: list[str]) -> None:
+    with pytest.raises(InputError, match=r"column 'T1 \[C\]': '(True|0x10|1_0)' is not a number"):
+        read(table(tmp_path, "time_s", ["0", "1"], cells))
+
+
+def test_every_digit_counts_whatever_stands_beside_it(tmp_path: Path) -> None:
+    values = np.random.default_rng(7).normal(20, 1, 390)
+    cells = [repr(float(v)).replace(".", ",") for v in values]
+    words = [*cells, "OL", "1.234,5"]
+    recording = read(table(tmp_path, "time_s", [str(k) for k in range(392)], words))
+    assert np.array_equal(recording.table["T1_C"], [*values, np.nan, 1234.5], equal_nan=True)
 
 
 def test_infinity_of_instruments_is_missing(tmp_path: Path) -> None:
@@ -297,6 +311,25 @@ def test_a_row_at_the_end_that_is_one_is_not_left_out(tmp_path: Path, end: str, 
     path.write_text("time_s;t1_C;t2_C\n0;20;21\n10;21;22\n" + end, encoding="utf-8")
     with pytest.raises(InputError, match=refused):
         read(path)
+
+
+def test_a_first_row_with_a_wrong_cell_is_not_passed_over(tmp_path: Path) -> None:
+    for rows in ("0;warm\n1;20\n2;21\n", "0;warm\n1;hot\n2;21\n3;22\n"):
+        path = tmp_path / "first.csv"
+        path.write_text("time_s;t1_C\n" + rows, encoding="utf-8")
+        with pytest.raises(InputError, match="line 2, column 't1_C': 'warm'"):
+            read(path)
+
+
+def test_rows_of_labels_between_headings_and_table_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "labels.csv"
+    path.write_text("Zeit;T1;T2\n1;2;3\ns;°C;°C\nOffset;0;0\n0;20;21\n1;21;22\n", encoding="utf-8")
+    recording = read(path)
+    assert recording.table.to_numpy().tolist() == [[20, 21], [21, 22]]
+    assert recording.notes[:2] == (
+        "between the headings and the table lines 2, 4 are passed over",
+        "line 3 holds the units",
+    )
 
 
 def test_rows_at_the_end_of_a_sheet_are_left_out(tmp_path: Path) -> None:

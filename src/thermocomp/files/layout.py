@@ -65,12 +65,15 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     # a preamble is over in the later half
     width, columns = find_columns(rows[len(rows) // 2 :])
     is_row = [_is_row(row, columns) for row in rows]
+    # a row of the numbers of channels, say, is no row of the table: units follow it
+    labels = [k + 1 < len(rows) and _is_units(rows[k + 1]) for k in range(len(rows))]
     for begin in range(1, len(rows)):
-        # a row of the numbers of channels, say, is no row of the table: units follow it
-        if not is_row[begin] or (begin + 1 < len(rows) and _is_units(rows[begin + 1])):
+        if not is_row[begin] or labels[begin]:
             continue
         first = begin
         while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
+            if columns[0] < len(rows[first - 1]) and _is_value(rows[first - 1][columns[0]]) and not labels[first - 1]:
+                break  # a row of the table with words in it, which is not passed over
             first -= 1
         above = range(first, begin)
         units = [k for k in above if _is_units(rows[k])]
@@ -126,9 +129,14 @@ def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str,
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
     between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
-    for passed, where in ((above, "above the headings"), (between, "between the headings and the table")):
-        if passed:
-            found.append(f"{tell_rows(passed, word)} {where} {'is' if len(passed) == 1 else 'are'} passed over")
+    if above:
+        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} passed over")
+    if between:
+        places = ", ".join(map(str, between))
+        found.append(
+            f"between the headings and the table {word}{'s' * (len(between) > 1)} {places} "
+            f"{'is' if len(between) == 1 else 'are'} passed over"
+        )
     if layout.units != layout.heading:
         found.append(f"{word} {numbers[layout.units]} holds the units")
     return tuple(found)

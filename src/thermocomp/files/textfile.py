@@ -94,37 +94,37 @@ class CsvTable:
         signs = Signs()
         for row in self.sample:
             signs.add(row[k] for k in numbers if k < len(row))
-        decimal = self.decimal or ("," if signs.proven[","] > signs.proven["."] else ".")
-        if self.decimal or signs.proven or (self.delimiter == "," and not signs.open):
+        text: dict[int, Any] = dict.fromkeys(texts, str)
+        decimal = self.decimal or signs.proven_sign() or ("." if self.delimiter == "," and not signs.open else "")
+        if decimal:
             with suppress(ValueError):
-                return self._load_plain(numbers, texts, decimal), tell_notation(Notation(decimal))
-        return self._load_anyhow(numbers, texts)
-
-    def _load_plain(self, numbers: Sequence[int], texts: Sequence[int], decimal: str) -> pd.DataFrame:
-        """Read columns of numbers that are all written in one way; a ValueError if they are not."""
-        types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
-        return self._read_frame(types, decimal=decimal, **_EXACT)
-
-    def _load_anyhow(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-        """Read columns cell by cell: slowly, with whatever may stand in place of a number."""
+                frame = self._read_frame({**text, **dict.fromkeys(numbers, np.float64)}, decimal=decimal)
+                return frame, tell_notation(Notation(decimal))
         try:
-            frame = self._read_frame(dict.fromkeys((*texts, *numbers), str))
+            # what pandas does not take for numbers stays text
+            types = text if decimal else {**text, **dict.fromkeys(numbers, str)}
+            frame = self._read_frame({**dict.fromkeys(numbers), **types}, decimal=decimal or ".")
         except ValueError as e:
             raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
-        signs = Signs()
-        for k in numbers:
-            signs.add(frame[k].dropna())
-        notation = decide(signs, self.decimal, self.delimiter, str(self.path))
+        written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
+        for k in written:
+            # pandas takes True for a number
+            frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
+            signs.add(cell for cell in frame[k] if isinstance(cell, str))
+        notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, str(self.path))
         notes = tell_notation(notation)
         for k in numbers:
-            values, found = convert(self, str(self.path), k, frame[k], notation)
-            frame[k] = values
-            notes += found
+            if k in written:
+                frame[k], found = convert(self, str(self.path), k, frame[k], notation)
+                notes += found
         return frame, notes
 
     def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
+        """Read columns of some types, or of the one that pandas finds (None); a ValueError if they are not."""
         try:
-            with pd.read_csv(BytesIO(self.data) if self.data else self.path, **self._options(types), **more) as chunks:
+            with pd.read_csv(
+                BytesIO(self.data) if self.data else self.path, **self._options(types), **more, **_EXACT
+            ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
         except UnicodeDecodeError as e:
             raise RecordingError(
@@ -151,7 +151,8 @@ class CsvTable:
             "header": None,
             "names": range(len(self.headings)),
             "usecols": sorted(types),
-            "dtype": types,
+            "dtype": {k: kind for k, kind in types.items() if kind is not None},
+            "low_memory": False,
             "index_col": False,
             "skiprows": list(self.skipped),
             "skipinitialspace": True,
