@@ -33,7 +33,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             CP1252,
             "lines 1 to 4 above the headings are passed over",
-            "line 7 between the headings and the table is passed over",
+            "between the headings and the table line 7 is passed over",
             "line 8 holds the units",
             "'Zeit  1 - Standardmessrate [s]' is taken as the time",
             COMMA,

@@ -201,7 +201,8 @@ def is_unit(symbol: str) -> bool:
 def _name(symbol: str) -> str:
     """Return the symbol under which a unit is kept, of one of its spellings."""
     plain = " ".join(symbol.removeprefix("Â").replace("℃", "°C").replace("℉", "°F").translate(_SIGNS).split())
-    plain = _POWER.sub(lambda found: f"1e{found[1] or found[2]}", plain.replace("° ", "°").lstrip("x* "))
+    plain = _POWER.sub(lambda found: f"1e{found[1] or found[2]}", plain.replace("° ", "°"))
+    plain = re.sub(r"^[x*] ?(?=\d)", "", plain)  # x1000 rpm
     word = plain.casefold().removesuffix(".").replace(" ", "_")
     return _ALIASES.get(plain) or _WORDS.get(word, plain)
 

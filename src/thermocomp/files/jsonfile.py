@@ -10,7 +10,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails, SchemaValidator
 
 from thermocomp.core.draft import write_text
-from thermocomp.core.exceptions import ModelFileError, SettingError
+from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.plaintext import list_errors, read_text
 

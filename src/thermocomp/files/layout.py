@@ -62,15 +62,18 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     """
     if len(rows) < 2:
         return None
-    width = find_width(rows)
-    columns = find_value_columns(rows, width)
+    # a preamble is over in the later half
+    width, columns = find_columns(rows[len(rows) // 2 :])
     is_row = [_is_row(row, columns) for row in rows]
+    # a row of the numbers of channels, say, is no row of the table: units follow it
+    labels = [k + 1 < len(rows) and _is_units(rows[k + 1]) for k in range(len(rows))]
     for begin in range(1, len(rows)):
-        # a row of the numbers of channels, say, is no row of the table: units follow it
-        if not is_row[begin] or (begin + 1 < len(rows) and _is_units(rows[begin + 1])):
+        if not is_row[begin] or labels[begin]:
             continue
         first = begin
         while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
+            if columns[0] < len(rows[first - 1]) and _is_value(rows[first - 1][columns[0]]) and not labels[first - 1]:
+                break  # a row of the table with words in it, which is not passed over
             first -= 1
         above = range(first, begin)
         units = [k for k in above if _is_units(rows[k])]
@@ -84,25 +87,24 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     return None
 
 
-def find_end(rows: Sequence[Sequence[str]], columns: Sequence[int], width: int) -> int:
+def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> int:
     """Count the rows at the end of a file that are none of its table: remarks and statistics.
 
     Parameters
     ----------
-    rows : sequence of sequence of str
-        Cells of the last rows.
-    columns : sequence of int
-        That hold values.
-    width : int
-        Cells of a row of the table.
+    first, last : sequence of sequence of str
+        Cells of the first and the last rows below the headings.
 
     Returns
     -------
     int
         A row that was cut off, or lacks its time, is not counted: it begins as one of the table.
     """
+    if len(last) < 2:
+        return 0
+    width, columns = find_columns(first[: (len(first) + 1) // 2])
     count = 0
-    for row in reversed(rows):
+    for row in reversed(last[1:]):
         if not _is_remark(row, columns, width):
             break
         count += 1
@@ -127,9 +129,14 @@ def tell_layout(numbers: Sequence[int], layout: Layout, word: str) -> tuple[str,
     found = []
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
     between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
-    for passed, where in ((above, "above the headings"), (between, "between the headings and the table")):
-        if passed:
-            found.append(f"{tell_rows(passed, word)} {where} {'is' if len(passed) == 1 else 'are'} passed over")
+    if above:
+        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} passed over")
+    if between:
+        places = ", ".join(map(str, between))
+        found.append(
+            f"between the headings and the table {word}{'s' * (len(between) > 1)} {places} "
+            f"{'is' if len(between) == 1 else 'are'} passed over"
+        )
     if layout.units != layout.heading:
         found.append(f"{word} {numbers[layout.units]} holds the units")
     return tuple(found)
@@ -175,17 +182,13 @@ def is_stamp(cell: str) -> bool:
     return len(cell) < _LONGEST and _TIME.fullmatch(cell.strip()) is not None
 
 
-def find_width(rows: Sequence[Sequence[str]]) -> int:
-    """Return the commonest number of cells in the later half of the rows, where a preamble is over."""
-    counts = Counter(len(row) for row in rows[len(rows) // 2 :])
-    return max(counts, key=lambda width: (counts[width], width))
-
-
-def find_value_columns(rows: Sequence[Sequence[str]], width: int) -> list[int]:
-    """Return the columns that hold values in most of the later rows."""
-    later = [row for row in rows[len(rows) // 2 :] if len(row) == width]
-    counts = Counter(k for row in later for k, cell in enumerate(row) if _is_value(cell))
-    return [k for k in range(width) if 2 * counts[k] >= len(later) and counts[k]]
+def find_columns(rows: Sequence[Sequence[str]]) -> tuple[int, list[int]]:
+    """Return the commonest number of cells of some rows, and the columns that hold values in most of them."""
+    counts = Counter(len(row) for row in rows)
+    width = max(counts, key=lambda width: (counts[width], width))
+    even = [row for row in rows if len(row) == width]
+    values = Counter(k for row in even for k, cell in enumerate(row) if _is_value(cell))
+    return width, [k for k in range(width) if 2 * values[k] >= len(even) and values[k]]
 
 
 def _is_text(row: Sequence[str], width: int) -> bool:
@@ -213,7 +216,7 @@ def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
     values = any(k < len(row) and _is_value(row[k]) for k in columns)
     timed = columns[0] < len(row) and _is_value(row[columns[0]])
     counted = any(row[k].strip().strip(":.").casefold() in _STATISTICS for k in words)
-    return not values or (not timed and (counted or (len(row) < width - 1 and columns[0] in words)))
+    return not values or (not timed and (counted or (len(row) < width and columns[0] in words)))
 
 
 def _is_units(row: Sequence[str]) -> bool:

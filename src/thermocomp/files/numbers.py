@@ -89,6 +89,10 @@ class Signs:
             elif _PLAIN.fullmatch(text) and ("." in text or "," in text):
                 self.proven["." if "." in text else ","] += 1
 
+    def proven_sign(self) -> str:
+        """Return the decimal sign that most cells prove; empty if none does."""
+        return self.proven.most_common(1)[0][0] if self.proven else ""
+
     def decide(self, stated: str, delimiter: str) -> Notation | None:
         """Return how the numbers are written; None if no cell says.
 
@@ -104,9 +108,7 @@ class Signs:
         RecordingError
             They can be read in two ways.
         """
-        decimal = stated
-        if not decimal and self.proven:
-            decimal = self.proven.most_common(1)[0][0]
+        decimal = stated or self.proven_sign()
         if not decimal and self.open:
             if delimiter != "," or "," in self.open:
                 cell = next(iter(self.open.values())) if delimiter != "," else self.open[","]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, Remedy
 from thermocomp.files.limits import Limits
-from thermocomp.files.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like, is_word
+from thermocomp.files.numbers import Notation, Signs, is_filler, is_number_like, is_word
 
 FloatArray = NDArray[np.float64]
 
@@ -274,26 +274,20 @@ def convert(
     RecordingError
         A cell holds anything else; the message names it.
     """
-    values = np.full(len(cells), np.nan)
+    values, odd = read_plain(cells, notation.decimal)
     words: dict[str, list[int]] = {}
     grouped = -1
-    for row, cell in enumerate(cells):
-        if not isinstance(cell, str):
-            if cell is not None and not pd.isna(cell):
-                try:
-                    values[row] = float(cell)
-                except (TypeError, ValueError) as e:
-                    refuse_cell(table, source, row, column, cell, e)
-            continue
-        number = notation.read(cell)
+    for row in np.flatnonzero(odd):
+        cell = cells.iloc[row]
+        number = notation.read(cell) if isinstance(cell, str) else None
         if number is not None:
             values[row] = number
-            if grouped < 0 and notation.thousands and any(s in cell.strip() for s in notation.thousands):
-                grouped = row
+            if grouped < 0 and any(s in cell.strip() for s in notation.thousands):
+                grouped = int(row)
+        elif not isinstance(cell, str) or not is_filler(cell):
+            refuse_cell(table, source, int(row), column, cell)
         elif is_word(cell):
-            words.setdefault(cell.strip(), []).append(row)
-        elif cell.strip().casefold() not in MISSING_TEXT:
-            refuse_cell(table, source, row, column, cell)
+            words.setdefault(cell.strip(), []).append(int(row))
     if grouped >= 0:
         _refuse_mixed(table, source, column, cells, grouped)
     return values, tuple(
@@ -301,6 +295,22 @@ def convert(
         f"{tell_places(rows, table.place)}"
         for word, rows in words.items()
     )
+
+
+def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return numbers without separators of thousands, and where a cell is filled with anything else."""
+    filled = cells.notna().to_numpy()
+    texts = cells.map(lambda c: isinstance(c, str)).to_numpy(dtype=np.bool_) if cells.dtype == object else filled
+    plain = cells
+    if decimal == "," and texts.any():
+        # a point is no part of a number where the comma is the decimal sign
+        swapped = cells[texts].astype("str").str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
+        plain = cells.astype(object).where(~texts, swapped)
+    good = pd.to_numeric(plain, errors="coerce").notna().to_numpy() & filled
+    values = np.full(len(cells), np.nan)
+    # to the last digit, which pandas does not promise
+    values[good] = plain[good].to_numpy(dtype=object).astype(np.float64)
+    return values, filled & ~good
 
 
 def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:

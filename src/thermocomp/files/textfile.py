@@ -1,7 +1,6 @@
 """CSV files: how they are written is found out from the file, then pandas reads the columns asked for."""
 
 from bisect import bisect_right
-from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -19,8 +18,6 @@ from thermocomp.files.layout import (
     Layout,
     find_end,
     find_layout,
-    find_value_columns,
-    find_width,
     join_units,
     name_stamps,
     tell_again,
@@ -93,37 +90,37 @@ class CsvTable:
         signs = Signs()
         for row in self.sample:
             signs.add(row[k] for k in numbers if k < len(row))
-        decimal = self.decimal or ("," if signs.proven[","] > signs.proven["."] else ".")
-        if self.decimal or signs.proven or (self.delimiter == "," and not signs.open):
+        text: dict[int, Any] = dict.fromkeys(texts, str)
+        decimal = self.decimal or signs.proven_sign() or ("." if self.delimiter == "," and not signs.open else "")
+        if decimal:
             with suppress(ValueError):
-                return self._load_plain(numbers, texts, decimal), tell_notation(Notation(decimal))
-        return self._load_anyhow(numbers, texts)
-
-    def _load_plain(self, numbers: Sequence[int], texts: Sequence[int], decimal: str) -> pd.DataFrame:
-        """Read columns of numbers that are all written in one way; a ValueError if they are not."""
-        types: dict[int, Any] = {**dict.fromkeys(texts, str), **dict.fromkeys(numbers, np.float64)}
-        return self._read_frame(types, decimal=decimal, **_EXACT)
-
-    def _load_anyhow(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
-        """Read columns cell by cell: slowly, with whatever may stand in place of a number."""
+                frame = self._read_frame({**text, **dict.fromkeys(numbers, np.float64)}, decimal=decimal)
+                return frame, tell_notation(Notation(decimal))
         try:
-            frame = self._read_frame(dict.fromkeys((*texts, *numbers), str))
+            # what pandas does not take for numbers stays text
+            types = text if decimal else {**text, **dict.fromkeys(numbers, str)}
+            frame = self._read_frame({**dict.fromkeys(numbers), **types}, decimal=decimal or ".")
         except ValueError as e:
             raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
-        signs = Signs()
-        for k in numbers:
-            signs.add(frame[k].dropna())
-        notation = decide(signs, self.decimal, self.delimiter, str(self.path))
+        written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
+        for k in written:
+            # pandas takes True for a number
+            frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
+            signs.add(cell for cell in frame[k] if isinstance(cell, str))
+        notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, str(self.path))
         notes = tell_notation(notation)
         for k in numbers:
-            values, found = convert(self, str(self.path), k, frame[k], notation)
-            frame[k] = values
-            notes += found
+            if k in written:
+                frame[k], found = convert(self, str(self.path), k, frame[k], notation)
+                notes += found
         return frame, notes
 
     def _read_frame(self, types: dict[int, Any], **more: Any) -> pd.DataFrame:
+        """Read columns of some types, or of the one that pandas finds (None); a ValueError if they are not."""
         try:
-            with pd.read_csv(BytesIO(self.data) if self.data else self.path, **self._options(types), **more) as chunks:
+            with pd.read_csv(
+                BytesIO(self.data) if self.data else self.path, **self._options(types), **more, **_EXACT
+            ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
         except UnicodeDecodeError as e:
             raise RecordingError(
@@ -150,7 +147,8 @@ class CsvTable:
             "header": None,
             "names": range(len(self.headings)),
             "usecols": sorted(types),
-            "dtype": types,
+            "dtype": {k: kind for k, kind in types.items() if kind is not None},
+            "low_memory": False,
             "index_col": False,
             "skiprows": list(self.skipped),
             "skipinitialspace": True,
@@ -188,11 +186,8 @@ def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> Csv
         return split_line(line.decode(encoding, errors), delimiter)
 
     rows = [split(line) for _, line in first[layout.begin :]]
-    remarks = list[int]()
-    if rows and body.n_rows > 1:
-        last = [split(line) for _, line in body.tail]
-        count = find_end(last, find_value_columns(rows, find_width(rows)), body.width)
-        remarks = [number for number, _ in body.tail][len(last) - min(count, body.n_rows - 1) :]
+    n_remarks = find_end(rows, [split(line) for _, line in body.tail])
+    remarks = [number for number, _ in body.tail][len(body.tail) - n_remarks :]
     if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
         raise RecordingError(body.ragged[1], [{"read": {"skip": [body.ragged[0] + 1]}}])
     try:
@@ -249,7 +244,7 @@ class _Body(NamedTuple):
     n_rows: int
     odd: list[bytes]  #: lines that are not UTF-8
     again: list[int]  #: lines that repeat the headings, from 1
-    tail: deque[tuple[int, bytes]]  #: the last rows
+    tail: list[tuple[int, bytes]]  #: the last rows
     ragged: tuple[int, str] | None  #: first row of another width, and what is to be said of it
 
 
@@ -282,7 +277,7 @@ def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, b
 def _scan(lines: Lines, head: _Head) -> _Body:
     heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
     skipped, odd, again = list[int](), list[bytes](), list[int]()
-    tail, ragged = deque[tuple[int, bytes]](maxlen=MOST_REMARKS), None
+    number, ragged = 0, None
     width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
     top, plain, long = lines.options.heading - 1, delimiter != " ", lines.limits.cell_characters
     for number, line in lines.content(skipped):
@@ -297,13 +292,13 @@ def _scan(lines: Lines, head: _Head) -> _Body:
         cells = line.count(ending) + 1 if plain and b'"' not in line else count_cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        tail.append((number, line))
         if cells != width and ragged is None:
             ragged = number, describe_ragged(lines.path, number + 1, cells, width, line, delimiter)
         if len(line) > long:
             most = max(map(len, split_line(line.decode("latin-1"), delimiter)))
             lines.limits.check("cell_characters", most, f"{lines.path}: line {number + 1}")
-    return _Body(skipped, width, n_rows, odd, again, tail, ragged)
+    tail = lines.read_tail(1 + max(number, *skipped[-1:]), skipped)[-MOST_REMARKS:]
+    return _Body(skipped, width, n_rows, odd, again, tail[-n_rows:] if n_rows > 0 else [], ragged)
 
 
 def _find_table(

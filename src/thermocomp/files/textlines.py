@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -16,6 +16,7 @@ from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.tables import EMBEDDED
 
 _BOM = b"\xef\xbb\xbf"
+_TAIL = 65536  # bytes at the end of a file in which remarks are looked for
 _BLANK = b' \t\r\n",;|'  # a spreadsheet's empty rows: ;;;;
 _SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?\"?sep=([,;\t| ])\"?\r?\n", re.IGNORECASE)
 #: a spreadsheet puts quotation marks around the line
@@ -107,6 +108,24 @@ class Lines:
         if text.startswith('"'):
             text = split_line(text, ";")[0]
         return text.partition(": ")[2].strip()
+
+    def read_tail(self, n_lines: int, skipped: list[int]) -> list[tuple[int, bytes]]:
+        """Return the last rows of the file with their numbers, without going through it again.
+
+        Parameters
+        ----------
+        n_lines : int
+            Lines of the file.
+        skipped : list of int
+            Those that are no rows.
+        """
+        with self.open() as f:
+            size = f.seek(0, SEEK_END)
+            f.seek(max(0, size - _TAIL))
+            lines = f.read().splitlines(keepends=True)
+        lines = lines[1:] if size > _TAIL else lines
+        passed = set(skipped[-len(lines) :])
+        return [(number, line) for number, line in enumerate(lines, n_lines - len(lines)) if number not in passed]
 
     def separator(self) -> str:
         """Return the delimiter that a spreadsheet writes into the first line of a file (``sep=;``), if it does."""

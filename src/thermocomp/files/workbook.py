@@ -21,8 +21,6 @@ from thermocomp.files.layout import (
     Layout,
     find_end,
     find_layout,
-    find_value_columns,
-    find_width,
     join_units,
     tell_end,
     tell_layout,
@@ -167,11 +165,8 @@ def _table(
 
 def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
     """Count the rows at the end of a sheet that are none of its table."""
-    if not head:
-        return 0
-    first, last = ([[_text(c) for c in row] for row in part] for part in (head, tail))
-    # a row may be short for empty cells at its end: width says nothing here
-    return min(find_end(last, find_value_columns(first, find_width(first)), 0), len(tail) - 1)
+    width = max(map(len, (*head, *tail)), default=0)
+    return find_end(*([[*map(_text, row), *[""] * (width - len(row))] for row in part] for part in (head, tail)))
 
 
 class _Body:
