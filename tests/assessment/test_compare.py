@@ -301,6 +301,19 @@ def test_a_model_of_large_opposed_gains_is_called_harmful(samples: Samples) -> N
     assert "noise of 0.4 degC" not in calm.worse_than_none
 
 
+def test_accepted_by_units_but_worse_over_all_rows_is_unproven_in_the_file(
+    samples: Samples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that calls it accepted, with an RMS above none, would be taken for an altered one."""
+    judging = splits.leave_one_cycle_out(samples)
+    (overall,) = (a for a in compare(samples, ["dynamic"], judging).overall() if a.target == "z_um")
+    assert study.honest_error(overall, judging).verdict == "accepted"
+    monkeypatch.setattr(type(overall), "none_metric", lambda self, name: 0.5 * self.metric(name))
+    found = study.honest_error(overall, judging)
+    assert found.verdict == "unproven"
+    assert "; over all rows RMS " in found.reason
+
+
 def test_fit_writes_its_honest_error_into_the_models(samples: Samples) -> None:
     judging = splits.leave_one_cycle_out(samples)
     fitted = study.fit(samples, "dynamic", judging, support=Support("fade"))

@@ -83,3 +83,9 @@ def test_what_is_no_state_is_refused(left: JobState, change: dict[str, object], 
     body = [content["models"][0] | change]
     with pytest.raises(ModelFileError, match=says):
         jobstate.loads(jsonfile.pack(jobstate.KIND, body))
+
+
+def test_a_file_is_of_one_job(left: JobState) -> None:
+    body = json.loads(jobstate.dumps(left, NOON))["models"]
+    with pytest.raises(ModelFileError, match="holds the states of 2 jobs: want one"):
+        jobstate.loads(jsonfile.pack(jobstate.KIND, body * 2))

@@ -17,7 +17,7 @@ from thermocomp.files.plaintext import list_errors, read_text
 #: bytes of a file, at most; models of additive curves over 9,000 rows had 8 million each before they were thinned
 MOST = 64_000_000
 #: the same of what stands in it: memory is bounded, whatever is made of the bytes
-_COUNTS = {",": 5_000_000, "[": 500_000, "{": 100_000, '"': 1_000_000}
+_COUNTS = {",": 4_000_000, "[": 500_000, "{": 20_000, '"': 300_000}
 #: digits of an integer
 _DIGITS = 18
 #: characters of a text from a file that an error repeats
