@@ -1,7 +1,7 @@
 """What a heading says: ``t1_C``, ``drift_mm``, ``T1 [degC]`` carry the unit of their column."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import UnitError
@@ -77,7 +77,7 @@ def understand(heading: str) -> Meaning | None:
                 raise
             return None
         said = _suffix(base)
-        if said and SUFFIXES[said] == meant.symbol:  # x_um [um]: twice
+        if said and replace(find_unit(SUFFIXES[said]), symbol=meant.symbol) == meant:  # x_um [um]: twice
             inner = understand(base)
             if inner is not None and (inner.unit.scale, inner.unit.shift) == (1, 0):
                 return Meaning(base, inner.base, inner.unit)
