@@ -111,7 +111,7 @@ def bases() -> dict[str, bytes]:
 def _sheet(rows: str, **parts: str) -> bytes:
     """Return a workbook with these rows, and other parts in place of its own."""
     book = openpyxl.Workbook()
-    book.active.append(["time_s", "t1_C"])  # type: ignore[union-attr]
+    book.active.append(["time_s", "t1_C"])
     out = io.BytesIO()
     book.save(out)
     kept: dict[str, str | bytes] = {
