@@ -17,6 +17,7 @@ from numpydoc.docscrape import NumpyDocString  # type: ignore[import-untyped]
 from numpydoc.validate import validate  # type: ignore[import-untyped]
 
 from thermocomp.cli.app import app
+from thermocomp.files.limits import Limits
 from thermocomp.files.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.files.recordings import read
 from thermocomp.recording.cleaning import Cut, Resample, Rezero, Shift, Swap
@@ -46,7 +47,7 @@ NOUNS = {
 }
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]
-TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule}
+TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule, "limits": Limits}
 STEPS = (Cut, Shift, Rezero, Swap, Resample)
 # Written by Sphinx itself, or not a page.
 _MADE = ("_build", "_templates", "auto_examples", "auto_papers", "papers", "reference", "tutorial")

@@ -1,5 +1,6 @@
 """Forecasts as CSV."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -80,3 +81,17 @@ def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, t
         return
     for time, values in found.columns.values():
         InputSignal(time, values)
+
+
+def test_a_forecast_is_a_file_of_sane_size(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "huge.csv").write_bytes(b"")
+    os.truncate(tmp_path / "huge.csv", 65 << 20)
+    (tmp_path / "long.csv").write_text(f'time_s,"{"x" * 140_000}"\n0,1\n')
+    for name, message in (
+        ("pipe.csv", "is a pipe or a device"),
+        ("huge.csv", "more than 64 MiB"),
+        ("long.csv", "line 1 cannot be read: field larger"),
+    ):
+        with pytest.raises(InputError, match=message):
+            forecast.read(tmp_path / name)

@@ -241,6 +241,12 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
             {"time_s": np.zeros(30_000_000), "t1_C": np.zeros(30_000_000)}, compression="zstd", use_dictionary=False
         ),
     ),
+    "parquet columns without units": (
+        "parquet",
+        lambda: _parquet(
+            {"time_s": [0.0, 1.0], "t_C": [20.0, 21.0], **{f"n{k}": [1.0, "a"][k % 2 :][:1] * 2 for k in range(9_000)}}
+        ),
+    ),
     "parquet columns": ("parquet", lambda: _parquet({f"t{k}_C": [1.0] for k in range(20_000)})),
     "parquet kinds": (
         "parquet",
@@ -279,9 +285,9 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
 
 
 def _wide(heading: str) -> bytes:
-    names = ",".join(heading.format(k) for k in range(9_998))
-    rows = "".join(f"{k}," + ",".join(["20.5"] * 9_998) + "\n" for k in range(200))
-    return f"time_s,{names}\n{rows}".encode()
+    names = ",".join(heading.format(k) for k in range(9_990))
+    rows = "".join(f"{k},20," + ",".join(["20.5"] * 9_990) + "\n" for k in range(200))
+    return f"time_s,t_C,{names}\n{rows}".encode()
 
 
 def damaged(seed: int, sound: dict[str, bytes]) -> tuple[str, bytes]:

@@ -9,7 +9,10 @@ from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.core.units import Unit
 from thermocomp.files.leftout import why_left_out
+from thermocomp.files.limits import Limits, check_file
 
+#: hours at a row a second are below one
+_MOST_BYTES = 64 << 20
 _TIME = ("time", "t", "elapsed")
 
 
@@ -55,6 +58,9 @@ def read(path: str | Path) -> Forecast:
     """
     source = Path(path)
     try:
+        check_file(source, Limits())
+        if source.stat().st_size > _MOST_BYTES:
+            raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, which no forecast has; leave rows out")
         text = source.read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
         raise InputError(f"{source}: no such file") from e
@@ -66,7 +72,7 @@ def read(path: str | Path) -> Forecast:
     if len(lines) < 2:
         raise InputError(f"{source}: a forecast is a line of headings and rows of numbers below it; found {len(lines)}")
     delimiter = next((d for d in "\t;" if d in lines[0][1]), ",")
-    cells = [next(csv.reader([line], delimiter=delimiter)) for _, line in lines]
+    cells = [_cells(line, delimiter, f"{source}: line {number}") for number, line in lines]
     headings = [h.strip() for h in cells[0]]
     kept, left_out = _columns(headings, str(source))
     time = next((k for k, (name, _) in kept.items() if name == ""), None)
@@ -95,6 +101,13 @@ def read(path: str | Path) -> Forecast:
         if not times:
             left_out.append(f"{name} is empty")
     return Forecast(str(source), {n: (tuple(t), tuple(v)) for n, (t, v) in found.items() if t}, tuple(left_out))
+
+
+def _cells(line: str, delimiter: str, where: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter))
+    except csv.Error as e:
+        raise InputError(f"{where} cannot be read: {e}") from e
 
 
 def _columns(headings: list[str], source: str) -> tuple[dict[int, tuple[str, Unit]], list[str]]:

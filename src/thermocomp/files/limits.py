@@ -112,13 +112,37 @@ class Limits:
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
-        """Refuse a table that is too large; see `check`."""
+        """Refuse a table that is too large.
+
+        Parameters
+        ----------
+        rows, columns : int
+        where : object
+            File and place, for the message.
+
+        Raises
+        ------
+        RecordingError
+            See `check`.
+        """
         self.check("columns", columns, where)
         self.check("rows", rows, where)
         self.check("cells", rows * columns, where)
 
     def check_unpacked(self, unpacked: int, path: Path) -> None:
-        """Refuse a small file that becomes a large one, in bytes; see `check`."""
+        """Refuse a small file that becomes a large one.
+
+        Parameters
+        ----------
+        unpacked : int
+            What it has become so far [byte].
+        path : Path
+
+        Raises
+        ------
+        RecordingError
+            See `check`.
+        """
         size = max(path.stat().st_size, 1)
         if unpacked > _UNPACKED_FREE:
             self.check("growth", -(-(unpacked - _UNPACKED_FREE) // size), path)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,18 +25,17 @@ from thermocomp.files.tables import (
 )
 
 if TYPE_CHECKING:
-    from pyarrow import Array, RecordBatch
+    from pyarrow import Array, DataType, RecordBatch
     from pyarrow.parquet import ParquetFile
 
 _TEXTS = ("string", "large_string", "binary", "large_binary")
-_TIMES = ("timestamp", "duration")
-#: an index that has no name
-_INDEX = "__index_level_0__"
 _FIRST = 100  # cells that tell whether a column holds numbers
 _BATCH = 65_536  # rows that are unpacked at a time
 _BUFFER = 1 << 18  # bytes of a column that are read at a time; else all of a row group are
 #: where pandas keeps what belongs to a table
 _PANDAS, _ATTRIBUTES = b"pandas", b"PANDAS_ATTRS"
+#: what it calls an index without a name
+_INDEX = "__index_level_0__"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,8 @@ class ParquetTable:
     headings : tuple of str
     texts : tuple of str
         Names of the columns that hold texts.
+    others : tuple of int
+        Positions of the columns that do not hold numbers by their type.
     n_rows : int
     embedded : str
     limits : Limits
@@ -62,6 +64,7 @@ class ParquetTable:
     names: tuple[str, ...]
     headings: tuple[str, ...]
     texts: tuple[str, ...]
+    others: tuple[int, ...]
     n_rows: int
     embedded: str
     limits: Limits
@@ -70,11 +73,17 @@ class ParquetTable:
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
-        for batch in self._batches([column]):
-            filled = batch.column(0).drop_null()
-            if len(filled):
-                return first_is_number(filled.slice(0, _FIRST).to_pandas(), empty=empty)
-        return empty
+        found = self._first_cells.get(column)
+        return column not in self.others if found is None else first_is_number(found, empty=empty)
+
+    @cached_property
+    def _first_cells(self) -> dict[int, "pd.Series[Any]"]:
+        """First filled cell of those of the `others` that have one among the first rows."""
+        filled = {}
+        batch = next(self._batches(self.others), None) if self.others else None
+        for k, column in zip(self.others, batch.columns if batch is not None else (), strict=batch is not None):
+            filled[k] = column.drop_null().slice(0, _FIRST).to_pandas()
+        return filled
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `thermocomp.files.tables.FileTable.load`."""
@@ -159,11 +168,13 @@ def open_parquet(path: Path, options: ReadOptions, limits: Limits) -> FileTable:
         if len(set(schema.names)) < len(schema.names):
             raise RecordingError(f"{path}: two columns have one name; rename one of them")
         names = _names(file)
+        others = [k for k, name in enumerate(names) if not _is_number(schema.field(name).type)]
         texts = [f.name for f in schema if str(f.type) in _TEXTS]
-        embedded = _embedded(schema.metadata or {})
-        times = [f.name for f in schema if str(f.type).startswith(_TIMES)]
-    index = "timestamp" if _INDEX in times else "index"
-    notes = ("the index has no name and holds times: taken as the time",) if _INDEX in times else ()
+        embedded = str(json.loads((schema.metadata or {}).get(_ATTRIBUTES, b"{}")).get(EMBEDDED, ""))
+        kind = str(schema.field(_INDEX).type) if _INDEX in names else ""
+    timed = kind.startswith(("timestamp", "duration"))
+    # the numbers of rows that were sorted or chosen mean nothing
+    index = "timestamp" if timed else "" if kind.startswith(("int", "uint")) else "index"
     headings = [clean_heading(index if name == _INDEX else name) for name in names]
     check_headings(path, headings, about.num_rows, limits)
     return ParquetTable(
@@ -171,11 +182,12 @@ def open_parquet(path: Path, options: ReadOptions, limits: Limits) -> FileTable:
         names=tuple(names),
         headings=tuple(headings),
         texts=tuple(texts),
+        others=tuple(others),
         n_rows=about.num_rows,
         embedded=embedded,
         limits=limits,
         decimal=options.decimal,
-        notes=notes,
+        notes=("the index has no name and holds times: taken as the time",) if timed else (),
     )
 
 
@@ -187,12 +199,10 @@ def _names(file: "ParquetFile") -> list[str]:
     return index + [name for name in names if name not in set(index)]
 
 
-def _embedded(metadata: dict[bytes, bytes]) -> str:
-    """Return thermocomp's own description, from the file's metadata or from those of a table in pandas."""
-    own = metadata.get(EMBEDDED.encode())
-    if own is not None:
-        return own.decode("utf-8", "replace")
-    return str(json.loads(metadata.get(_ATTRIBUTES, b"{}")).get(EMBEDDED, ""))
+def _is_number(kind: "DataType") -> bool:
+    from pyarrow.types import is_floating, is_integer
+
+    return bool(is_floating(kind) or is_integer(kind))
 
 
 def _unpacked(column: "Array") -> int:

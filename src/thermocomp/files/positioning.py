@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.headings import understand
 from thermocomp.core.units import Unit, find_unit
+from thermocomp.files.limits import Limits, check_file
 from thermocomp.files.mapping import ReadOptions
 from thermocomp.files.textfile import CsvTable, open_csv
 from thermocomp.recording.positioning import Positioning
@@ -65,6 +66,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     if source.suffix.lower() not in ENDINGS:
         raise RecordingError(f"{source}: a positioning test is read from one of {', '.join(ENDINGS)}")
     try:
+        check_file(source, Limits())
         table = open_csv(source, ReadOptions())
     except FileNotFoundError as e:
         raise RecordingError(f"{source}: no such file") from e

@@ -108,7 +108,14 @@ class FrameTable:
 
 
 def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
-    """Return whether the first filled cell is a number; `empty` if there is none."""
+    """Return whether the first filled cell is a number.
+
+    Parameters
+    ----------
+    cells : Series
+    empty : bool
+        What to return if there is none.
+    """
     filled = (str(cell) for cell in cells.dropna())
     first = next((cell for cell in filled if not is_filler(cell)), None)
     return empty if first is None else is_number_like(first)
@@ -124,6 +131,10 @@ def clean_heading(cell: object) -> str:
 
     White space at its ends is gone, the name that pandas gives an index without one, and the apostrophe before what a
     spreadsheet would calculate (`defuse`).
+
+    Parameters
+    ----------
+    cell : object
     """
     text = restore(str(cell).strip())
     return "" if _NAMELESS.fullmatch(text) else text
@@ -134,17 +145,36 @@ def defuse(text: str) -> str:
 
     An apostrophe stands before ``=``, ``+``, ``-``, ``@``, a tab or a line's end; line ends become the signs for them.
     `restore` turns it back.
+
+    Parameters
+    ----------
+    text : str
+        A heading or a label.
     """
     return f"'{text}".translate(_LINE_ENDS) if _FORMULA.match(text) else text.translate(_LINE_ENDS)
 
 
 def restore(text: str) -> str:
-    """Turn back what `defuse` did."""
+    """Turn back what `defuse` did.
+
+    Parameters
+    ----------
+    text : str
+        A heading or a label of a file.
+    """
     return (text[1:] if text.startswith("'") and _FORMULA.match(text) else text).translate(_LINE_SIGNS)
 
 
 def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Limits) -> None:
     """Refuse a table that cannot be a recording, whatever its columns mean.
+
+    Parameters
+    ----------
+    path : Path
+    headings : sequence of str
+    n_rows : int
+        Without that of the headings.
+    limits : Limits
 
     Raises
     ------
