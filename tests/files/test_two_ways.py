@@ -314,16 +314,21 @@ def test_a_row_at_the_end_that_is_one_is_not_left_out(tmp_path: Path, end: str, 
 
 
 def test_a_first_row_with_a_wrong_cell_is_not_passed_over(tmp_path: Path) -> None:
-    for rows in ("0;warm\n1;20\n2;21\n", "0;warm\n1;hot\n2;21\n3;22\n"):
+    for rows, wrong in (
+        ("0;warm;5\n1;20;5\n2;21;5\n", "'t1_C': 'warm'"),
+        ("0;warm;5\n1;hot;5\n2;21;5\n3;22;5\n", "'t1_C': 'warm'"),
+        ("0E;20;5\n1;20;5\n2;21;5\n", "'time_s': '0E'"),
+        ("later;20;5\n1;20;5\n2;21;5\n", "'time_s': 'later'"),
+    ):
         path = tmp_path / "first.csv"
-        path.write_text("time_s;t1_C\n" + rows, encoding="utf-8")
-        with pytest.raises(InputError, match="line 2, column 't1_C': 'warm'"):
+        path.write_text("time_s;t1_C;t2_C\n" + rows, encoding="utf-8")
+        with pytest.raises(InputError, match=f"line 2, column {wrong}"):
             read(path)
 
 
 def test_rows_of_labels_between_headings_and_table_are_passed_over(tmp_path: Path) -> None:
     path = tmp_path / "labels.csv"
-    path.write_text("Zeit;T1;T2\n1;2;3\ns;°C;°C\nOffset;0;0\n0;20;21\n1;21;22\n", encoding="utf-8")
+    path.write_text("Zeit;T1;T2\n1;2;3\ns;°C;°C\n;front;rear\n0;20;21\n1;21;22\n", encoding="utf-8")
     recording = read(path)
     assert recording.table.to_numpy().tolist() == [[20, 21], [21, 22]]
     assert recording.notes[:2] == (

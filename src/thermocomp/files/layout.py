@@ -72,12 +72,13 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
             continue
         first = begin
         while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
-            if columns[0] < len(rows[first - 1]) and _is_value(rows[first - 1][columns[0]]) and not labels[first - 1]:
-                break  # a row of the table with words in it, which is not passed over
+            above = rows[first - 1]
+            if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels[first - 1]:
+                break  # perhaps a row of the table with words in it, which is not passed over
             first -= 1
-        above = range(first, begin)
-        units = [k for k in above if _is_units(rows[k])]
-        names = [k for k in above if k not in units and _is_heading(rows[k])]
+        block = range(first, begin)
+        units = [k for k in block if _is_units(rows[k])]
+        names = [k for k in block if k not in units and _is_heading(rows[k])]
         if names:
             known = [k for k in names if any(is_time_name(cell) or is_understood(cell) for cell in rows[k])]
             # of rows that say nothing the first that is full; in two columns what stands above is a preamble

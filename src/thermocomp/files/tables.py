@@ -235,7 +235,20 @@ def skip_row(table: FileTable, row: int) -> Remedy:
 
 
 def decide(signs: Signs, stated: str, delimiter: str, source: str) -> Notation:
-    """Return how the numbers of a file are written; see `Signs.decide`."""
+    """Return how the numbers of a file are written; see `thermocomp.files.numbers.Signs.decide`.
+
+    Parameters
+    ----------
+    signs : Signs
+    stated, delimiter : str
+    source : str
+        The file.
+
+    Raises
+    ------
+    RecordingError
+        They can be read in two ways.
+    """
     try:
         return signs.decide(stated, delimiter) or Notation(".")
     except RecordingError as e:
