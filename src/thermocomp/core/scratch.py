@@ -99,17 +99,22 @@ def _clear(folder: Path) -> None:
 
 
 def _remove(path: Path, lock: int) -> None:
-    """Remove a folder, its lock last: one without a lock is empty, wherever this is killed."""
-    try:
-        with suppress(OSError):
-            for inside in path.iterdir():
-                if inside.is_dir() and not inside.is_symlink():
-                    shutil.rmtree(inside, ignore_errors=True)
-                elif inside.name != _LOCK:
-                    inside.unlink()
-    finally:
-        os.close(lock)  # Windows removes no file that is open
+    """Remove a folder, its lock last: one without a lock is empty, wherever this is killed.
+
+    The lock is held until its file is gone: who waits for it, having just made the folder, then sees that.
+    """
+    closed = os.name != "posix"  # Windows removes no file that is open, and knows no such locks
+    if closed:
+        os.close(lock)
+    with suppress(OSError):
+        for inside in path.iterdir():
+            if inside.is_dir() and not inside.is_symlink():
+                shutil.rmtree(inside, ignore_errors=True)
+            elif inside.name != _LOCK:
+                inside.unlink()
     with suppress(OSError):
         if [p.name for p in path.iterdir()] == [_LOCK]:
             (path / _LOCK).unlink()
             path.rmdir()
+    if not closed:
+        os.close(lock)

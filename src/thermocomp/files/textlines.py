@@ -186,7 +186,18 @@ def count_cells(line: bytes, delimiter: str) -> int:
 
 
 def describe_ragged(path: Path, number: int, cells: int, width: int, line: bytes, delimiter: str) -> str:
-    """Say what is wrong with a line that has more or fewer cells than the headings."""
+    """Say what is wrong with a line that is too short or too long, and what to do.
+
+    Parameters
+    ----------
+    path : Path
+    number : int
+        Of the line, from 1.
+    cells, width : int
+        How many cells it has, and how many the headings have.
+    line : bytes
+    delimiter : str
+    """
     start = line[:60].decode("latin-1").strip()
     text = f"{path}: line {number} has {cells} cells where the heading has {width}: {start!r}"
     if delimiter == "," and cells > width:
