@@ -6,15 +6,13 @@ import traceback
 from collections.abc import Sequence
 
 from cyclopts import App, Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import jsonoutput, loudness
 from thermocomp.cli.exits import FAULT, STDIN, STOPPED
 from thermocomp.cli.extras import needs
+from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.shown import replace_unprintable
 
 app = App(
     name="thermocomp",
@@ -83,7 +81,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
             _tell_programs(str(e.__context__))
         raise
     except KeyboardInterrupt:
-        Console(stderr=True, highlight=False).print("[bold red]stopped:[/] nothing was finished, nothing was written")
+        make_console(stderr=True).print("[bold red]stopped:[/] nothing was finished, nothing was written")
         return STOPPED
     except Exception as e:  # noqa: BLE001 - a user is told what happened, and how to see where
         return _fault(e)
@@ -96,8 +94,8 @@ def main() -> None:
 
 
 def _unusable(message: str) -> int:
-    text = "\n".join(replace_unprintable(line) for line in message.split("\n"))
-    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
+    text = "\n".join(words(line) for line in message.split("\n"))
+    make_console(stderr=True).print(f"[bold red]error:[/] {text}", soft_wrap=True)
     _tell_programs(message)
     return 2
 
@@ -107,9 +105,7 @@ def _fault(error: Exception) -> int:
         traceback.print_exception(error)
     message = f"unexpected: {type(error).__name__}: {error}"
     hint = "" if loudness.verbose else "; this is a fault of thermocomp: --verbose tells where, for a report"
-    Console(stderr=True, highlight=False).print(
-        f"[bold red]error:[/] {escape(replace_unprintable(message + hint))}", soft_wrap=True
-    )
+    make_console(stderr=True).print(f"[bold red]error:[/] {words(message + hint)}", soft_wrap=True)
     _tell_programs(message)
     return FAULT
 

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
+from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.correction import Limits
 from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from thermocomp.cli.beginning import Beginning
     from thermocomp.recording.recording import Recording
 
-_stderr = Console(stderr=True, highlight=False)
+_stderr = make_console(stderr=True)
 
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
@@ -221,5 +220,5 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 def _told(lines: list[str]) -> list[str]:
     for line in () if loudness.quiet else lines:
-        _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
+        _stderr.print(f"[bold yellow]trouble[/] {words(line)}", soft_wrap=True)
     return lines
