@@ -4,12 +4,14 @@ import ast
 import io
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hostile import NAMES, renamed
 from rich.console import Console
+from rich.panel import Panel
 from smallmachine import small_machine
 
 from thermocomp.cli import terminal
@@ -106,3 +108,24 @@ def test_a_file_of_such_names_is_checked(
     assert all(c.isprintable() or c == "\n" for c in text)
     content: dict[str, Any] = json.loads(text)
     assert content["recordings"][0]["channels"][0]["name"] == recording.channels[0].name
+
+
+@pytest.mark.parametrize(
+    "line", ["check --{}", "{}", "select x.csv --method {}", "check {}.csv", "compare x.csv --jobs {}"]
+)
+def test_what_stands_on_the_command_line(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("\x1b[31m\x07[red]", "\x9b31m", "a\u202eb", "\udcff"):
+        with suppress(SystemExit):
+            run([word.format(name) for word in line.split()])
+        said = capsys.readouterr()
+        assert all(c.isprintable() or c == "\n" for c in said.out + said.err)
+        assert len(said.err) > 10
+
+
+def test_a_console_obeys_nothing() -> None:
+    file = io.StringIO()
+    console = terminal.make_console(file=file, force_terminal=True, color_system="standard")
+    console.print("[red]a\x1b[2J:cat:\u202e 12[/]\nb", Panel("\x9b1m"))
+    printed = file.getvalue()
+    assert printed.startswith("\x1b[31ma?[2J:cat:? 12\x1b[0m\nb")
+    assert "\x9b" not in printed

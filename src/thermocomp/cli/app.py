@@ -68,9 +68,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     jsonoutput.called_with = given
     begin = time.perf_counter()
     try:
-        words = loudness.taken_off(given)
+        line = loudness.taken_off(given)
         with needs("study"):
-            code = app([str(STDIN) if word == "-" else word for word in words])
+            code = app([str(STDIN) if word == "-" else word for word in line], error_console=make_console(stderr=True))
         loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
         return _unusable(str(e))

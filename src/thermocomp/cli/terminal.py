@@ -1,9 +1,11 @@
 """What a terminal shows: tables, and words that stand out."""
 
+from collections.abc import Iterator
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
 from rich.markup import escape
+from rich.segment import Segment
 from rich.table import Table
 
 from thermocomp.core.shown import replace_unprintable
@@ -11,14 +13,33 @@ from thermocomp.report.layout import Layout, Toned, verdict
 
 
 def make_console(**how: Any) -> Console:
-    """Return a console that adds nothing of its own to words: no colours of numbers, no pictures for ``:names:``.
+    """Return a console that adds nothing of its own to words, such as pictures for ``:names:``, and obeys none of them.
 
     Parameters
     ----------
     **how
         Of `rich.console.Console`.
     """
-    return Console(highlight=False, emoji=False, **how)
+    made = Console(highlight=False, emoji=False, **how)
+    made.push_render_hook(_Printable())
+    return made
+
+
+class _Printable(RenderHook):
+    """Lets nothing through that moves the cursor, whoever prints it."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        return [_Cleaned(r) for r in renderables]
+
+
+class _Cleaned:
+    def __init__(self, inner: ConsoleRenderable) -> None:
+        self.inner = inner
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        for part in console.render(self.inner, options):
+            text = part.text if part.control else "\n".join(map(replace_unprintable, part.text.split("\n")))
+            yield part._replace(text=text)
 
 
 #: of all commands
