@@ -6,15 +6,13 @@ import traceback
 from collections.abc import Sequence
 
 from cyclopts import App, Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp import __version__
 from thermocomp.cli import jsonoutput, loudness
 from thermocomp.cli.exits import FAULT, STDIN, STOPPED
 from thermocomp.cli.extras import needs
+from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.shown import replace_unprintable
 
 app = App(
     name="thermocomp",
@@ -71,9 +69,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     jsonoutput.called_with = given
     begin = time.perf_counter()
     try:
-        words = loudness.taken_off(given)
+        line = loudness.taken_off(given)
         with needs("study"):
-            code = app([str(STDIN) if word == "-" else word for word in words])
+            code = app([str(STDIN) if word == "-" else word for word in line], error_console=make_console(stderr=True))
         loudness.tell(f"took {time.perf_counter() - begin:.1f} s")
     except ThermocompError as e:
         return _unusable(str(e), getattr(e, "__notes__", ()))
@@ -84,7 +82,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
             _tell_programs(str(e.__context__))
         raise
     except KeyboardInterrupt:
-        Console(stderr=True, highlight=False).print("[bold red]stopped:[/] nothing was finished, nothing was written")
+        make_console(stderr=True).print("[bold red]stopped:[/] nothing was finished, nothing was written")
         return STOPPED
     except Exception as e:  # noqa: BLE001 - a user is told what happened, and how to see where
         return _fault(e)
@@ -97,9 +95,8 @@ def main() -> None:
 
 
 def _unusable(message: str, notes: Sequence[str] = ()) -> int:
-    lines = "\n".join((message, *notes)).split("\n")
-    text = "\n".join(replace_unprintable(line) for line in lines)
-    Console(stderr=True, highlight=False).print(f"[bold red]error:[/] {escape(text)}", soft_wrap=True)
+    text = "\n".join(words(line) for line in "\n".join((message, *notes)).split("\n"))
+    make_console(stderr=True).print(f"[bold red]error:[/] {text}", soft_wrap=True)
     _tell_programs(message, notes)
     return 2
 
@@ -109,9 +106,7 @@ def _fault(error: Exception) -> int:
         traceback.print_exception(error)
     message = f"unexpected: {type(error).__name__}: {error}"
     hint = "" if loudness.verbose else "; this is a fault of thermocomp: --verbose tells where, for a report"
-    Console(stderr=True, highlight=False).print(
-        f"[bold red]error:[/] {escape(replace_unprintable(message + hint))}", soft_wrap=True
-    )
+    make_console(stderr=True).print(f"[bold red]error:[/] {words(message + hint)}", soft_wrap=True)
     _tell_programs(message)
     return FAULT
 

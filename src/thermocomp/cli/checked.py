@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.terminal import marked, print_table
+from thermocomp.cli.terminal import marked, print_table, words
 from thermocomp.recording.findings import Finding
 from thermocomp.recording.recording import Recording
 from thermocomp.report import records
@@ -53,7 +52,7 @@ def show_check(
         for r, found, content in zip(tests, findings, told, strict=True):
             _show(r, found, content, console)
     if page is not None:
-        console.print(f"Page: {escape(str(page))}", soft_wrap=True)
+        console.print(f"Page: {words(page)}", soft_wrap=True)
 
 
 def _overview(recordings: Sequence[dict[str, Any]]) -> Layout:
@@ -81,26 +80,26 @@ def _first(r: dict[str, Any]) -> str:
 
 def _show(r: Recording, found: Sequence[Finding], content: dict[str, Any], console: Console) -> None:
     console.print(
-        f"[bold]{escape(r.source or r.name)}[/]: {len(r)} rows, {content['hours']:.2f} h, "
-        f"a row every {r.sampling_interval:g} s" + (f", from {r.start}" if r.start else "")
+        f"[bold]{words(r.source or r.name)}[/]: {len(r)} rows, {content['hours']:.2f} h, "
+        f"a row every {r.sampling_interval:g} s" + (f", from {words(r.start)}" if r.start else "")
     )
     columns = (Column("channel", "name"), Column("quantity", "quantity"), Column("unit", "unit"), *records.RANGE)
     print_table(Layout(columns, content["channels"]), console)
     cycles = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
-    console.print(f"{len(r.cycles)} thermal cycle(s): {escape(cycles)}")
+    console.print(f"{len(r.cycles)} thermal cycle(s): {words(cycles)}")
     told = {f.text for f in found}
     for note in r.notes:
         if note not in told:  # a column that was left out is a finding too
-            console.print(f"[dim]note[/] {escape(note)}")
+            console.print(f"[dim]note[/] {words(note)}")
     for kind in dict.fromkeys((f.severity, f.kind) for f in found):
         mine = [f for f in found if (f.severity, f.kind) == kind]
         for f in mine[:_FULL]:
-            where = f"{escape(f.channel)} " if f.channel else ""
-            console.print(f"{marked(_graded(f.severity))} [bold]{where}[/]{escape(f.text)}")
+            where = f"{words(f.channel)} " if f.channel else ""
+            console.print(f"{marked(_graded(f.severity))} [bold]{where}[/]{words(f.text)}")
             if f.remedy is not None:
-                console.print(f"  [dim]in a mapping: {escape(records.remedy(f.remedy))}[/]")
+                console.print(f"  [dim]in a mapping: {words(records.remedy(f.remedy))}[/]")
         if rest := [f.channel for f in mine[_FULL:]]:
-            console.print(f"{marked(_graded(kind[0]))} {kind[1]}, {len(rest)} more: [bold]{escape(', '.join(rest))}[/]")
+            console.print(f"{marked(_graded(kind[0]))} {kind[1]}, {len(rest)} more: [bold]{words(', '.join(rest))}[/]")
     if any(f.remedy is not None for f in found):
         console.print(
             "[dim]thermocomp map FILE writes these lines into a mapping, one after the other, asking first[/]"

@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
@@ -15,7 +13,7 @@ from thermocomp.cli.options import (
     read_recordings,
     tell_trouble,
 )
-from thermocomp.cli.terminal import console, print_table
+from thermocomp.cli.terminal import console, make_console, print_table, words
 from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError, RecordingError
 
@@ -132,25 +130,25 @@ def _show(found: "Evaluated", page: Path | None) -> None:
     from thermocomp.report.layout import laid_out
 
     # numbers must not be cut: a narrow terminal wraps whole lines instead
-    wide = Console(highlight=False, width=max(console.width, TABLE_WIDTH))
+    wide = make_console(width=max(console.width, TABLE_WIDTH))
     for t in found.thermal:
-        console.print(f"\n[bold]{escape(t.name)}: {TITLES[t.kind]}[/]")
-        console.print(escape(t.described))
+        console.print(f"\n[bold]{words(t.name)}: {TITLES[t.kind]}[/]")
+        console.print(words(t.described))
         for table in tables.thermal_tables(t):
-            console.print(f"\n[bold]{escape(table.title)}[/]")
+            console.print(f"\n[bold]{words(table.title)}[/]")
             print_table(laid_out(table), wide)
         for note in t.notes:
-            console.print(f"[yellow]note[/] {escape(note)}")
+            console.print(f"[yellow]note[/] {words(note)}")
     for recording, mine in found.settlings:
         for table in tables.time_constant_tables(mine):
-            console.print(f"\n[bold]{escape(recording.name)}: {escape(table.title)}[/]")
+            console.print(f"\n[bold]{words(recording.name)}: {words(table.title)}[/]")
             print_table(laid_out(table), wide)
     for table in tables.positioning_tables(found.positioned):
-        console.print(f"\n[bold]{escape(table.title)}[/]")
+        console.print(f"\n[bold]{words(table.title)}[/]")
         print_table(laid_out(table), wide)
     for r in found.positioned:
         for note in r.notes:
             where = " ".join(part for part in (r.test.axis, r.test.state) if part)
-            console.print(f"[yellow]note[/] {escape(f'{where}: {note}' if where else note)}")
+            console.print(f"[yellow]note[/] {words(f'{where}: {note}' if where else note)}")
     if page is not None:
-        console.print(f"Page: {page}", soft_wrap=True)
+        console.print(f"Page: {words(page)}", soft_wrap=True)

@@ -17,8 +17,8 @@ def print_json(content: dict[str, Any]) -> None:
     content = {"thermocomp": __version__, "arguments": called_with, **content}
     # JSON has no nan and no infinity: what is not known is null
     text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
-    # a name of a file that is no text: what stands for its bytes is written as JSON escapes it
-    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode("utf-8") + "\n")
+    # what no terminal should get, and bytes of a name that is no text, stand there as JSON escapes them
+    sys.stdout.write("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n")
 
 
 def _nulled(value: Any) -> Any:

@@ -5,20 +5,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.markup import escape
-
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput
-from thermocomp.cli.terminal import console
+from thermocomp.cli.terminal import console, make_console, words
 from thermocomp.core.draft import refuse_existing, write_text
 from thermocomp.core.exceptions import InputError, Remedy
-from thermocomp.core.shown import replace_unprintable
 
 if TYPE_CHECKING:
     from thermocomp.files.mending import Mended, Question
 
-_stderr = Console(stderr=True, highlight=False)
+_stderr = make_console(stderr=True)
 
 
 def map(
@@ -71,14 +67,14 @@ def map(
         print_json(_content(mended, output, [f"{f.channel} {f.text}".strip() for f in left]))
         return 1 if left else 0
     for note in mended.recording.notes:
-        _stderr.print(f"[dim]note[/] {escape(note)}", soft_wrap=True)
+        _stderr.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
     for f in left:
-        _stderr.print(f"[bold red]left[/] {escape(f'{f.channel} {f.text}'.strip())}", soft_wrap=True)
+        _stderr.print(f"[bold red]left[/] {words(f'{f.channel} {f.text}'.strip())}", soft_wrap=True)
     if output is None:
         print(mended.text, end="")
     else:
         console.print(
-            f"Mapping file: {escape(str(output))}; give it with --mapping {escape(str(output))}", soft_wrap=True
+            f"Mapping file: {words(str(output))}; give it with --mapping {words(str(output))}", soft_wrap=True
         )
     return 1 if left else 0
 
@@ -102,9 +98,9 @@ def _ask(question: "Question") -> Remedy | None:
     """Put a question on the terminal; return the answer, or None for leaving it as it is."""
     from thermocomp.files.mending import to_toml
 
-    _stderr.print(f"\n[bold]?[/] {escape(replace_unprintable(question.text))}", soft_wrap=True)
+    _stderr.print(f"\n[bold]?[/] {words(question.text)}", soft_wrap=True)
     for k, option in enumerate(question.options, start=1):
-        _stderr.print(f"  [bold]{k}[/] {escape(to_toml(option).replace(chr(10), '; '))}", soft_wrap=True)
+        _stderr.print(f"  [bold]{k}[/] {words(to_toml(option).replace(chr(10), '; '))}", soft_wrap=True)
     _stderr.print("  [bold]0[/] leave it as it is")
     own = next((name for name in question.options[0].get("columns", ())), "")
     more = ', or keys of your own, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.assessment.choice import Settings
 from thermocomp.cli import loudness
 from thermocomp.cli.exits import STDIN
+from thermocomp.cli.terminal import make_console, words
 from thermocomp.core.correction import Limits
 from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from thermocomp.cli.beginning import Beginning
     from thermocomp.recording.recording import Recording
 
-_stderr = Console(stderr=True, highlight=False)
+_stderr = make_console(stderr=True)
 
 Quiet = Annotated[bool, Parameter(show=False, parse=False)]
 Output = Annotated[Path, Parameter(name=["--output", "-o"])]
@@ -187,7 +186,7 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
     loudness.tell_read(found)
     for r in found if tell and not loudness.quiet else ():
         for change in r.changed:
-            _stderr.print(f"[dim]note[/] {escape(f'{r.name}: {change}')}", soft_wrap=True)
+            _stderr.print(f"[dim]note[/] {words(f'{r.name}: {change}')}", soft_wrap=True)
     return found
 
 
@@ -227,5 +226,5 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 def _told(lines: list[str]) -> list[str]:
     for line in () if loudness.quiet else lines:
-        _stderr.print(f"[bold yellow]trouble[/] {escape(line)}", soft_wrap=True)
+        _stderr.print(f"[bold yellow]trouble[/] {words(line)}", soft_wrap=True)
     return lines

@@ -5,7 +5,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice
@@ -13,7 +12,7 @@ from thermocomp.assessment.do_no_harm import JudgedUnit
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.jsonoutput import print_json
-from thermocomp.cli.terminal import mark, print_table
+from thermocomp.cli.terminal import mark, print_table, words
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report import records
@@ -56,31 +55,31 @@ def show_comparison(
         print_json(content)
         return
     _tell_starts(comparison.starts, console)
-    console.print(f"Judged on: {comparison.judging.name}")
+    console.print(f"Judged on: {words(comparison.judging.name)}")
     print_table(_assessment_table(comparison.assessments), console)
     print_table(_cycle_table(comparison.assessments), console)
     for a in comparison.overall():
         if not a.accepted:
-            console.print(f"{mark(a.word)} {a.model} for {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
+            console.print(f"{mark(a.word)} {words(a.model)} for {words(a.target)}: {words(a.reason)}", soft_wrap=True)
     for target in dict.fromkeys(a.target for a in comparison.assessments):
         best = comparison.best(target)
         if best is None:
-            console.print(f"[bold red]{escape(target)}: no model may run yet[/]")
+            console.print(f"[bold red]{words(target)}: no model may run yet[/]")
         else:
             console.print(
-                f"[bold green]{escape(target)}: {best.model}[/], {best.metric('rms'):.2f} um RMS "
+                f"[bold green]{words(target)}: {words(best.model)}[/], {best.metric('rms'):.2f} um RMS "
                 f"instead of {best.none_metric('rms'):.2f} um ({best.metric('reduction'):.0f} % less): "
-                f"{escape(best.reason)}",
+                f"{words(best.reason)}",
                 soft_wrap=True,
             )
     for caution in cautions(comparison):
-        console.print(f"[yellow]but[/] {escape(caution)}")
+        console.print(f"[yellow]but[/] {words(caution)}")
     for line in describe_running(comparison.overall()):
-        console.print(escape(line))
+        console.print(words(line))
     if comparison.left:
         console.print(f"[bold red]stopped:[/] {comparison.left} pairs of method and target were not judged")
     if report is not None:
-        console.print(f"Report: {report}")
+        console.print(f"Report: {words(report)}")
 
 
 def show_choices(
@@ -106,15 +105,16 @@ def show_choices(
         return
     for c in choices:
         for t in c.tables:
-            console.print(f"\n[bold]{escape(c.target)}: {escape(t.title)}[/]")
+            console.print(f"\n[bold]{words(c.target)}: {words(t.title)}[/]")
             print_table(laid_out(t), console)
         for note in c.notes:
-            console.print(f"[dim]note[/] {escape(note)}")
+            console.print(f"[dim]note[/] {words(note)}")
         console.print(
-            f"[bold green]{escape(c.target)}: {escape(', '.join(c.sensors)) or 'no sensor'}[/]: {escape(c.reason)}"
+            f"[{'red' if c.failure else 'bold green'}]{words(c.target)}: "
+            f"{words(', '.join(c.sensors) or 'no sensor')}[/]: {words(c.reason)}"
         )
     if page is not None:
-        console.print(f"Page: {page}", soft_wrap=True)
+        console.print(f"Page: {words(page)}", soft_wrap=True)
 
 
 def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
@@ -131,7 +131,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
         print_json(content)
         return
     _tell_starts(fitted.comparison.starts, console)
-    console.print(f"Judged on: {fitted.comparison.judging.name}")
+    console.print(f"Judged on: {words(fitted.comparison.judging.name)}")
     columns = (
         Column("target", "target"),
         Column("sensors", lambda m: len(m["sensors"]), ">"),
@@ -143,12 +143,10 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     print_table(Layout(columns, models), console)
     for m in fitted.models:
         if m.honest_error is not None:
-            console.print(
-                f"{mark(m.honest_error.word)} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True
-            )
+            console.print(f"{mark(m.honest_error.word)} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
     for line in describe_running(fitted.comparison.overall()):
-        console.print(escape(line))
-    console.print(f"Model file: {path}", soft_wrap=True)
+        console.print(words(line))
+    console.print(f"Model file: {words(path)}", soft_wrap=True)
 
 
 def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
@@ -171,31 +169,31 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
     print_table(_cycle_table(judged.assessments), console)
     print_table(_robustness(judged.overall()), console)
     for a in judged.overall():
-        console.print(f"{mark(a.word)} {escape(a.target)}: {escape(a.reason)}", soft_wrap=True)
+        console.print(f"{mark(a.word)} {words(a.target)}: {words(a.reason)}", soft_wrap=True)
         if a.robustness is not None and a.robustness.harm:
-            console.print(f"[red]harmful when disturbed[/] {escape(a.target)}: {escape(a.robustness.harm)}")
+            console.print(f"[red]harmful when disturbed[/] {words(a.target)}: {words(a.robustness.harm)}")
         if a.robustness is not None and a.robustness.outside > 0.1:
             share = f"{100 * a.robustness.outside:.0f} % of the rows"
-            console.print(f"[yellow]but[/] {share} are outside the range {escape(a.target)} was trained in")
+            console.print(f"[yellow]but[/] {share} are outside the range {words(a.target)} was trained in")
         if a.robustness is not None and a.robustness.unlike > 0.1:
-            console.print(f"[yellow]but[/] {escape(a.target)}: {describe_unlike(a.robustness)}")
+            console.print(f"[yellow]but[/] {words(a.target)}: {words(describe_unlike(a.robustness))}")
     for line in describe_running(judged.overall()):
-        console.print(escape(line))
+        console.print(words(line))
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     known = {name: v for name, v in fitted.items() if v is not None}
     if known:
         covered = coverage.table(known)
-        console.print(f"\n[bold]{escape(covered.title)}[/]")
+        console.print(f"\n[bold]{words(covered.title)}[/]")
         print_table(laid_out(covered), console)
     for m in judged.models:
         if m.honest_error is not None and not m.accepted:
             word = mark(f"{m.honest_error.word} when it was fitted")
-            console.print(f"{word} {escape(m.target)}: {escape(m.honest_error.why)}", soft_wrap=True)
+            console.print(f"{word} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
 
 
 def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:
     for name, start in begins:
-        console.print(f"Start of {escape(start.told(name))}")
+        console.print(f"Start of {words(start.told(name))}")
 
 
 def _starts(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
@@ -211,7 +209,7 @@ def show_simulated(tests: Sequence[Recording], paths: Sequence[Path], console: C
     for r, p in zip(tests, paths, strict=True):
         hours = (r.time[-1] - r.time[0]) / 3600
         console.print(
-            f"{p}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
+            f"{words(p)}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
             f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
         )
 

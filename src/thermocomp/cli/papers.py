@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import (
@@ -16,7 +14,7 @@ from thermocomp.cli.options import (
     tell_trouble,
 )
 from thermocomp.cli.progress import show_share
-from thermocomp.cli.terminal import console, marked, print_table
+from thermocomp.cli.terminal import console, make_console, marked, print_table, words
 from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
 from thermocomp.report.layout import Column, Layout, Toned
@@ -122,7 +120,7 @@ def papers(
 
         pages.write([study for study, _ in done], output, seed=seed, overwrite=overwrite)
         if not json:
-            console.print(f"Page: {output}", soft_wrap=True)
+            console.print(f"Page: {words(output)}", soft_wrap=True)
     if json:
         print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]})
     return 1 if any(not study.ran for study, _ in done) else 0
@@ -158,7 +156,7 @@ def _cross(
 def _show(study: "Study", seconds: float) -> None:
     from thermocomp.report.papers import headline
 
-    console.print(f"\n[bold]{escape(study.title)}[/]")
+    console.print(f"\n[bold]{words(study.title)}[/]")
     if study.claims:
         columns = (
             Column("id", lambda c: ", ".join(c.ids)),
@@ -170,14 +168,14 @@ def _show(study: "Study", seconds: float) -> None:
         print_table(Layout(columns, study.claims), console)
         for c in study.claims:
             if c.finding:
-                console.print(f"{marked(Toned(', '.join(c.ids), _holds(c).tone))} {escape(c.finding)}")
+                console.print(f"{marked(Toned(', '.join(c.ids), _holds(c).tone))} {words(c.finding)}")
     if study.name == CROSS:
         # Numbers must not be cut: a narrow terminal wraps whole lines instead.
-        wide = Console(highlight=False, width=max(console.width, TABLE_WIDTH))
+        wide = make_console(width=max(console.width, TABLE_WIDTH))
         for t in study.tables:
             print_table(_laid_out(t), wide)
     said = f"{headline(study)}; " if study.claims else ""
-    console.print(f"{escape(said)}{seconds:.0f} s")
+    console.print(f"{words(said)}{seconds:.0f} s")
 
 
 def _holds(claim: "Claim") -> Toned:

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.markup import escape
 
 from thermocomp.api.position import Positioned
 from thermocomp.assessment.position import PositionStudy
-from thermocomp.cli.terminal import mark, marked, print_table
+from thermocomp.cli.terminal import mark, marked, print_table, words
 from thermocomp.files.profiles import NOT_TAKEN
 from thermocomp.models.positionoptions import Setting
 from thermocomp.recording.profiles import Profiles
@@ -29,7 +28,7 @@ def show_positioned(result: Positioned, file: Path | None, console: Console) -> 
     else:
         show(result.found[0], result.tests[0], result.left_open, console)
     if file is not None:
-        console.print(f"Model file: {file}", soft_wrap=True)
+        console.print(f"Model file: {words(file)}", soft_wrap=True)
 
 
 def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:
@@ -39,8 +38,8 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
     low, high = model.travel
     _show_notes([tests], console)
     console.print(
-        f"[bold]{escape(model.target)}[/]: {sum(len(t) for t in tests)} profiles of {len(tests[0].points)} points "
-        f"along {model.axis}, {low:g} to {high:g} mm"
+        f"[bold]{words(model.target)}[/]: {sum(len(t) for t in tests)} profiles of {len(tests[0].points)} points "
+        f"along {words(model.axis)}, {low:g} to {high:g} mm"
     )
     if fit.profile.tried:
         chosen = (fit.profile.order, fit.profile.through)
@@ -58,19 +57,19 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
         title = "Cold profile: error at points left out"
         print_table(Layout(columns, fit.profile.tried, title, caption="! = chosen"), console)
     kind = f"{model.profile and model.profile.kind} of order {_order(fit.profile.order)}"
-    console.print(f"Cold profile: {'natural spline through all points' if fit.profile.through else kind}")
+    console.print(f"Cold profile: {words('natural spline through all points' if fit.profile.through else kind)}")
     if fit.profile.words:
-        console.print(f"[yellow]but[/] it {fit.profile.words}")
+        console.print(f"[yellow]but[/] it {words(fit.profile.words)}")
     if left_open:
-        console.print(f"Chosen by the profiles: {_chosen(found, left_open)}")
+        console.print(f"Chosen by the profiles: {words(_chosen(found, left_open))}")
     for factor, errors, power in zip(model.models, fit.coefficient_errors, model.powers, strict=True):
         formula = factor.formula()
-        console.print(f"k{power} [{factor.unit}] = {_shortened(formula)}", markup=False)
+        console.print(words(f"k{power} [{factor.unit}] = {_shortened(formula)}"))
         if errors and len(formula) <= FORMULA:
             told = ", ".join(f"{name} {error:.2g}" for name, error in errors.items())
-            console.print(f"  standard errors: {told}", markup=False)
+            console.print(words(f"  standard errors: {told}"))
     rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
-    console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {rest} {unit}")
+    console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {words(rest)} {unit}")
     if model.powers and "slopes" not in left_open and fit.enough > max(model.powers):
         console.print(f"[yellow]but[/] higher powers tell more: try --slopes {fit.enough}")
     if model.slopes and "offset" not in left_open and fit.shifts:
@@ -80,9 +79,9 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
         )
     _show_judging(found, left_open, console)
     print_table(_cycle_table(found), console)
-    console.print(f"{marked(_verdict(found))} {escape(model.target)}: {escape(judged.reason)}")
+    console.print(f"{marked(_verdict(found))} {words(model.target)}: {words(judged.reason)}")
     if found.dropped:
-        console.print(f"[yellow]but[/] the cold profile alone; its thermal part is left out: {escape(found.dropped)}")
+        console.print(f"[yellow]but[/] the cold profile alone; its thermal part is left out: {words(found.dropped)}")
 
 
 def show_all(
@@ -115,21 +114,24 @@ def show_all(
     for f in found:
         if not f.assessment.accepted:
             console.print(
-                f"{mark(f.assessment.verdict.word)} {f.fit.model.target}: {escape(f.assessment.reason)}", soft_wrap=True
+                f"{mark(f.assessment.verdict.word)} {words(f.fit.model.target)}: {words(f.assessment.reason)}",
+                soft_wrap=True,
             )
         elif f.dropped:
-            console.print(f"[yellow]cold profile alone[/] {f.fit.model.target}: thermal part: {escape(f.dropped)}")
+            console.print(
+                f"[yellow]cold profile alone[/] {words(f.fit.model.target)}: thermal part: {words(f.dropped)}"
+            )
 
 
 def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
     notes = [note for mine in tests for t in mine for note in t.states.notes if note.startswith(NOT_TAKEN)]
     for note in dict.fromkeys(notes):
-        console.print(f"[dim]note[/] {escape(note)}", soft_wrap=True)
+        console.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
 
 
 def _show_judging(found: PositionStudy, left_open: Sequence[Setting], console: Console) -> None:
     anew = "; settings are chosen anew in each" if left_open else ""
-    console.print(f"Judged on: {found.assessment.protocol}{anew}")
+    console.print(f"Judged on: {words(found.assessment.protocol)}{anew}")
 
 
 def _chosen(found: PositionStudy, left_open: Sequence[Setting]) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -19,12 +18,13 @@ from rich.progress import (
 )
 
 from thermocomp.cli import loudness
+from thermocomp.cli.terminal import make_console
 from thermocomp.core.shown import replace_unprintable
 
 #: without a terminal a line is told so often; work that takes less time tells none [s]
 OFTEN = 10.0
 
-_console = Console(stderr=True)
+_console = make_console(stderr=True)
 
 
 class Steps(Protocol):
@@ -50,7 +50,7 @@ def show_steps(total: int, *, hidden: bool) -> Iterator[Steps]:
         def tell(text: str, /, steps: int = 1) -> None:
             nonlocal done
             done += steps
-            bar.update(task, description=text, advance=steps)
+            bar.update(task, description=replace_unprintable(text), advance=steps)
             if loudness.verbose:
                 loudness.tell(f"{text}: {done} of {total}")
             else:
@@ -69,7 +69,7 @@ def show_share(name: str, *, hidden: bool) -> Iterator[Share]:
 
         def tell(share: float, text: str = "", /) -> None:
             said = f"{name}: {text}" if text else name
-            bar.update(task, completed=share, description=said)
+            bar.update(task, completed=share, description=replace_unprintable(said))
             line.tell(said, f"{min(share, 1.0):.0%}")
 
         yield tell

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 
 from cyclopts import Group, Parameter
-from rich.markup import escape
 
 from thermocomp.api.revision import outcome
 from thermocomp.api.revision.job import Done, Job
@@ -18,8 +17,7 @@ from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import show_share
-from thermocomp.cli.terminal import console, print_table
-from thermocomp.core.shown import replace_unprintable
+from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.report.layout import Column, Layout
 
@@ -103,10 +101,10 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     revision = job.revision
 
     def say(mark: str, text: str) -> None:
-        console.print(f"{mark} {escape(replace_unprintable(text))}".lstrip(), soft_wrap=True)
+        console.print(f"{mark} {words(text)}".lstrip(), soft_wrap=True)
 
     console.print(
-        f"[bold]{escape(replace_unprintable(job.program))}[/]: {_many(revision.lines, 'line')}, "
+        f"[bold]{words(job.program)}[/]: {_many(revision.lines, 'line')}, "
         f"{revision.changed if done.written else 'none'} of them changed; "
         f"runs {outcome.duration(revision.seconds)}; {_spindle(job)}; "
         f"{_many(len(revision.tool_changes), 'tool change')}",

@@ -1,23 +1,65 @@
 """What a terminal shows: tables, and words that stand out."""
 
+from collections.abc import Iterator
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
 from rich.markup import escape
+from rich.segment import Segment
 from rich.table import Table
 
+from thermocomp.core.shown import replace_unprintable
 from thermocomp.report.layout import Layout, Toned, verdict
 
+
+def make_console(**how: Any) -> Console:
+    """Return a console that adds nothing of its own to words, such as pictures for ``:names:``, and obeys none of them.
+
+    Parameters
+    ----------
+    **how
+        Of `rich.console.Console`.
+    """
+    made = Console(highlight=False, emoji=False, **how)
+    made.push_render_hook(_Printable())
+    return made
+
+
+class _Printable(RenderHook):
+    """Lets nothing through that moves the cursor, whoever prints it."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        return [_Cleaned(r) for r in renderables]
+
+
+class _Cleaned:
+    def __init__(self, inner: ConsoleRenderable) -> None:
+        self.inner = inner
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        for part in console.render(self.inner, options):
+            text = part.text if part.control else "\n".join(map(replace_unprintable, part.text.split("\n")))
+            yield part._replace(text=text)
+
+
 #: of all commands
-console = Console(highlight=False)
+console = make_console()
 
 _TONES = {"good": "green", "doubtful": "yellow", "bad": "red", "grave": "bold red", "soft": "dim", "strong": "bold"}
 _ROWS = {"best": "bold green", "none": "dim"}
 
 
+def words(text: object) -> str:
+    """Return what people typed, or files hold, for rich: nothing in it is markup, moves the cursor or begins a line.
+
+    All of that kind that is printed goes through here; a test looks.
+    """
+    return escape(replace_unprintable(text))
+
+
 def marked(text: str) -> str:
     """Return text for rich, in its tone if it has one."""
-    return f"[{_TONES[text.tone]}]{escape(text)}[/]" if isinstance(text, Toned) else escape(text)
+    return f"[{_TONES[text.tone]}]{words(text)}[/]" if isinstance(text, Toned) else words(text)
 
 
 def mark(word: str) -> str:
@@ -35,11 +77,11 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
     **how
         Of `rich.table.Table`.
     """
-    table = Table(title=escape(t.title) or None, caption=escape(t.caption) or None, **how)
+    table = Table(title=words(t.title) or None, caption=words(t.caption) or None, **how)
     for c in t.columns:
         # what may be broken is folded, not cut; a number that finds no room shows that it is cut
         table.add_column(
-            escape(f"{c.heading}, {c.unit}" if c.unit else c.heading),
+            words(f"{c.heading}, {c.unit}" if c.unit else c.heading),
             justify="right" if c.form else "left",
             no_wrap=c.whole,
             overflow="ellipsis" if c.whole else "fold",
@@ -50,4 +92,4 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
         table.add_row(*(marked(c.text(row)) for c in t.columns), style=_ROWS.get(t.tone(k)))
     console.print(table)
     if t.note:
-        console.print(escape(t.note), style="dim")
+        console.print(words(t.note), style="dim")

@@ -3,13 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
-
 from thermocomp.cli import loudness
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import OptionalOutput, read_recordings, tell_trouble
 from thermocomp.cli.progress import show_share
-from thermocomp.cli.terminal import console, print_table
+from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
 
@@ -101,7 +99,7 @@ def volumetric(
     else:
         _show(result, point=at is not None or grid is None, volume=grid is not None or at is None)
         if output is not None:
-            console.print(f"Page: {output}", soft_wrap=True)
+            console.print(f"Page: {words(output)}", soft_wrap=True)
     return 0
 
 
@@ -113,7 +111,7 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
     if recording is not None:
         hours = (recording.time[-1] - recording.time[0]) / 3600
         replayed = f"{recording.source or recording.name}, {len(recording)} rows, {hours:.2f} h"
-    console.print(f"[bold]{escape(machine.name)}[/], {escape(machine.structure.code)}: {escape(replayed)}")
+    console.print(f"[bold]{words(machine.name)}[/], {words(machine.structure.code)}: {words(replayed)}")
     known, components = told.components(study), told.listed(study)
     if known.rows:
         print_table(known, console)
@@ -131,10 +129,10 @@ def _show(study: "Volumetric", *, point: bool, volume: bool) -> None:
         print_table(told.volume(study), console)
     for what, codes in (("never judged on unseen cycles", told.untested(study)), ("unproven", told.unproven(study))):
         if codes:
-            console.print(f"[yellow]but[/] {what}: {escape(', '.join(codes))}", soft_wrap=True)
+            console.print(f"[yellow]but[/] {what}: {words(', '.join(codes))}", soft_wrap=True)
     if study.missing:
         console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the state before is held there")
     for note in study.notes:
-        console.print(f"[yellow]note[/] {escape(note)}", soft_wrap=True)
+        console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
     if volume:
         console.print(f"[bold]{told.headline(study)}[/]", soft_wrap=True)

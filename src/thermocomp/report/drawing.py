@@ -83,7 +83,7 @@ def add_legend(where: Axes | Figure, **how: Any) -> None:
                 first.setdefault(label, handle)
         named = [(handle, label) for label, handle in first.items()]
     labels = [shorten(label, _NAME) for _, label in named]
-    # with a blank before it matplotlib takes it
+    # before 3.10 matplotlib takes it with a blank before it
     labels = [f" {label}" if label.startswith("_") else label for label in labels]
     where.legend([handle for handle, _ in named], labels, **how)
 
