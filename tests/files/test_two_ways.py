@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.files.mapping import Mapping, ReadOptions
+from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.files.mapping import Mapping, ReadOptions, TimeColumn
 from thermocomp.files.numbers import Notation, Signs
 from thermocomp.files.recordings import read
 from thermocomp.recording.recording import Recording
@@ -379,3 +379,42 @@ def test_encodings_are_told_apart_by_what_headings_hold(tmp_path: Path, encoding
     recording = read(path)
     assert recording.table.columns.tolist() == ["Lager_C", "Überlauf_um"]
     assert not note or told(recording, note)
+
+
+def stamps(path: Path, *texts: str) -> Path:
+    path.write_text("timestamp,t1_C\n" + "".join(f"{t},{20 + k / 10}\n" for k, t in enumerate(texts)), "utf-8")
+    return path
+
+
+def test_a_clock_that_is_set_needs_its_zone(tmp_path: Path) -> None:
+    spring = stamps(
+        tmp_path / "spring.csv",
+        "2024-03-31 01:57:00",
+        "2024-03-31 01:58:00",
+        "2024-03-31 01:59:00",
+        "2024-03-31 03:00:00",
+    )
+    autumn = stamps(
+        tmp_path / "autumn.csv",
+        "2024-10-27 02:58:00",
+        "2024-10-27 02:59:00",
+        "2024-10-27 02:00:00",
+        "2024-10-27 02:01:00",
+    )
+    berlin, utc = (Mapping(TimeColumn(zone=zone)) for zone in ("Europe/Berlin", "UTC"))
+    for path in (spring, autumn):
+        with pytest.raises(RecordingError, match=r"name the zone in a mapping, \[time\] zone = "):
+            read(path)
+    summer = read(spring, berlin)
+    assert (summer.time.tolist(), summer.start) == ([0.0, 60.0, 120.0, 180.0], "2024-03-31T01:57:00+01:00")
+    assert "'timestamp' is taken as the time in Europe/Berlin" in summer.notes
+    assert read(spring, utc).time.tolist() == [0.0, 60.0, 120.0, 3780.0]
+    winter = read(autumn, berlin)
+    assert (winter.time.tolist(), winter.start) == ([0.0, 60.0, 120.0, 180.0], "2024-10-27T02:58:00+02:00")
+    with pytest.raises(RecordingError, match="02:00:00 is before 2024-10-27 02:59:00"):
+        read(autumn, utc)
+    missing = stamps(tmp_path / "missing.csv", "2024-03-31 01:58:00", "2024-03-31 02:30:00")
+    with pytest.raises(RecordingError, match=r"these are no times in Europe/Berlin: .*02:30:00"):
+        read(missing, berlin)
+    with pytest.raises(InputError, match=r"\[time\]: zone = 'Europe/Berln' is not known"):
+        Mapping(TimeColumn(zone="Europe/Berln"))

@@ -8,6 +8,7 @@ from datetime import datetime
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
@@ -52,6 +53,8 @@ class TimeColumn:
         file goes on from another.
     date : str or int
         Column of the dates where `column` holds the time of day alone.
+    zone : str
+        Time zone of timestamps that tell none, such as ``Europe/Berlin``; ``UTC`` for a clock that is never set.
     """
 
     column: Place = ""
@@ -59,6 +62,7 @@ class TimeColumn:
     format: str = ""
     start: str = ""
     date: Place = ""
+    zone: str = ""
 
 
 @dataclass(frozen=True)
@@ -189,6 +193,7 @@ class Mapping:
         if self.time.unit not in ("", "timestamp"):
             _unit_in("[time]", self.time.unit, "time")
         _check_start(self.time.start)
+        _check_zone(self.time.zone)
         for name, column in self.columns.items():
             table = f"[columns.{name}]"
             _unit_in(table, column.unit, column.role if column.role in HOUSE_UNITS else None)
@@ -344,6 +349,17 @@ def _check_start(stamp: str) -> None:
         raise InputError(
             f"[time]: start = {stamp!r} is no ISO timestamp: write year, month, day and time of day, such as "
             '"2024-03-01T08:00:00" or, with its offset from UTC, "2024-03-01T08:00:00+01:00"'
+        ) from e
+
+
+def _check_zone(name: str) -> None:
+    try:
+        if name:
+            ZoneInfo(name)
+    except (ZoneInfoNotFoundError, ValueError, OSError) as e:
+        raise InputError(
+            f"[time]: zone = {name!r} is not known; write a place of the time zone database, such as "
+            '"Europe/Berlin" or "America/Detroit", or "UTC"'
         ) from e
 
 

@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -30,6 +30,12 @@ _SERIAL = 36526.0, 73050.0
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
+
+
+_ZONE = (
+    'use UTC or timestamps with an offset, or name the zone in a mapping, [time] zone = "Europe/Berlin" ("UTC": a '
+    "clock that is never set)"
+)
 
 
 def read_times(
@@ -105,21 +111,14 @@ def read_times(
         if part.any() and (time % 1 == 0).all():
             time = ((time * 1000 + part) - part[0]) / 1000
             notes += (f"{table.headings[columns.fraction]!r} is added to the time",)
+    if mapping.time.zone and start and pd.Timestamp(start).tzinfo is None:
+        time, start = _in_zone(time, start, mapping.time.zone, f"{source}: column {heading!r}")
+        notes += (f"{heading!r} is taken as the time in {mapping.time.zone}",)
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0) if rising else steps < 0) + 1
     if wrong.size:
-        row = int(wrong[0])
-        what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
-        more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
-        # a clock that is set back falls by an hour less one interval
-        falls_by_an_hour = abs(steps[row - 1] - np.median(steps) + 3600) < 300
-        if is_stamp and falls_by_an_hour and pd.Timestamp(start).tzinfo is None:
-            more += ", perhaps as the clock was set back (daylight saving): use UTC, or timestamps with an offset"
-        raise RecordingError(
-            f"{source}: {table.place(row)}, column {heading!r}: time {shown.iloc[row]} {what}, in "
-            f"{table.place(row - 1)}{more}; time must rise: delete or correct the row, or split the file into tests",
-            [skip_row(table, row)],
-        )
+        local = is_stamp and pd.Timestamp(start).tzinfo is None
+        _refuse_falling(wrong, time, shown, table, f"{source}: {{}}, column {heading!r}", local=local)
     if is_stamp and start and pd.Timestamp(start).tzinfo is None:
         _refuse_set_forward(time, steps, start, table, source, heading)
     return time, start, notes
@@ -256,6 +255,23 @@ def _read_numbers(
     )
 
 
+def _refuse_falling(
+    wrong: NDArray[np.intp], time: FloatArray, shown: "pd.Series[Any]", table: FileTable, where: str, *, local: bool
+) -> NoReturn:
+    """Refuse times that do not rise."""
+    row = int(wrong[0])
+    what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
+    more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
+    text = f"{where.format(table.place(row))}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
+    steps = np.diff(time)
+    # a clock that is set back falls by an hour less one interval
+    if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
+        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")
+    raise RecordingError(
+        f"{text}; time must rise: delete or correct the row, or split the file into tests", [skip_row(table, row)]
+    )
+
+
 def _refuse_set_forward(
     time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
 ) -> None:
@@ -270,8 +286,19 @@ def _refuse_set_forward(
             raise RecordingError(
                 f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
                 f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
-                "use UTC, or timestamps with an offset, or split the file into tests"
+                f"{_ZONE}",
+                [{"time": {"zone": "UTC"}}],
             )
+
+
+def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[FloatArray, str]:
+    """Return times and the first timestamp of a clock that follows daylight saving."""
+    local = pd.DatetimeIndex(pd.Timestamp(start) + pd.to_timedelta(time, unit="s"))
+    try:
+        zoned = local.tz_localize(zone, ambiguous="infer")
+    except ValueError as e:  # an hour that the zone does not have, or has twice without a way to tell
+        raise RecordingError(f"{where}: these are no times in {zone}: {e}; correct [time] zone in the mapping") from e
+    return _seconds(pd.Series(zoned - zoned[0])), zoned[0].isoformat()
 
 
 def _seconds(passed: "pd.Series[pd.Timedelta]") -> FloatArray:
