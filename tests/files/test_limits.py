@@ -13,6 +13,7 @@ from hostile_files import HOSTILE
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.files.limits import _COUNTED, Limits
 from thermocomp.files.mapping import ColumnMap, Mapping, read_mapping
+from thermocomp.files.parquet import open_parquet
 from thermocomp.files.recordings import read
 
 TEXT = "time_s,t1_C,drift_um,cycle\n# remark\n0,20.5,0,a\n\n15,20.6,1,b\n30,20.6,1,c\n"
@@ -76,6 +77,14 @@ def test_what_grows_too_much_may_grow_by_a_mapping(tmp_path: Path, name: str) ->
         read(path)
     with pytest.raises(RecordingError, match=r"over 50,000 cells"):  # the next limit
         read(path, Mapping(limits=Limits(growth=10**9, cells=50_000)))
+
+
+def test_a_parquet_file_is_refused_by_what_it_says_of_itself(tmp_path: Path) -> None:
+    path = tmp_path / "rec.parquet"
+    path.write_bytes(HOSTILE["parquet rows"][1]())
+
+    with pytest.raises(RecordingError, match=r"over 100 times its size"):
+        open_parquet(path, Limits())  # nothing of it is loaded
 
 
 def test_a_file_does_not_raise_its_own_limits(tmp_path: Path) -> None:

@@ -74,10 +74,7 @@ class _Survey:
 
     def _element(self, name: str, attributes: dict[str, str]) -> None:
         assert self.parser is not None
-        at = self.parser.CurrentByteIndex
-        if at - self.last > self.limits.line_bytes:
-            self.limits.check("line_bytes", at - self.last, self.where)
-        self.last = at
+        self.last = self.parser.CurrentByteIndex
         self.elements += 1
         local = name.rpartition(":")[2]
         if not self.root:
