@@ -12,7 +12,7 @@ from hostile_files import HOSTILE
 
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.files.limits import _COUNTED, Limits
-from thermocomp.files.mapping import ColumnMap, Mapping, read_mapping
+from thermocomp.files.mapping import ColumnMap, Mapping, ReadOptions, read_mapping
 from thermocomp.files.parquet import open_parquet
 from thermocomp.files.recordings import read
 
@@ -84,7 +84,7 @@ def test_a_parquet_file_is_refused_by_what_it_says_of_itself(tmp_path: Path) -> 
     path.write_bytes(HOSTILE["parquet rows"][1]())
 
     with pytest.raises(RecordingError, match=r"over 100 times its size"):
-        open_parquet(path, Limits())  # nothing of it is loaded
+        open_parquet(path, ReadOptions(), Limits())  # nothing of it is loaded
 
 
 def test_a_file_does_not_raise_its_own_limits(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def map(
         refuse_existing(
             [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
         )
-    from thermocomp.files.mending import mend, take_best
+    from thermocomp.files.mending import mend, take_best, to_toml
     from thermocomp.files.plaintext import read_text
     from thermocomp.files.tomlfile import MOST
     from thermocomp.recording.quality import check
@@ -66,6 +66,12 @@ def map(
     if json:
         print_json(_content(mended, output, [f"{f.channel} {f.text}".strip() for f in left]))
         return 1 if left else 0
+    for question, answer in mended.decided:
+        if answer is not None and question.others:
+            _stderr.print(
+                f"[yellow]taken[/] {words(to_toml(answer).replace(chr(10), ' '))}: {words(question.text)}",
+                soft_wrap=True,
+            )
     for note in mended.recording.notes:
         _stderr.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
     for f in left:

@@ -114,16 +114,28 @@ def understand_or_none(heading: str) -> Meaning | None:
 
 
 def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
-    """Return columns of numbers; those that hold text, or nothing, are left out."""
+    """Return columns of numbers; those that hold more texts than numbers are left out."""
     try:
         cells, _ = table.load(columns, [])
         found = {k: cells[k].to_numpy(dtype=np.float64) for k in columns}
     except InputError:  # one of them holds text
         if len(columns) < 2:
-            return {}
+            return _mostly_numbers(table, columns)
         half = len(columns) // 2
         found = {**_numbers(table, columns[:half]), **_numbers(table, columns[half:])}
     return {k: values for k, values in found.items() if np.isfinite(values).any()}
+
+
+def _mostly_numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
+    """Return a column some cells of which are texts."""
+    cells, _ = table.load([], columns)
+    found = {}
+    for k in columns:
+        filled = cells[k].dropna().astype(str).str.replace(",", ".", regex=False)
+        values = pd.to_numeric(filled, errors="coerce").to_numpy(dtype=np.float64)
+        if 2 * np.isfinite(values).sum() > len(values):
+            found[k] = values
+    return found
 
 
 def _role(heading: str, values: FloatArray) -> tuple[str, str]:

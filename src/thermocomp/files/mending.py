@@ -50,6 +50,11 @@ class Question:
     options: tuple[Remedy, ...]
     severity: str
 
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What else may be true of a file that can be read in several ways, a line each."""
+        return tuple(to_toml(r).replace("\n", " ") for r in self.options[1:]) if self.severity == "error" else ()
+
 
 #: what is decided: one of the options, or None to leave it as it is
 Decide = Callable[[Question], Remedy | None]
@@ -293,8 +298,7 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
         if not dialogue.decided:
             return ""
         how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
-    ways = [to_toml(r).replace("\n", " ") for r in error.remedies[1:]]
-    other = "".join(f"\n# or: {way}" for way in ways)
+    other = "".join(f"\n# or: {way}" for q, _ in dialogue.decided for way in q.others)
     return f"{how}, save it as {name} and give it with --mapping {name}:\n\n{dialogue.draft.text.strip()}{other}"
 
 
