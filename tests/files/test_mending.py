@@ -237,11 +237,14 @@ def test_the_command_asks_and_writes(
     path.write_text(
         "time_s,T1,n,Z,q\n" + "".join(f"{10 * k},{20 + k / 10},{k},{k / 1000},{k % 2}\n" for k in range(9)), "utf-8"
     )
-    answers = iter(["", "9", "3", 'role = "displacement", unit = "mm", scale = -1.0', "0"])
+    answers = iter(
+        ["", "9", 'unit = "banana"', "unit = ", "3", 'role = "displacement", unit = "mm", scale = -1.0', "0"]
+    )
     monkeypatch.setattr("builtins.input", lambda: next(answers))
     assert run(["map", str(path), "-o", str(tmp_path / "plain.toml")]) == 0
     said = capsys.readouterr()
     assert "want a number from 0 to 5" in said.err
+    assert "unknown unit 'banana'" in said.err
     mapping = read_mapping(tmp_path / "plain.toml")
     assert {n: (c.role, c.unit, c.scale) for n, c in mapping.columns.items()} == {
         "T1_C": ("temperature", "degC", 1.0),
@@ -264,6 +267,14 @@ def test_without_an_answer_nothing_is_written(
     assert run(["map", str(path), "-o", str(tmp_path / "drift.toml")]) == 2
     assert "--yes takes the best guess" in capsys.readouterr().err
     assert not (tmp_path / "drift.toml").exists()
+
+
+def test_a_mapping_to_begin_with_is_read_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, begun = written(tmp_path / "drift.csv"), tmp_path / "begun.toml"
+    for text, reason in (("[read", "not valid TOML"), ("[read]\nskips = [1]\n", "did you mean 'skip'")):
+        begun.write_text(text, encoding="utf-8")
+        assert run(["map", str(path), "--mapping", str(begun), "--yes"]) == 2
+        assert reason in " ".join(capsys.readouterr().err.split())
 
 
 def test_what_is_left_is_judged_bad(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,12 +53,16 @@ def map(
         refuse_existing(
             [output], overwrite, [p for p in (recording, mapping) if p is not None and p != output], ".toml"
         )
+    from thermocomp.files.mapping import read_mapping
     from thermocomp.files.mending import mend, take_best, to_toml
     from thermocomp.files.plaintext import read_text
     from thermocomp.files.tomlfile import MOST
     from thermocomp.recording.quality import check
 
-    begun = "" if mapping is None else read_text(mapping, "mapping file", MOST)
+    begun = ""
+    if mapping is not None:
+        read_mapping(mapping)  # says what is wrong with it
+        begun = read_text(mapping, "mapping file", MOST)
     mended = mend(recording, begun, take_best if yes or json else _ask)
     left = [f for f in check(mended.recording) if f.severity == "trouble"]
     if output is not None:
@@ -102,6 +106,7 @@ def _content(mended: "Mended", output: Path | None, left: Sequence[str]) -> dict
 
 def _ask(question: "Question") -> Remedy | None:
     """Put a question on the terminal; return the answer, or None for leaving it as it is."""
+    from thermocomp.files.mapping import check_content
     from thermocomp.files.mending import to_toml
 
     _stderr.print(f"\n[bold]?[/] {words(question.text)}", soft_wrap=True)
@@ -123,9 +128,10 @@ def _ask(question: "Question") -> Remedy | None:
             return question.options[int(said) - 1] if int(said) else None
         try:
             keys = tomllib.loads(f"keys = {{ {said} }}")["keys"] if own and "=" in said else {}
-        except tomllib.TOMLDecodeError:
-            keys = {}
-        if keys:
-            place = {k: v for k, v in question.options[0]["columns"][own].items() if k == "column"}
-            return {"columns": {own: {**place, **keys}}}
-        _stderr.print(f"  want a number from 0 to {len(question.options)}")
+            place = {k: v for k, v in question.options[0].get("columns", {}).get(own, {}).items() if k == "column"}
+            if keys:
+                check_content({"columns": {own: {**place, **keys}}}, "your answer")
+                return {"columns": {own: {**place, **keys}}}
+        except (tomllib.TOMLDecodeError, InputError) as e:
+            _stderr.print(f"  {words(e)}", soft_wrap=True)
+        _stderr.print(f"  want a number from 0 to {len(question.options)}{' or keys' if own else ''}")

@@ -115,6 +115,8 @@ def understand_or_none(heading: str) -> Meaning | None:
 
 def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
     """Return columns of numbers; those that hold more texts than numbers are left out."""
+    if not columns:
+        return {}
     try:
         cells, _ = table.load(columns, [])
         found = {k: cells[k].to_numpy(dtype=np.float64) for k in columns}

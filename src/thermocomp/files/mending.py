@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import tomlkit
-from pydantic import ValidationError
 from tomlkit.items import Table
 
 from thermocomp.core.exceptions import InputError, RecordingError, Remedy, UnitError
@@ -290,11 +289,12 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
     """Return words that offer a mapping by which a file can be read; empty if there is none."""
     if not error.remedies or path.stat().st_size > _LARGE:
         return ""
-    dialogue, name = _Dialogue(Draft(_dumped(mapping)), take_best), _file_name(path)
+    begun = tomlkit.dumps(ADAPTER.dump_python(mapping, mode="json", exclude_defaults=True))
+    dialogue, name = _Dialogue(Draft(begun), take_best), _file_name(path)
     try:
         dialogue.until(lambda: read(path, dialogue.draft.mapping(str(path))))
         how = "by this mapping it is read; look it over"
-    except (RecordingError, UnitError) as e:
+    except InputError as e:
         if not dialogue.decided:
             return ""
         how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
@@ -305,13 +305,6 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
 def _file_name(path: Path) -> str:
     """Return a name of a mapping file that no shell takes amiss."""
     return f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', path.stem).lstrip('-.') or 'recording'}.toml"
-
-
-def _dumped(mapping: Mapping) -> str:
-    try:
-        return tomlkit.dumps(ADAPTER.dump_python(mapping, mode="json", exclude_defaults=True))
-    except ValidationError:
-        return ""
 
 
 def _table(content: Remedy) -> Table:
