@@ -130,7 +130,7 @@ def test_refusals(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
         ([spindle, "--pairs", "x1:y2:9mm"], "whose names begin with that letter"),
         ([spindle, "--ambient", "t_moon_C"], "no channel is named 't_moon_C'"),
         ([spindle, "--model", str(model)], "no such model file"),
-        (["--positioning", spindle], "no column 'position'"),
+        (["--positioning", spindle], "no column 'deviation'"),
         ([str(tmp_path / "none.csv")], "no such file"),
         ([spindle, "-o", spindle], "is also an input"),
     ):

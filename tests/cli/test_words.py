@@ -17,7 +17,7 @@ from smallmachine import small_machine
 from thermocomp.cli import terminal
 from thermocomp.cli.app import run
 from thermocomp.cli.terminal import marked, words
-from thermocomp.files import recordings
+from thermocomp.files import mending
 from thermocomp.report.layout import Column, Layout, Toned
 
 CLI = Path(terminal.__file__).parent
@@ -27,6 +27,7 @@ _SAFE = {"words", "mark", "marked", "len", "_many"}
 _OURS = {
     "app.py": {"text"},
     "checked.py": {"kind[1]", "where"},
+    "map.py": {"k", "more", "best"},
     "iso230.py": {"TITLES[t.kind]"},
     "output.py": {"comparison.left", "share", "word"},
     "positiontables.py": {"unit", "anew", "states", "fit.enough", "sum((len(t) for t in tests))"},
@@ -98,7 +99,7 @@ def test_a_file_of_such_names_is_checked(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = renamed(small_machine(), name)
-    monkeypatch.setattr(recordings, "read_all", lambda *_: [recording])
+    monkeypatch.setattr(mending, "read_or_offer", lambda *_: recording)
     assert run(["check", "x.csv", "-o", str(tmp_path / "page.html")]) in (0, 1)
     printed = capsys.readouterr()
     assert all(c.isprintable() or c == "\n" for c in printed.out + printed.err)

@@ -213,7 +213,7 @@ def test_a_clock_that_was_set_back_is_hinted_at(tmp_path: Path, ending: str, int
     with pytest.raises(RecordingError, match="line 5") as caught:
         read(path)
 
-    assert ("daylight saving): use UTC, or timestamps with an offset" in str(caught.value)) == (
+    assert ("daylight saving): use UTC or timestamps with an offset" in str(caught.value)) == (
         back + interval == 3600 and not ending
     )
 

@@ -80,6 +80,13 @@ def test_what_was_measured(name: str) -> None:
 @pytest.mark.parametrize("first", range(0, len(NAMES), 12))
 def test_a_whole_report(first: int) -> None:
     recording = mixed(small_machine(), first)
+    speed = small_machine().speed
+    assert recording.speed is not None
+    assert speed is not None
+    # a model takes no name with unprintable characters; that of the speed stands in every model
+    channels = tuple(speed if c is recording.speed else c for c in recording.channels)
+    table = recording.table.rename(columns={recording.speed.name: speed.name})
+    recording = replace(recording, channels=channels, table=table)
     samples = stack([recording], [c.name for c in recording.displacements])
     result = compare(samples, ["ols", "partial-f"], splits.leave_one_cycle_out(samples))
     assessments = tuple(

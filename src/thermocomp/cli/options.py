@@ -1,6 +1,5 @@
 """Options that several commands share, and what they stand for."""
 
-import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -193,12 +192,16 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
 def _read_all(paths: list[Path], read: "Callable[[list[Path]], list[Recording]]") -> "list[Recording]":
     if STDIN not in paths:
         return read(paths)
+    from thermocomp.files.limits import Limits as FileLimits
+
     if paths.count(STDIN) > 1:
         raise InputError("-: there is one standard input")
     with scratch() as folder:
         typed = folder / "stdin.csv"
         with typed.open("wb") as file:
-            shutil.copyfileobj(sys.stdin.buffer, file)
+            while block := sys.stdin.buffer.read(1 << 20):
+                FileLimits().check("file_bytes", file.tell() + len(block), "standard input")
+                file.write(block)
         return read([typed if p == STDIN else p for p in paths])
 
 

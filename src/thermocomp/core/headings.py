@@ -214,7 +214,7 @@ def understand(heading: str) -> Meaning | None:
     if inner is not None and inner[1] == meant:  # x_um [um]: said twice
         twice = understand(base)
         if twice is not None and (twice.unit.scale, twice.unit.shift) == (1, 0):
-            return twice
+            return Meaning(base, twice.base, twice.unit)
     other = (meant.symbol == "K" and _DIFFERENCE.fullmatch(base)) or _ELECTRIC.search(base)
     if other or (meant.quantity == "time" and find_named_quantity(base)):
         return None  # T1_min is the least of T1
