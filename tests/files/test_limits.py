@@ -155,6 +155,17 @@ def test_no_value_is_infinite(tmp_path: Path) -> None:
     assert "t2_C: infinite, taken as missing, in 2 of 2 cells" in recording.notes
 
 
+def test_a_whole_number_beyond_the_floats_is_missing(tmp_path: Path) -> None:
+    ending, make = HOSTILE["digits alone"]
+    path = tmp_path / f"rec.{ending}"
+    path.write_bytes(make())
+
+    recording = read(path)
+
+    np.testing.assert_array_equal(recording.table["t1_C"], [np.nan, 1.0])
+    assert "t1_C: infinite, taken as missing, in 1 of 2 cells" in recording.notes
+
+
 def test_times_that_no_clock_has_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "rec.csv"
     for text, message in (

@@ -165,6 +165,13 @@ def _dictionary() -> bytes:
 HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
     "cell far away": ("xlsx", lambda: _sheet(_HEAD + "<row r='20000'><c r='XFD20000'><v>1</v></c></row>")),
     "cell beyond": ("xlsx", lambda: _sheet(_HEAD + "<row r='4'><c r='ZZZZZZZ4'><v>1</v></c></row>")),
+    "digits in a cell": ("xlsx", lambda: _sheet(_HEAD + f"<row><c><v>2</v></c><c><v>{'9' * 4_000}</v></c></row>")),
+    "digits alone": ("xlsx", lambda: _sheet(_HEAD.replace("<v>20<", f"<v>{'9' * 400}<").replace("<v>21<", "<v>1<"))),
+    "digits of a thumb": (
+        "xlsx",
+        lambda: _sheet(_HEAD.replace("<v>20<", f"<v>{'9' * 30}<").replace("<v>21<", "<v>x<")),
+    ),
+    "digits as time": ("xlsx", lambda: _sheet(_HEAD + f"<row><c><v>{'9' * 400}</v></c><c><v>2</v></c></row>")),
     "row beyond": ("xlsx", lambda: _sheet(_HEAD + "<row r='2000000000'><c><v>1</v></c></row>")),
     "wide empty rows": ("xlsx", lambda: _sheet(_HEAD + "<row><c r='XFD1'/></row>" * 300_000)),
     "empty cells": ("xlsx", lambda: _sheet(_HEAD + ("<row>" + "<c/>" * 10_000 + "</row>") * 400)),
@@ -246,6 +253,16 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes]]] = {
         lambda: _parquet(
             {"time_s": [0.0, 1.0], "t_C": [20.0, 21.0], **{f"n{k}": [1.0, "a"][k % 2 :][:1] * 2 for k in range(9_000)}}
         ),
+    ),
+    "parquet bytes": (
+        "parquet",
+        lambda: _parquet({"time": pa.array([b"\xff", b"\x00\xfe"]), "t1_C": [1.0, 2.0]}).replace(b"\xfe", b"\xff"),
+    ),
+    "parquet text that is none": (
+        "parquet",
+        lambda: _parquet(
+            {"time": ["2024-01-01T00:00:00~", "2024-01-01T00:00:01~"], "t1_C": [1.0, 2.0]}, compression="none"
+        ).replace(b"~", b"\xff"),
     ),
     "parquet columns": ("parquet", lambda: _parquet({f"t{k}_C": [1.0] for k in range(20_000)})),
     "parquet kinds": (

@@ -80,9 +80,10 @@ class ParquetTable:
     def _first_cells(self) -> dict[int, "pd.Series[Any]"]:
         """First filled cell of those of the `others` that have one among the first rows."""
         filled = {}
-        batch = next(self._batches(self.others), None) if self.others else None
-        for k, column in zip(self.others, batch.columns if batch is not None else (), strict=batch is not None):
-            filled[k] = column.drop_null().slice(0, _FIRST).to_pandas()
+        with _translated(self.path):
+            batch = next(self._batches(self.others), None) if self.others else None
+            for k, column in zip(self.others, batch.columns if batch is not None else (), strict=batch is not None):
+                filled[k] = column.drop_null().slice(0, _FIRST).to_pandas()
         return filled
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:

@@ -1,5 +1,6 @@
 """Workbooks (XLSX, ODS): sheets are streamed, after a look at what they become when they are unzipped."""
 
+import math
 import re
 import warnings
 import zipfile
@@ -36,6 +37,8 @@ _SAMPLE_CELLS = 10_000
 _SAMPLE_PLACES = 10_000
 #: cells that are kept as objects; more become numbers first
 _CHUNK = 200_000
+#: bits of a whole number that no float holds
+_LARGE = 1024
 _OFFICE, _TABLE, _TEXT = (
     f"{{urn:oasis:names:tc:opendocument:xmlns:{part}:1.0}}" for part in ("office", "table", "text")
 )
@@ -204,13 +207,10 @@ class _Body:
 
 def _column(cells: Row) -> Column:
     kinds = set(map(type, cells))
-    try:
-        if kinds == {int}:
-            return np.array(cells, dtype=np.int64)
-        if kinds <= {int, float, type(None)}:
-            return np.array(cells, dtype=np.float64)
-    except OverflowError:  # a whole number larger than any float
-        pass
+    if kinds == {int} and all(abs(cell) < 1 << 63 for cell in cells):
+        return np.array(cells, dtype=np.int64)
+    if kinds <= {int, float, type(None)}:
+        return np.array(cells, dtype=np.float64)
     column = np.empty(len(cells), dtype=object)
     column[:] = cells
     return column
@@ -234,7 +234,9 @@ def _trimmed(row: Sequence[Any]) -> Row:
 
 
 def _plain(cell: object) -> object:
-    """Return a cell as the text readers of times know it; numbers as they are."""
+    """Return a cell as the text readers of times know it; numbers as they are, beyond the floats infinite."""
+    if isinstance(cell, int):
+        return cell if cell.bit_length() < _LARGE else (math.inf if cell > 0 else -math.inf)
     if isinstance(cell, datetime):
         return cell.isoformat(sep=" ")
     return cell.isoformat() if isinstance(cell, date | time) else cell
