@@ -99,7 +99,8 @@ def test_a_whole_report(first: int) -> None:
     for a in odd.overall():
         blocks = [b for b in assessments if (b.target, b.model) == (a.target, a.model) and not b.overall]
         texts(figures.prediction(a, blocks, [recording.time]))
-        texts(figures.robustness(odd, a.model))
+        if a.robustness is not None:  # nothing is judged of a model that was refused
+            texts(figures.robustness(odd, a.model))
     for method in ("grouping", "subsets", "pareto", "ace"):
         settings = Settings() if method == "grouping" else Settings(max_sensors=2)
         choices = selecting.select(method, samples, splits.leave_one_cycle_out(samples), settings)
