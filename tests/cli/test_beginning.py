@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recordings.write(whole, there / "whole.csv")
     samples = stack([small_machine()], ["z_um"])
     model = train("dynamic", samples, 0, np.ones(len(samples), np.bool_)).model
-    honest = HonestError("none", 1.0, 1.0, 1.0, 9.0, 9.0, {}, "accepted", "")
+    honest = HonestError("none", 1.0, 1.0, 1.0, 9.0, 9.0, {"1": 1.0}, "accepted", "", 2)
     modelfile.write([replace(model, honest_error=honest)], there / "model.json")
     return there
 

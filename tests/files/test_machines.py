@@ -56,7 +56,7 @@ def written(folder: Path, text: str) -> Path:
 def drift(target: str, unit: str = "um", verdict: Word = "") -> Polynomial:
     judged = None
     if verdict:
-        judged = HonestError("made", 2.0, 2.0, 4.0, 3.0, 3.0, {"1": 2.0}, verdict, "worse than none", rules=RULES)
+        judged = HonestError("made", 2.0, 2.0, 4.0, 3.0, 3.0, {"1": 2.0}, verdict, "worse than none", 2, rules=RULES)
     return Polynomial(
         target=target,
         unit=unit,

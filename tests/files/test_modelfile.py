@@ -50,7 +50,7 @@ def model(coefficient: float = 1 / 3) -> LinearDynamic:
             "dynamic", {"copies": "'lagged'"}, ("ab12",), ("1 (600 1/min)",), 810, "0.1.0", prints=PRINTS
         ),
         honest_error=HonestError(
-            "leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none", rules=RULES
+            "leave one out", 1.0, 2.0, 3.0, 4.0, 5.0, {"1": 0.1}, "accepted", "better than none", 2, rules=RULES
         ),
     )
 

@@ -88,6 +88,19 @@ def test_what_a_review_got_through_is_refused(change: Change, message: str) -> N
         modelfile.loads(signed(change))
 
 
+def test_a_verdict_that_rests_on_nothing_is_refused() -> None:
+    assert MODEL.honest_error is not None
+    for change, reason in (
+        ({"units": 0}, "accepted, but judged on nothing"),
+        ({"cycles": {}}, "accepted, but judged on nothing"),
+        ({"verdict": "unproven", "taken": "Bob"}, "taken by 'Bob': want a name and a reason"),
+        ({"verdict": "unproven", "taken": "Bob, "}, "want a name and a reason"),
+    ):
+        honest = replace(MODEL.honest_error, **{"verdict": "accepted", "rules": RULES, "units": 2, **change})  # type: ignore[arg-type]
+        with pytest.raises(ModelFileError, match=reason):
+            modelfile.loads(modelfile.dumps([replace(MODEL, honest_error=honest)]))
+
+
 def test_a_model_without_an_honest_error_is_read_and_does_not_run() -> None:
     (model,) = modelfile.loads(signed(put(None, "honest_error")))
     assert model.predict({"time_s": [0.0, 60.0], "spindle_rpm": [0.0, 6000.0], "t3_C": [20.0, 20.0]})[1] != 0

@@ -81,7 +81,7 @@ def test_what_only_one_reading_fits_is_read(
         ("Date", ["03/04/2024 8:00:00 PM", "03/04/2024 8:00:10 PM"], "%d/%m/%Y %I:%M:%S %p"),
         ("Zeit", ["00:10", "00:20"], "hours and minutes or as minutes and seconds.*%H:%M.*%M:%S"),
         ("Zeit", ["2024-05-27 08:00:00 EST", "2024-05-27 08:00:10 EST"], "say how it is written"),
-        ("Time", ["45439.3333333333", "45439.3334490741"], "holds numbers from 45439.33333 .* says no unit"),
+        ("Time", ["45439.3333333333", "45439.3334490741"], "holds numbers from 45439.333333333 .* says no unit"),
         ("Time [m]", ["0", "1"], "'m' stands for metres; minutes are min"),
         ("T", ["0", "1"], "no time column"),
         ("Zeit", ["23:59:40", "23:59:50", "05:00:00"], "05:00:00 is before 23:59:50"),

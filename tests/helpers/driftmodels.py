@@ -13,7 +13,9 @@ from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.terms import Variable
 
 SPEED = Input("spindle_rpm", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0)
-ACCEPTED = HonestError("test", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "worse than none on cycle 3", rules=RULES)
+ACCEPTED = HonestError(
+    "test", 1.0, 1.0, 2.0, 5.0, 5.0, {"1": 1.0}, "accepted", "worse than none on cycle 3", 2, rules=RULES
+)
 ROOM = Input("t3_C", "temperature", "degC", 20.0, True, -5.0, 5.0)
 
 

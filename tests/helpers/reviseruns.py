@@ -14,7 +14,7 @@ from thermocomp.files import modelfile
 from thermocomp.nc.rewrite.header import MARK
 
 HONEST = HonestError(
-    "leave one thermal cycle out", 0.8, 1.0, 2.0, 9.0, 11.0, {"a": 1.0}, "accepted", "fine", rules=RULES
+    "leave one thermal cycle out", 0.8, 1.0, 2.0, 9.0, 11.0, {"a": 1.0}, "accepted", "fine", 2, rules=RULES
 )
 PLATE = """%
 (a plate)

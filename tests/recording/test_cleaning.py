@@ -133,6 +133,7 @@ def test_rows_are_averaged_backwards() -> None:
         (Cut(("z_um",), times=((500.0, 600.0),)), "there is no row from 500 to 600 s; the nearest is at 110 s"),
         (Cut(times=((0.0, 500.0),)), "nothing would be left of the 12 rows"),
         (Rezero(("z_um",), at=500.0), "there is no row at or after 500 s"),
+        (Swap(("t1_C", "z_um"), at=60.0), "t1_C is a temperature and z_um a displacement: no two plugs change"),
     ],
 )
 def test_what_is_not_there_is_refused(step: Step, message: str) -> None:

@@ -122,8 +122,7 @@ def _ask(question: "Question") -> Remedy | None:
             said = input().strip()
         except EOFError as e:
             raise InputError("there is no answer to come on the input; --yes takes the best guess") from e
-        if not said:
-            said = str(best)
+        said = {"": str(best), "y": "1", "yes": "1", "n": "0", "no": "0"}.get(said.lower(), said)
         if said.isdigit() and int(said) <= len(question.options):
             return question.options[int(said) - 1] if int(said) else None
         try:

@@ -256,8 +256,7 @@ def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> l
             if mapped.isdisjoint((heading, k)) and not mapping.read.only_mapped:
                 raise UnitError(
                     f"{source}: heading {heading!r} of column {k}: {e}. Correct it, or leave the column out by a "
-                    f'mapping with [columns."{heading}"] role = "ignore"',
-                    [{"columns": {heading: {"role": "ignore"}}}],
+                    f'mapping with [columns."{heading}"] role = "ignore"'
                 ) from e
             meanings.append(None)
     return meanings

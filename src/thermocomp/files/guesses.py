@@ -13,6 +13,7 @@ from thermocomp.core.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.tables import FileTable
+from thermocomp.files.times import find_likely_units
 
 FloatArray = NDArray[np.float64]
 
@@ -169,8 +170,10 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
             continue
         if table.is_number(k, empty=False):
             values = _numbers(table, [k]).get(k)
-            if values is not None and len(values) > 1 and (np.diff(values) > 0).all():
-                return {"column": heading, "unit": "s"}
+            if values is None or understand_or_none(heading) is not None or _role(heading, values)[0]:
+                continue
+            if units := find_likely_units(values):
+                return {"column": heading, "unit": units[0]}
         else:
             cells = table.load([], [k])[0][k].dropna().astype(str)
             if len(cells) and pd.to_datetime(cells.iloc[:1], format="ISO8601", utc=True, errors="coerce").notna().all():

@@ -20,6 +20,8 @@ from thermocomp.recording.recording import Recording
 
 #: what may be asked about one file: rows that are passed over one by one, for the most part
 MOST_QUESTIONS = 60
+#: rows that are passed over for somebody: a file with more such rows is another kind of file
+MOST_SKIPPED = 5
 #: rounds of checking: a unit that is corrected shows what was hidden behind it
 _ROUNDS = 5
 #: a heading of a table right below a line that is no comment
@@ -274,15 +276,25 @@ class _Dialogue:
         self.decided.append((question, answer))
         return answer is not None and self.draft.add(answer)
 
+    def _skipped(self) -> int:
+        return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))
+
     def until(self, action: Callable[[], _T]) -> _T:
         """Do something; what stands in the way is asked about, one after the other."""
         for _ in range(MOST_QUESTIONS):
             try:
                 return action()
             except (RecordingError, UnitError) as e:
-                if not e.remedies or not self.ask(Question(str(e), e.remedies, "error")):
+                if not e.remedies or (_skips(e.remedies[0]) and self._skipped() >= MOST_SKIPPED):
+                    raise
+                if not self.ask(Question(str(e), e.remedies, "error")):
                     raise
         return action()
+
+
+def _skips(remedy: Remedy) -> bool:
+    """Return whether a remedy passes over a row."""
+    return "skip" in remedy.get("read", {})
 
 
 def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
@@ -295,7 +307,7 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
         dialogue.until(lambda: read(path, dialogue.draft.mapping(str(path))))
         how = "by this mapping it is read; look it over"
     except InputError as e:
-        if not dialogue.decided:
+        if not dialogue.decided or any(map(_skips, e.remedies[:1])):
             return ""
         how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
     other = "".join(f"\n# or: {way}" for q, _ in dialogue.decided for way in q.others)

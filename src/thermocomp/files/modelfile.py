@@ -111,7 +111,15 @@ def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
     """Refuse a verdict that its own figures contradict; that of a position model is on more than one of its factors."""
     for k, model in enumerate(models, start=1):
         found = model.honest_error
-        if found is not None and found.verdict == "accepted" and found.rms > found.none_rms:
+        if found is None:
+            continue
+        if found.verdict == "accepted" and found.current and not (found.units and found.cycles):
+            raise ModelFileError(f"{source}: model {k}: honest_error: accepted, but judged on nothing: it was altered")
+        if found.taken and not all(part.strip() for part in (*found.taken.split(",", 1), "")[:2]):
+            raise ModelFileError(
+                f"{source}: model {k}: honest_error: taken by {found.taken[:60]!a}: want a name and a reason"
+            )
+        if found.verdict == "accepted" and found.rms > found.none_rms:
             raise ModelFileError(
                 f"{source}: model {k}: honest_error: accepted with an RMS of {found.rms:g} {model.unit}, above the "
                 f"{found.none_rms:g} {model.unit} without compensation: it was altered"

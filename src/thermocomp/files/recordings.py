@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from thermocomp.core.draft import draft
-from thermocomp.core.exceptions import InputError, RecordingError, UnitError
+from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import understand
 from thermocomp.files.columns import Column, ColumnPlan, plan
 from thermocomp.files.guesses import guess
@@ -38,7 +38,7 @@ FloatArray = NDArray[np.float64]
 _MOST_NOTES = 100
 _MOST_SAID = 2_000
 
-ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".ods", ".parquet")
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".xlsx", ".ods", ".parquet")
 
 
 def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
@@ -50,7 +50,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
     Parameters
     ----------
     path : str or Path
-        A file ending in .csv, .tsv, .txt, .xlsx, .ods or .parquet.
+        A file ending in .csv, .tsv, .txt, .dat, .asc, .xlsx, .ods or .parquet.
     mapping : Mapping, optional
         What the columns are, where their headings do not say; see `thermocomp.files.mapping.read_mapping`.
 
@@ -332,7 +332,7 @@ def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
     """Let errors about columns carry a guess of what these are."""
     try:
         yield
-    except (RecordingError, UnitError) as e:
+    except RecordingError as e:
         e.remedies = e.remedies or guess(table, mapping)
         raise
 

@@ -108,6 +108,8 @@ def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parse
         up = [o for o in whole if not rising or (np.diff(read[o].to_numpy(dtype="M8[ns]").view(np.int64)) >= 0).all()]
         if len(up) != 1:
             formats = [_shown_format(shape, order) for order in whole]
+            if "%p" in formats[0]:  # who writes AM and PM writes the month first, as a rule
+                formats.sort(key=lambda form: not form.startswith("%m"))
             raise AmbiguousDatesError(formats, " or ".join(_WORDS[o] for o in whole))
         notes = (f"the dates are {_WORDS[up[0]]}: otherwise time would not rise",)
         whole = up

@@ -350,6 +350,8 @@ def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, NDArr
         swapped = cells[texts].astype("str").str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
         plain = cells.astype(object).where(~texts, swapped)
     good = pd.to_numeric(plain, errors="coerce").notna().to_numpy() & filled
+    if cells.dtype == object:  # True counts as a number
+        good &= ~cells.map(lambda c: isinstance(c, bool | np.bool_)).to_numpy(dtype=np.bool_)
     values = np.full(len(cells), np.nan)
     # to the last digit, which pandas does not promise
     values[good] = plain[good].to_numpy(dtype=object).astype(np.float64)

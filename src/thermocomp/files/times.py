@@ -23,7 +23,7 @@ _CLOCK = re.compile(
 )
 _HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
 #: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
-_EPOCH = 946684800.0, 4102444800.0
+_EPOCH = 946684800.0, 2240611200.0
 _PARTS = {1: "seconds", 1000: "milliseconds", 1000000: "microseconds", 1000000000: "nanoseconds"}
 #: days since 1899-12-30, as spreadsheets count, between the same years
 _SERIAL = 36526.0, 73050.0
@@ -247,12 +247,34 @@ def _read_numbers(
             start,
             (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
         )
+    ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
+    if raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
+        ways = [{"format": "%Y%m%d%H%M%S"}]
     raise RecordingError(
-        f"{source}: column {heading!r} holds numbers from {raw[0]:.10g} to {raw[-1]:.10g} and says no unit: seconds, "
+        f"{source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: seconds, "
         f'minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] '
         f'column = "{heading}" and unit = "s"',
-        [{"time": {"column": heading, "unit": unit}} for unit in ("s", "min", "h", "ms")],
+        [{"time": {"column": heading, **way}} for way in ways],
     )
+
+
+def find_likely_units(raw: FloatArray) -> tuple[str, ...]:
+    """Return the units that numbers may be times in: rows 50 ms to an hour apart, over a minute at least.
+
+    Parameters
+    ----------
+    raw : ndarray of shape (n_rows,)
+
+    Returns
+    -------
+    tuple of str
+        The likeliest first; none where they are no times of a test.
+    """
+    if len(raw) < 2 or not (np.diff(raw) > 0).all():
+        return ()
+    step, span = float(np.median(np.diff(raw))), float(raw[-1] - raw[0])
+    scales = {unit: find_unit(unit, "time").scale for unit in ("s", "min", "h", "d", "ms")}
+    return tuple(u for u, s in scales.items() if 0.05 <= step * s <= 3600 and (span * s >= 60 or len(raw) < 10))
 
 
 def _refuse_falling(
@@ -264,6 +286,8 @@ def _refuse_falling(
     more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
     text = f"{where.format(table.place(row))}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
     steps = np.diff(time)
+    if len(steps) > 1 and (steps < 0).all():
+        raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
     # a clock that is set back falls by an hour less one interval
     if local and abs(steps[row - 1] - np.median(steps) + 3600) < 300:
         raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving): {_ZONE}")

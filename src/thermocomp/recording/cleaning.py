@@ -219,6 +219,11 @@ class Swap(Step):
     def apply(self, rows: Rows) -> Rows:
         """Exchange the values."""
         a, b = rows.columns(self.channels, self.name)
+        kinds = {c.name: c.quantity for c in rows.channels}
+        if kinds[a] != kinds[b]:
+            raise InputError(
+                f"{rows.source}: {self.name}: {a} is a {kinds[a]} and {b} a {kinds[b]}: no two plugs change"
+            )
         begin = rows.seconds(self.at, self.name)
         moved = rows.time >= begin - _SAME
         table = rows.table.copy()

@@ -83,10 +83,14 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
     for quantity, (shift, names) in told.items():
         others = len(groups[quantity]) - len(names)
         who = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-        rest = f"; the other {others} {quantity}s do not answer clearly" if others else ""
-        moved = {"clean": [{"do": "shift", "channels": names, "by_s": -shift}]}
+        rest = f"; the other {others} {quantity}s do not answer clearly: those of the same logger need the same" * (
+            others > 0
+        )
+        moved: dict[str, object] = {"do": "shift", "channels": names, "by_s": -shift}
+        if others:  # only who was there knows which logger they belong to
+            moved["reason"] = "clock; add the other channels of this logger"
         channel = names[0] if len(names) == 1 else ""
-        yield Finding("trouble", channel, "clock", _text(who, shift) + rest, remedy=moved)
+        yield Finding("trouble", channel, "clock", _text(who, shift) + rest, remedy={"clean": [moved]})
 
 
 def _usable(signals: Sequence[Signal], quantity: str) -> list[Signal]:
