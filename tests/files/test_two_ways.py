@@ -418,3 +418,16 @@ def test_a_clock_that_is_set_needs_its_zone(tmp_path: Path) -> None:
         read(missing, berlin)
     with pytest.raises(InputError, match=r"\[time\]: zone = 'Europe/Berln' is not known"):
         Mapping(TimeColumn(zone="Europe/Berln"))
+
+
+def test_names_of_groups_above_the_headings_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "groups.csv"
+    path.write_text(
+        "Zeit;Temperatur;;Weg\n[s];Spindel [°C];Luft [°C];Weg Z [mm]\n"
+        + "".join(f"{10 * k};{20 + k / 8:.3f};20,125;{k / 16:.4f}\n".replace(".", ",") for k in range(12)),
+        encoding="utf-8",
+    )
+    with pytest.raises(RecordingError, match=r"no time column found among \[s\], Spindel"):
+        read(path)
+    recording = read(path, Mapping(TimeColumn(1, "s")))
+    assert [c.name for c in recording.channels] == ["Spindel_C", "Luft_C", "Weg_Z_um"]

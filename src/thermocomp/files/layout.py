@@ -80,7 +80,8 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
         units = [k for k in block if _is_units(rows[k])]
         names = [k for k in block if k not in units and _is_heading(rows[k])]
         if names:
-            known = [k for k in names if any(is_time_name(cell) or is_understood(cell) for cell in rows[k])]
+            said = {k: sum(is_time_name(cell) or is_understood(cell) for cell in rows[k]) for k in names}
+            known = sorted((k for k in names if said[k]), key=lambda k: -said[k])  # of as many the first
             # of rows that say nothing the first that is full; in two columns what stands above is a preamble
             order = 1 if width == 2 else -1
             heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
