@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import lru_cache
 
 from thermocomp.core.exceptions import UnitError
 
@@ -141,6 +142,7 @@ _POWER = re.compile(r"(?<![\d.])(?:10(?:\^|\*\*)?|[eE])([-+]\d)(?=[ *])|(?<![\d.
 #: a number and its unit, such as 12.5 mm, 1e-3urad or 6000 1/min
 _MEASURED = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*?|(?<=\s)1/.*?)\s*")
 
+_SYMBOLS = frozenset(u.symbol for u in _UNITS)
 _BY_KEY = {(u.symbol, u.quantity): u for u in _UNITS}
 
 
@@ -191,11 +193,12 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     raise UnitError(f"unknown unit {symbol!r}{hint} Known units: {', '.join(dict.fromkeys(u.symbol for u in _UNITS))}")
 
 
+@lru_cache(maxsize=4096)
 def is_unit(symbol: str) -> bool:
     """Return whether `find_unit` knows a unit."""
     name = _name(symbol)
     counted = _COUNT.fullmatch(name)
-    return any(u.symbol in (name, counted and _name(counted[3])) for u in _UNITS)
+    return name in _SYMBOLS or (counted is not None and _name(counted[3]) in _SYMBOLS)
 
 
 def _name(symbol: str) -> str:
