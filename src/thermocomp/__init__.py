@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from thermocomp.models.ace_monotone import MonotoneACE
     from thermocomp.models.arx import ARX
     from thermocomp.models.arx_net import NetARX
+    from thermocomp.models.averaged import AveragedDynamic
     from thermocomp.models.dynamic import DynamicRidge
     from thermocomp.models.gp import GaussianProcess
     from thermocomp.models.grouping import CorrelationGrouping
@@ -68,6 +69,7 @@ _PUBLIC = {
     # the estimators
     "ACE": "thermocomp.models.ace",
     "ARX": "thermocomp.models.arx",
+    "AveragedDynamic": "thermocomp.models.averaged",
     "BestSubset": "thermocomp.models.subsets",
     "CorrelationGrouping": "thermocomp.models.grouping",
     "DynamicRidge": "thermocomp.models.dynamic",
@@ -91,6 +93,7 @@ _PUBLIC = {
 __all__ = [
     "ACE",
     "ARX",
+    "AveragedDynamic",
     "BestSubset",
     "Correction",
     "CorrelationGrouping",

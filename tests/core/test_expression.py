@@ -16,6 +16,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Network, Perceptron
+from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable, second_order_terms
 from thermocomp.models.unfrozen import EstimatorModel
@@ -58,6 +59,21 @@ LAGS = st.builds(
     many(2),
     many(4),
     st.lists(st.floats(5.0, 9000.0), min_size=4, max_size=4).map(tuple),
+    numbers,
+)
+PACED = st.builds(
+    lambda w, tau, p, ends, k: PacedDynamic(
+        **HEAD,
+        time_constants=tau,
+        temperatures=(LaggedInput(1, w[0], w[1:3]), LaggedInput(0, w[3], w[4:6])),
+        top_speed=5000.0,
+        states=tuple(SpeedState(2, q, max(e), min(e), v) for q, e, v in zip(p, ends, w[6:], strict=True)),
+        intercept=k,
+    ),
+    many(8),
+    st.lists(st.floats(5.0, 9000.0), min_size=2, max_size=2).map(tuple),
+    st.lists(st.floats(0.5, 3.0), min_size=2, max_size=2),
+    st.lists(st.tuples(st.floats(5.0, 9000.0), st.floats(5.0, 9000.0)), min_size=2, max_size=2),
     numbers,
 )
 CURVES = st.one_of(
@@ -115,6 +131,7 @@ AUTOREGRESSIVE_NETS = st.builds(
 FAMILIES = {
     "polynomial": POLYNOMIALS,
     "linear-dynamic": LAGS,
+    "paced-dynamic": PACED,
     "additive": ADDITIVE,
     "network": NETS,
     "autoregressive": AUTOREGRESSIVE,

@@ -33,7 +33,7 @@ class Running:
             self.done[id(node)] = self._value(node)
         return self.done[id(node)]
 
-    def _value(self, node: e.Node) -> float:  # noqa: PLR0911 - a case for every kind of node
+    def _value(self, node: e.Node) -> float:  # noqa: PLR0911, PLR0912 - a case for every kind of node
         match node:
             case e.Constant(number):
                 return number
@@ -48,7 +48,9 @@ class Running:
             case e.Product(factors):
                 return math.prod(map(self.value, factors))
             case e.Power(of, exponent):
-                return self.value(of) ** exponent
+                return float(self.value(of) ** exponent)
+            case e.Magnitude(of):
+                return abs(self.value(of))
             case e.Sigmoid(of):
                 return 1.0 / (1.0 + math.exp(-self.value(of)))
             case e.Lookup(of, x, y, kind):
@@ -59,6 +61,12 @@ class Running:
                 signal = self.value(of)
                 before = self.lags.get(id(node), signal)
                 self.lags[id(node)] = before + (1.0 - math.exp(-self.dt / tau)) * (signal - before)
+                return self.lags[id(node)]
+            case e.PacedLag(of, stopped, running, pace):
+                signal, share = self.value(of), self.value(pace)
+                rate = (1.0 - share) / stopped + share / running
+                before = self.lags.get(id(node), signal)
+                self.lags[id(node)] = before + (1.0 - math.exp(-self.dt * rate)) * (signal - before)
                 return self.lags[id(node)]
             case e.Recurrence(tick, interval):
                 return self.clocks.setdefault(id(node), _Clock(self, tick, interval)).step(self.dt)

@@ -66,10 +66,17 @@ class Product:
 
 @dataclass(frozen=True)
 class Power:
-    """A value times itself, so often."""
+    """A value to a power; one that is no whole number is of no negative value."""
 
     of: "Node"
-    exponent: int
+    exponent: float
+
+
+@dataclass(frozen=True)
+class Magnitude:
+    """A value without its sign."""
+
+    of: "Node"
 
 
 @dataclass(frozen=True)
@@ -112,6 +119,25 @@ class Lag:
 
     of: "Node"
     time_constant: float
+
+
+@dataclass(frozen=True)
+class PacedLag:
+    """A first-order lag whose rate is linear in its pace: 1/tau = (1 - pace)/stopped + pace/running.
+
+    Parameters
+    ----------
+    of : Node
+    stopped, running : float
+        Time constants at a pace of 0 and of 1 [s].
+    pace : Node
+        At the end of the step.
+    """
+
+    of: "Node"
+    stopped: float
+    running: float
+    pace: "Node"
 
 
 @dataclass(frozen=True)
@@ -166,9 +192,11 @@ Node = (
     | Difference
     | Product
     | Power
+    | Magnitude
     | Sigmoid
     | Lookup
     | Lag
+    | PacedLag
     | Past
     | Mean
     | Recurrence
@@ -214,14 +242,20 @@ def format_node(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every
             return f"{value:.6g} {_product(others)}"
         case Product(factors):
             return _product(factors)
+        case Power(of, exponent) if exponent == int(exponent):
+            return "*".join([_bracketed(of)] * int(exponent))
         case Power(of, exponent):
-            return "*".join([_bracketed(of)] * exponent)
+            return f"{_bracketed(of)}^{exponent:.4g}"
+        case Magnitude(of):
+            return f"|{format_node(of)}|"
         case Sigmoid(of):
             return f"sigmoid({format_node(of)})"
         case Lookup(of, name=name):
             return f"{name}({format_node(of)})"
         case Lag(of, tau):
             return f"lag({format_node(of)}, {tau / 60:.4g} min)"
+        case PacedLag(of, stopped, running):
+            return f"lag({format_node(of)}, {stopped / 60:.4g} to {running / 60:.4g} min)"
         case Past(ticks):
             return f"dz(t-{ticks})"
         case Mean(of, ticks):

@@ -31,6 +31,23 @@ def advance(memory: FloatArray, signals: FloatArray, dt: float, time_constants: 
     return memory + step_response(dt, time_constants) * (signals - memory)
 
 
+def follow(memory: FloatArray, signals: FloatArray, paces: FloatArray) -> FloatArray:
+    """Advance a bank of lags whose time constants change from step to step.
+
+    Parameters
+    ----------
+    memory, signals : ndarray of shape (..., n_lags)
+        As in `advance`.
+    paces : ndarray of shape (..., n_lags)
+        Time step by time constant.
+
+    Returns
+    -------
+    ndarray of shape (..., n_lags)
+    """
+    return memory - np.expm1(-paces) * (signals - memory)
+
+
 def run(
     signals: FloatArray, dt: FloatArray, time_constants: FloatArray, memory: FloatArray | None = None
 ) -> FloatArray:
@@ -41,8 +58,8 @@ def run(
     signals : ndarray of shape (n_rows, n_lags)
     dt : ndarray of shape (n_rows,)
         Time since the previous row [s]. A value of ``inf`` starts anew, at rest: the first row of each test.
-    time_constants : ndarray of shape (n_lags,)
-        [s]
+    time_constants : ndarray of shape (n_lags,) or (n_rows, n_lags)
+        [s]; of each row where they change.
     memory : ndarray of shape (n_lags,), optional
         Of the row before the first; at rest in the first row without it.
 
@@ -54,8 +71,11 @@ def run(
     if np.isinf(dt).all():  # every row at rest by itself
         out[:] = signals
         return out
-    steps, where = np.unique(dt, return_inverse=True)
-    shares = step_response(steps[:, None], time_constants)  # few distinct steps even in a long recording
+    if time_constants.ndim == 1:
+        steps, where = np.unique(dt, return_inverse=True)  # few distinct steps even in a long recording
+    else:
+        steps, where = dt, np.arange(len(dt))
+    shares = step_response(steps[:, None], time_constants)
     current = signals[0] if memory is None else memory
     for k in range(len(signals)):
         current = current + shares[where[k]] * (signals[k] - current)

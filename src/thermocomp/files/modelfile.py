@@ -15,13 +15,14 @@ from thermocomp.core.exceptions import ModelFileError
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Network
+from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.files import jsonfile
 
 #: as it stands in the file
 FORMAT = jsonfile.MODELS.name
 #: every family that a file may hold
-Family = Polynomial | LinearDynamic | Network | Additive | Autoregressive | AutoregressiveNet
+Family = Polynomial | LinearDynamic | PacedDynamic | Network | Additive | Autoregressive | AutoregressiveNet
 #: as it stands in a file, by its ``family``
 Entry = Annotated[Family, Discriminator("family")]
 FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}

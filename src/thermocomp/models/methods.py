@@ -84,6 +84,13 @@ METHODS: dict[str, Method] = {
         Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", "partial_f.PartialF"),
         Method("mra", "Chen's stepwise second-order regression", "second_order.SecondOrderRegression"),
         Method(
+            "averaged",
+            "average of many ridges on lagged temperatures and states of the spindle speed",
+            "averaged.AveragedDynamic",
+            speed="speed",
+            takes=("dt", "cycle"),
+        ),
+        Method(
             "dynamic",
             "ridge on temperatures, their lagged copies and the lagged spindle speed",
             "dynamic.DynamicRidge",

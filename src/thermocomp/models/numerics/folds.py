@@ -43,3 +43,45 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
         folds[learned] = np.arange(learned.size) * min(5, learned.size) // learned.size
         return folds, "five stretches of one thermal cycle, left out in turn"
     return folds, f"{number + 1} thermal cycles, left out in turn"
+
+
+#: of a thermal cycle, the least that is left out on its own
+_LEAST_PART = 0.1
+#: parts that are left out in turn, at most: more say little more
+_MOST_PARTS = 16
+
+
+def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
+    """Cut each fold in two, where its spindle comes to its last stop.
+
+    A model of drift is asked two things, how it warms up and how it cools down: what knows the one half of a cycle need
+    not know the other.
+
+    Parameters
+    ----------
+    folds : ndarray of int of shape (n_rows,)
+        As `number_folds` gives them.
+    turning : ndarray of bool of shape (n_rows,)
+        The spindle turns.
+
+    Returns
+    -------
+    parts : ndarray of int of shape (n_rows,)
+        0, 1, ...; -1 stays. A fold that does not end in a stop is cut in the middle of its rows. Of many folds none is
+        cut, and of very many several are one part.
+    description : str
+        What is left out, in words.
+    """
+    n_folds = int(folds.max()) + 1
+    if 2 * n_folds > _MOST_PARTS:
+        parts = np.where(folds < 0, -1, folds % _MOST_PARTS)
+        return parts, f"{n_folds} thermal cycles, left out in {int(parts.max()) + 1} groups in turn"
+    parts = np.full(len(folds), -1, dtype=np.intp)
+    for k in range(n_folds):
+        rows = np.flatnonzero(folds == k)
+        turned = np.flatnonzero(turning[rows])
+        stop = turned[-1] + 1 if turned.size else 0
+        if not _LEAST_PART * rows.size <= stop <= (1 - _LEAST_PART) * rows.size:
+            stop = rows.size // 2
+        parts[rows[:stop]], parts[rows[stop:]] = 2 * k, 2 * k + 1
+    return parts, f"halves of {n_folds} thermal cycles (run, stop), left out in turn"

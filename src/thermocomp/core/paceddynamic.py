@@ -1,0 +1,231 @@
+"""PacedDynamic family: lagged temperatures, and states of the spindle speed whose time constants the speed sets."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.bounds import DEGREE, ENTRIES, GAP, LEAST, RANGE, check_between, check_count, check_finite
+from thermocomp.core.exceptions import SettingError
+from thermocomp.core.expression import Lag, Magnitude, Node, PacedLag, Power, scale_node, sum_weighted
+from thermocomp.core.model import ErrorModel, FloatArray
+
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class LaggedInput:
+    """A temperature, and how much it and its lags count.
+
+    Parameters
+    ----------
+    input : int
+        Index into the inputs of the model.
+    direct : float
+        Read-out of the temperature itself [um/degC].
+    lagged : tuple of float
+        Read-out of its lags, one per time constant of the model [um/degC].
+    """
+
+    input: int
+    direct: float
+    lagged: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SpeedState:
+    """A state that follows a power of the spindle speed: faster, the faster the spindle turns.
+
+    Parameters
+    ----------
+    input : int
+        Index into the inputs of the model.
+    power : float
+        Of the speed's share of the top speed.
+    stopped, running : float
+        Time constant at rest and at top speed [s]; its reciprocal is linear in the speed.
+    weight : float
+        Read-out [um].
+    """
+
+    input: int
+    power: float
+    stopped: float
+    running: float
+    weight: float
+
+
+class Bank(NamedTuple):
+    """What the states of a `PacedDynamic` follow, and how fast."""
+
+    temperatures: IntArray  #: (n_temperatures,), inputs that are temperatures
+    taus: int  #: lags of each
+    speeds: IntArray  #: (n_states,), inputs of the speed states
+    powers: FloatArray  #: (n_states,)
+    rates: FloatArray  #: (n_lags + n_states,), at rest [1/s]
+    gain: FloatArray  #: (n_states,), what the rate grows by to top speed [1/s]
+    top: float  #: [1/min]
+
+    def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the states follow, (..., n_memory), and the share of top speed of each speed state."""
+        share = np.abs(change[..., self.speeds]) / self.top
+        temperatures = change[..., self.temperatures]
+        return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share
+
+    def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
+        """Return the states `dt` seconds later, the inputs having changed to `change`."""
+        signals, share = self.signals(change)
+        lags = len(self.rates) - len(self.gain)
+        rates = np.empty(signals.shape)
+        rates[..., :lags] = self.rates[:lags]
+        rates[..., lags:] = self.rates[lags:] + share * self.gain
+        return lagbank.follow(memory, signals, dt * rates)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PacedDynamic(ErrorModel):
+    """Deviation = intercept + sum of temperatures, their first-order lags and speed states, each by its read-out.
+
+    A lag of a temperature T follows tau dx/dt = T - x. A state of the speed n follows dx/dt = k (nu^p - x), nu = |n| /
+    n_top, with k = 1/tau_stopped + nu (1/tau_running - 1/tau_stopped): a turning spindle stirs the air that cools it.
+    All rest in the first reading.
+
+    Parameters
+    ----------
+    family : str
+        Its word in a file.
+    time_constants : tuple of float
+        Of the lags, the same for all temperatures [s].
+    temperatures : tuple of LaggedInput
+    top_speed : float
+        n_top [1/min].
+    states : tuple of SpeedState
+
+    Examples
+    --------
+    >>> from thermocomp.core.inputs import Input
+    >>> from thermocomp.core.paceddynamic import PacedDynamic, SpeedState
+    >>> speed = Input("spindle_rpm", "spindle_speed", "1/min", reference=0.0, rezero=False, low=0.0, high=6000.0)
+    >>> model = PacedDynamic(
+    ...     target="z_um",
+    ...     unit="um",
+    ...     inputs=(speed,),
+    ...     time_constants=(),
+    ...     temperatures=(),
+    ...     top_speed=6000.0,
+    ...     states=(SpeedState(0, power=2.0, stopped=3600.0, running=1800.0, weight=30.0),),
+    ... )
+    >>> table = {"time_s": [0, 1800, 18000, 19800], "spindle_rpm": [0.0, 6000.0, 6000.0, 0.0]}
+    >>> model.predict(table).round(1).tolist()  # warms up twice as fast as it cools down
+    [0.0, 19.0, 30.0, 18.2]
+    """
+
+    family: Literal["paced-dynamic"] = "paced-dynamic"
+    remembers: ClassVar[bool] = True
+
+    time_constants: tuple[float, ...]
+    temperatures: tuple[LaggedInput, ...]
+    top_speed: float
+    states: tuple[SpeedState, ...]
+
+    def _check(self) -> None:
+        owner, temperatures, states = f"model of {self.target}", self.temperatures, self.states
+        wrong = [t.input for t in temperatures if len(t.lagged) != len(self.time_constants)]
+        if wrong:
+            raise SettingError(f"{owner}: input {wrong[0]}: want {len(self.time_constants)} lagged, one per lag")
+        if any(not 0 <= k < len(self.inputs) for k in [t.input for t in temperatures] + [s.input for s in states]):
+            raise SettingError(f"{owner}: a temperature or a speed state is beyond the {len(self.inputs)} inputs")
+        slower = [s for s in states if s.running > s.stopped]
+        if slower:
+            raise SettingError(
+                f"{owner}: a speed state of {slower[0].running:g} s running and {slower[0].stopped:g} s stopped: "
+                "a turning spindle must not be the slower one"
+            )
+        check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
+        check_between(owner, LEAST, RANGE, top_speed=self.top_speed)
+        check_between(
+            owner,
+            LEAST,
+            GAP,
+            time_constants=self.time_constants,
+            stopped=[s.stopped for s in states],
+            running=[s.running for s in states],
+        )
+        check_between(owner, LEAST, DEGREE, power=[s.power for s in states])
+        check_finite(
+            owner,
+            intercept=self.intercept,
+            direct=[t.direct for t in temperatures],
+            lagged=[w for t in temperatures for w in t.lagged],
+            weight=[s.weight for s in states],
+        )
+
+    @cached_property
+    def bank(self) -> Bank:
+        """What its states follow; models with the same one can share them."""
+        taus, states = self.time_constants, self.states
+        stopped = [1 / s.stopped for s in states]
+        lags = [1 / tau for tau in taus for _ in self.temperatures]
+        return Bank(
+            np.array([t.input for t in self.temperatures], dtype=np.intp),
+            len(taus),
+            np.array([s.input for s in states], dtype=np.intp),
+            np.array([s.power for s in states], dtype=np.float64),
+            np.array(lags + stopped, dtype=np.float64),
+            np.array([1 / s.running - k for s, k in zip(states, stopped, strict=True)], dtype=np.float64),
+            self.top_speed,
+        )
+
+    @cached_property
+    def read_out(self) -> tuple[FloatArray, FloatArray]:
+        """Read-out of the inputs, (n_inputs,), and of the states, (n_memory,)."""
+        direct = np.zeros(len(self.inputs))
+        for t in self.temperatures:
+            direct[t.input] += t.direct
+        lagged = [t.lagged[k] for k in range(len(self.time_constants)) for t in self.temperatures]
+        return direct, np.array(lagged + [s.weight for s in self.states], dtype=np.float64)
+
+    def _begin(self, change: FloatArray) -> FloatArray:
+        return self.bank.signals(change)[0]
+
+    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
+        direct, weights = self.read_out
+        memory = self.bank.advance(memory, change, dt)
+        return memory, change @ direct + memory @ weights + self.intercept
+
+    def _expression(self, change: Sequence[Node]) -> Node:
+        weights: list[float] = []
+        parts: list[Node] = []
+        for t in self.temperatures:
+            weights += [t.direct, *t.lagged]
+            parts += [change[t.input], *(Lag(change[t.input], tau) for tau in self.time_constants)]
+        for s in self.states:
+            share = scale_node(1 / self.top_speed, Magnitude(change[s.input]))
+            weights.append(s.weight)
+            parts.append(PacedLag(Power(share, s.power), s.stopped, s.running, share))
+        return sum_weighted(weights, parts, self.intercept)
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that have an influence on the deviation."""
+        active = {t.input for t in self.temperatures if t.direct or any(t.lagged)}
+        active |= {s.input for s in self.states if s.weight}
+        return tuple(self.inputs[k].name for k in sorted(active))
+
+    def coefficients_by_name(self) -> dict[str, float]:
+        """Return the read-out of each part; ``lag(T1, 10 min)`` is a lag, of a speed at rest and at top speed."""
+        found: dict[str, float] = {}
+        for t in self.temperatures:
+            name = self.inputs[t.input].name
+            found[name] = t.direct
+            found |= {
+                f"lag({name}, {tau / 60:.4g} min)": w for w, tau in zip(t.lagged, self.time_constants, strict=True)
+            }
+        for s in self.states:
+            name = f"({self.inputs[s.input].name}/{self.top_speed:g})^{s.power:.3g}"
+            found[f"lag({name}, {s.stopped / 60:.4g} to {s.running / 60:.4g} min)"] = s.weight
+        return {name: w for name, w in found.items() if w != 0}
