@@ -27,7 +27,7 @@ RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
 # what a structure is drawn from
 _FEWEST_COPIES, _MOST_COPIES = 2, 4  # of each temperature: itself and its lags
 _FEWEST_STATES, _MOST_STATES = 2, 12
-_WEAKEST, _STRONGEST = -5.0, -1.0  # strength of the ridge per feature, power of ten
+_WEAKEST, _STRONGEST = -7.0, -1.0  # strength of the ridge per feature, power of ten
 
 _CHUNK = 20_000  # rows of features held at once
 
@@ -38,8 +38,8 @@ class AveragedDynamic(TimedRegressor):
     A few thermal cycles cannot tell which time constants a machine has: the set that errs least on a cycle left out is
     the luckiest, and errs more on the next. So none is chosen. Each of many structures takes some lags, the same for
     all temperatures, some states of the speed (`PacedDynamic`) and a strength of its ridge at random; the weights of
-    all are averaged, with the shares that err least where half a cycle, its run or its stop, was left out, pulled
-    towards equal shares. Since every structure is linear in the same states, their average is one model of that form.
+    all are averaged, those that err less where half a cycle, its run or its stop, was left out with the greater share.
+    Since every structure is linear in the same states, their average is one model of that form.
 
     To each ridge the covariance is added that noise of the sensors in use gives the features, the zero's included: what
     a regression on inputs with that noise would come to. Nothing leans on a difference that is lost in noise.
@@ -61,8 +61,6 @@ class AveragedDynamic(TimedRegressor):
         the spindle turns.
     structures : int
         How many are averaged.
-    evenness : float
-        How strongly the shares are pulled towards equal ones, in units of their error.
     random_state : int
         Of the draw.
     time : {'column', 'routed', 'none'} or None
@@ -78,7 +76,7 @@ class AveragedDynamic(TimedRegressor):
     top_speed_ : float
         Greatest speed of the rows learned from [1/min].
     cv_rms_ : float
-        Root of the mean square error on what was left out [unit of y].
+        Mean over what was left out of the root mean square error there [unit of y].
     chosen_by_ : str
         What was left out.
     gain_ : ndarray of shape (n_features_in_,)
@@ -87,8 +85,6 @@ class AveragedDynamic(TimedRegressor):
 
     References
     ----------
-    Breiman, L.: Stacked regressions. Machine Learning 24, 1996, 49-64. doi:10.1007/BF00117832
-
     Ho, T. K.: The random subspace method for constructing decision forests. IEEE Transactions on Pattern Analysis and
     Machine Intelligence 20(8), 1998, 832-844. doi:10.1109/34.709601
 
@@ -121,7 +117,6 @@ class AveragedDynamic(TimedRegressor):
         stopped: Sequence[float] = STOPPED,
         running: Sequence[float] = RUNNING,
         structures: int = 200,
-        evenness: float = 0.7,
         random_state: int = 0,
         time: Time | None = None,
     ) -> None:
@@ -132,16 +127,12 @@ class AveragedDynamic(TimedRegressor):
         self.stopped = stopped
         self.running = running
         self.structures = structures
-        self.evenness = evenness
         self.random_state = random_state
         self.time = time
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
-        if self.structures < 1 or not self.noise >= 0 or not self.evenness >= 0:
-            raise InputError(
-                f"structures {self.structures}, noise {self.noise}, evenness {self.evenness}: want at least one "
-                "structure, and numbers that are not negative"
-            )
+        if self.structures < 1 or not 0 <= self.noise < np.inf:
+            raise InputError(f"structures {self.structures}, noise {self.noise}: want at least 1, and at least 0 degC")
         self._speeds = [self._place(s, "speed column") for s in self.speed]
         self._temperatures = [i for i in range(rows.shape[1]) if i not in self._speeds]
         usual = _usual_step(step)
@@ -158,8 +149,9 @@ class AveragedDynamic(TimedRegressor):
         ]
         turning = np.abs(rows[:, self._speeds]).max(axis=1, initial=0.0) > 0
         parts, self.chosen_by_ = halve(folds, turning)
-        moments = self._moments(rows, deviation, step, parts, self._covariance(rows, step))
-        self.coef_, self.cv_rms_ = average(moments, self._draw(), float(self.evenness))
+        moments = self._moments(rows, deviation[:, None], step, parts, self._covariance(rows, step))
+        weights, errors = average(moments, self._draw())
+        self.coef_, self.cv_rms_ = weights[:, 0], float(errors.mean())
         self.gain_ = self._gain(usual)
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
@@ -213,16 +205,22 @@ class AveragedDynamic(TimedRegressor):
     def _moments(
         self, rows: FloatArray, deviation: FloatArray, step: FloatArray, parts: IntArray, noise: FloatArray
     ) -> Moments:
-        n_parts, start = int(parts.max()) + 1, 0
-        products = np.zeros((n_parts, len(noise) + 1, len(noise) + 1))
+        n_parts, n_features, start = int(parts.max()) + 1, len(noise), 0
+        products = np.zeros((n_parts, n_features + deviation.shape[1], n_features + deviation.shape[1]))
         for features in self._features(rows, step):
             own = slice(start, start + len(features))
-            table = np.column_stack([features, deviation[own]])
+            table = np.hstack([features, deviation[own]])
             for k in range(n_parts):
                 mine = table[parts[own] == k]
                 products[k] += mine.T @ mine
             start += len(features)
-        return Moments(products, np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64), noise)
+        return Moments(
+            products[:, :n_features, :n_features],
+            products[:, :n_features, n_features:],
+            np.diagonal(products, axis1=1, axis2=2)[:, n_features:],
+            np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64),
+            noise,
+        )
 
     def _covariance(self, rows: FloatArray, step: FloatArray) -> FloatArray:
         """Return the covariance of the features by noise of the readings, and of those of the zero."""
