@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError, InputError
-from thermocomp.models.dynamic import MINUTE, SHORTEST_LAG, DynamicRidge
+from thermocomp.models.dynamic import MINUTE, DynamicRidge
 from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.pacedfeatures import SHORTEST_LAG
 from thermocomp.recording.samples import Samples
 
 LAGS = {"temperature_lags": ((), (20 * MINUTE,)), "speed_lags": ((20 * MINUTE,), (20 * MINUTE, 90 * MINUTE))}

@@ -12,6 +12,7 @@ from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.terms import Term
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics import moments as ridge
+from thermocomp.models.pacedfeatures import SHORTEST_LAG, usual_step
 from thermocomp.models.shrinkage import Rule, choose
 from thermocomp.models.timed import Time, TimedRegressor
 
@@ -38,10 +39,6 @@ SPEED_LAGS: tuple[tuple[float, ...], ...] = (
 )
 #: ridge strengths that are tried, per row and in units of each feature's mean square
 STRENGTHS: tuple[float, ...] = tuple(float(10.0 ** (k / 2)) for k in range(-12, 5))
-
-#: A lag of the temperatures that is shorter than this many times between two rows is not tried: these rows say nothing
-#: of it, and a model that runs at another rate would do what nobody has seen.
-SHORTEST_LAG = 2.0
 
 _CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
 
@@ -222,8 +219,8 @@ class DynamicRidge(TimedRegressor):
 
     def _candidates(self, dt: FloatArray) -> list[_Candidate]:
         n_t, n_n = len(self._temperatures), len(self._speeds) * len(self.speed_powers)
-        between = dt[np.isfinite(dt) & (dt > 0)]
-        shortest = SHORTEST_LAG * float(np.median(between)) if len(between) else 0.0
+        usual = usual_step(dt)
+        shortest = SHORTEST_LAG * usual if np.isfinite(usual) else 0.0
         found = []
         for t_lags in [lags for lags in self.temperature_lags if n_t and min(lags, default=np.inf) >= shortest] or [()]:
             for n_lags in self.speed_lags if n_n else [()]:

@@ -1,0 +1,213 @@
+"""Features of `averaged`: temperatures, their lags, and states of the spindle speed whose pace the speed sets."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.bounds import LEAST
+from thermocomp.models.numerics.structures import Moments, Structure
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: A lag of the temperatures that is shorter than this many times between two rows is left out: these rows say nothing
+#: of it, and a model that runs at another rate would do what nobody has seen.
+SHORTEST_LAG = 2.0
+
+# what a structure is drawn from
+_FEWEST_COPIES, _MOST_COPIES = 2, 4  # of each temperature: itself and its lags
+_FEWEST_STATES, _MOST_STATES = 2, 12
+_WEAKEST, _STRONGEST = -7.0, -1.0  # strength of the ridge per feature, power of ten
+
+_CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
+
+
+@dataclass(frozen=True)
+class PacedFeatures:
+    """What features there are, and in which order: the temperatures, their lags, lag by lag, and the speed states.
+
+    Parameters
+    ----------
+    temperatures : tuple of int
+        Columns of the rows.
+    lags : tuple of float
+        Time constants of the temperatures' lags [s].
+    states : tuple of (int, float, float, float)
+        Column of the speed, power, and time constants at rest and at top speed [s].
+    top_speed : float
+        [1/min]
+    """
+
+    temperatures: tuple[int, ...]
+    lags: tuple[float, ...]
+    states: tuple[tuple[int, float, float, float], ...]
+    top_speed: float
+
+    @classmethod
+    def of(
+        cls,
+        rows: FloatArray,
+        step: FloatArray,
+        learned: NDArray[np.bool_],
+        speeds: Sequence[int],
+        *,
+        lags: Sequence[float],
+        powers: Sequence[float],
+        stopped: Sequence[float],
+        running: Sequence[float],
+    ) -> "PacedFeatures":
+        """Return the features that rows have something to say about.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (n_rows, n_inputs)
+            Inputs minus their reference.
+        step : ndarray of shape (n_rows,)
+            Time since the row before [s], inf where a test starts.
+        learned : ndarray of bool of shape (n_rows,)
+            Rows that may be learned from.
+        speeds : sequence of int
+            Columns that are spindle speeds; the others are temperatures.
+        lags, powers, stopped, running : sequence of float
+            Of `thermocomp.models.averaged.AveragedDynamic`.
+        """
+        usual = usual_step(step)
+        return cls(
+            tuple(i for i in range(rows.shape[1]) if i not in speeds),
+            tuple(float(t) for t in lags if t >= SHORTEST_LAG * usual or not np.isfinite(usual)),
+            tuple(
+                (int(i), float(p), float(slow), float(fast))
+                for i in speeds
+                for p in powers
+                for slow in stopped
+                for fast in running
+                if fast <= slow  # a turning spindle is not the slower one
+            ),
+            max(float(np.abs(rows[learned][:, list(speeds)]).max(initial=0.0)), LEAST),
+        )
+
+    @property
+    def copies(self) -> int:
+        """Features of each temperature: itself and its lags."""
+        return 1 + len(self.lags)
+
+    def __len__(self) -> int:
+        return self.copies * len(self.temperatures) + len(self.states)
+
+    def tables(self, rows: FloatArray, step: FloatArray) -> Iterator[FloatArray]:
+        """Yield the table of all features, (n_rows, n_features), a chunk of rows at a time."""
+        where = [state[0] for state in self.states]
+        powers, slow, fast = np.array([state[1:] for state in self.states], dtype=np.float64).reshape(-1, 3).T
+        taus = np.repeat(self.lags, len(self.temperatures))
+        memory = None
+        for start in range(0, len(rows), _CHUNK):
+            chunk, dt = rows[start : start + _CHUNK], step[start : start + _CHUNK]
+            temperatures = chunk[:, self.temperatures]
+            share = np.abs(chunk[:, where]) / self.top_speed
+            signals = np.hstack([temperatures] * len(self.lags) + [share**powers])
+            paced = 1.0 / (1.0 / slow + share * (1.0 / fast - 1.0 / slow))
+            states = lagbank.run(signals, dt, np.hstack([np.tile(taus, (len(chunk), 1)), paced]), memory)
+            memory = states[-1].copy() if len(states) else memory
+            yield np.hstack([temperatures, states])
+
+    def moments(
+        self, rows: FloatArray, targets: FloatArray, step: FloatArray, parts: IntArray, noise: float
+    ) -> Moments:
+        """Return all that ridge regressions need to know of the rows.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (n_rows, n_inputs)
+        targets : ndarray of shape (n_rows, n_targets)
+            What is predicted.
+        step : ndarray of shape (n_rows,)
+            [s]
+        parts : ndarray of int of shape (n_rows,)
+            What is left out together; -1 is not learned from.
+        noise : float
+            Standard deviation of the temperatures in use [degC].
+        """
+        n_parts, n_features, start = int(parts.max()) + 1, len(self), 0
+        products = np.zeros((n_parts, n_features + targets.shape[1], n_features + targets.shape[1]))
+        for features in self.tables(rows, step):
+            own = slice(start, start + len(features))
+            table = np.hstack([features, targets[own]])
+            for k in range(n_parts):
+                mine = table[parts[own] == k]
+                products[k] += mine.T @ mine
+            start += len(features)
+        return Moments(
+            products[:, :n_features, :n_features],
+            products[:, :n_features, n_features:],
+            np.diagonal(products, axis1=1, axis2=2)[:, n_features:],
+            np.bincount(parts[parts >= 0], minlength=n_parts).astype(np.float64),
+            noise**2 * self._covariance(rows, step),
+        )
+
+    def _covariance(self, rows: FloatArray, step: FloatArray) -> FloatArray:
+        """Return the covariance of the features by noise of 1 degC in the readings, and in those of the zero."""
+        share = self.shares(step)
+        kept = np.outer(1 - share, 1 - share)
+        own = np.outer(share, share) / (1 - kept) + _zero_noise(rows[:, self.temperatures], step)
+        covariance = np.zeros((len(self), len(self)))
+        count = self.copies * len(self.temperatures)
+        covariance[:count, :count] = np.kron(own, np.eye(len(self.temperatures)))
+        return covariance
+
+    def shares(self, step: FloatArray) -> FloatArray:
+        """Return how much of a jump each copy of a temperature follows within the usual step, (n_copies,)."""
+        return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
+
+    def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[Structure]:
+        """Draw structures: some copies, the same for all temperatures, some speed states, and strengths of a ridge.
+
+        Parameters
+        ----------
+        count : int
+        random_state : int
+        keep : sequence of int, optional
+            Places in `temperatures` that are taken; all without it. The draw is the same.
+
+        Returns
+        -------
+        list of Structure
+        """
+        rng = np.random.default_rng(random_state)
+        kept = np.arange(len(self.temperatures)) if keep is None else np.asarray(keep, dtype=np.intp)
+        first = self.copies * len(self.temperatures)
+        drawn = []
+        for _ in range(count):
+            copies = _pick(rng, self.copies, _FEWEST_COPIES, _MOST_COPIES)
+            states = _pick(rng, len(self.states), _FEWEST_STATES, _MOST_STATES)
+            strengths = 10 ** rng.uniform(_WEAKEST, _STRONGEST, 2)
+            columns = [(copies[:, None] * len(self.temperatures) + kept).ravel(), first + states]
+            each = [np.full(len(c), s * len(c)) for c, s in zip(columns, strengths, strict=True)]
+            drawn.append(Structure(np.concatenate(columns), np.concatenate(each)))
+        return drawn
+
+
+def usual_step(step: FloatArray) -> float:
+    """Return the median time between two rows [s]; inf where every row is a test of its own."""
+    between = step[np.isfinite(step) & (step > 0)]
+    return float(np.median(between)) if between.size else float("inf")
+
+
+def _pick(rng: np.random.Generator, count: int, fewest: int, most: int) -> IntArray:
+    """Return some of `count` numbers at random, as many as there are at most, in their order."""
+    return np.sort(rng.choice(count, min(count, int(rng.integers(fewest, most + 1))), replace=False))
+
+
+def _zero_noise(temperatures: FloatArray, step: FloatArray) -> float:
+    """Return the mean variance of the tests' zeros, in units of that of a reading.
+
+    The readings that a zero is the mean of all say that mean, so they are the rows at the start that do not change.
+    """
+    starts = np.append(np.flatnonzero(np.isinf(step)), len(step))
+    shares = []
+    for first, last in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        changed = (temperatures[first:last] != temperatures[first]).any(axis=1)
+        shares.append(1.0 / (int(np.argmax(changed)) if changed.any() else last - first))
+    return float(np.mean(shares))
