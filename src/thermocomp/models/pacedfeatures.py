@@ -20,7 +20,7 @@ SHORTEST_LAG = 2.0
 # what a structure is drawn from
 _FEWEST_COPIES, _MOST_COPIES = 2, 4  # of each temperature: itself and its lags
 _FEWEST_STATES, _MOST_STATES = 2, 12
-_WEAKEST, _STRONGEST = -7.0, -1.0  # strength of the ridge per feature, power of ten
+_WEAKEST, _STRONGEST = -6.0, -1.0  # strength of the ridge per feature, power of ten
 
 _CHUNK = 20_000  # rows of features held at once: bounds the memory of a fit, whatever the length of the recording
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-#: a structure's share is its root mean square error on what was left out to the power of minus this
+#: a structure's share is its root mean square error, the geometric mean over what was left out, to minus this power
 TRUST = 3.0
 
 
@@ -103,9 +103,9 @@ def share_out(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatA
         rest = [p for p in range(n_parts) if p != k]
         for row, structure in zip(fitted[k], structures, strict=True):
             row[structure.columns] = moments.solve(structure, rest)
-    own = np.mean([moments.error(k, weights) for k, weights in enumerate(fitted)], axis=0)
-    own = np.maximum(own, np.finfo(np.float64).tiny)
-    shares = (own.min(axis=0) / own) ** (TRUST / 2)
+    own = np.array([moments.error(k, weights) for k, weights in enumerate(fitted)])
+    own = np.log(np.maximum(own, np.finfo(np.float64).tiny)).mean(axis=0)
+    shares = np.exp(TRUST / 2 * (own.min(axis=0) - own))
     shares /= shares.sum(axis=0)
     means = (shares[:, None] * fitted).sum(axis=1)
     return shares, np.sqrt([moments.error(k, weights) for k, weights in enumerate(means)])
