@@ -21,7 +21,7 @@ from thermocomp.files import modelfile
 from thermocomp.files.mapping import Mapping
 from thermocomp.recording.recording import Recording
 
-DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
+DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
 Policy = Literal["clip", "hold", "fade"]
 
@@ -175,7 +175,7 @@ def _untried(found: Assessment) -> Assessment:
 def fit(
     recordings: Given,
     targets: str | Sequence[str] | None = None,
-    model: Any = "dynamic",
+    model: Any = "averaged",
     *,
     inputs: str | Sequence[str] | None = None,
     split: str | None = None,

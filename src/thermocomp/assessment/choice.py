@@ -63,7 +63,7 @@ class Settings:
     max_sensors: int | None = None
     seconds: float = 60.0
     criterion: Criterion = "cycles"
-    models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
+    models: list[str] = field(default_factory=lambda: ["ols", "averaged"])
     level: float = 0.05
     holm: bool = False
 

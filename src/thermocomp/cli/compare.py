@@ -12,7 +12,7 @@ from thermocomp.cli.options import (
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
 
-DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic")
+DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 
 
 def compare(

@@ -49,5 +49,5 @@ def demo(
         console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
     compare([recording], study=study, output=report, overwrite=overwrite, json=json)
     if not json:
-        console.print("\n[bold]3. 'dynamic', fitted to everything and frozen[/]")
+        console.print("\n[bold]3. 'averaged', fitted to everything and frozen[/]")
     return fit([recording], study=study, output=model, overwrite=overwrite, quiet=json)

@@ -22,7 +22,7 @@ def fit(
     /,
     *,
     study: StudyOptions = StudyOptions(),  # noqa: B008 - frozen
-    model: str = "dynamic",
+    model: str = "averaged",
     tilt: list[str] | None = None,
     output: Output,
     support: Policy = "clip",

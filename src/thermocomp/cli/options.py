@@ -166,7 +166,7 @@ class Selector(Settings):  # noqa: D101 - that of Settings, which the help is ma
     __doc__ = Settings.__doc__
 
     unsigned: bool = False
-    models: list[str] = field(default_factory=lambda: ["ols", "dynamic"])
+    models: list[str] = field(default_factory=lambda: ["ols", "averaged"])
     holm: bool = False
 
 
