@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP, INPUTS, READING, check_count, check_name
 from thermocomp.core.columns import Columns, count_rows, read_clock, read_numbers
 from thermocomp.core.exceptions import InputError, ReadingError, SettingError
@@ -71,6 +72,8 @@ class ErrorModel(ABC):
         What of its inputs' space was trained; None: a range per input is all that is known.
     zeroing : Zeroing
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
+    band : Band or None
+        How far it may be off; None: nothing is known of that.
 
     Examples
     --------
@@ -94,6 +97,7 @@ class ErrorModel(ABC):
     validity: Validity | None = None
     joint: JointSupport | None = None
     zeroing: Zeroing = FIRST_READING
+    band: Band | None = None
 
     def __post_init__(self) -> None:
         check_name("target", self.target)
@@ -105,6 +109,8 @@ class ErrorModel(ABC):
             raise SettingError(f"{owner}: an input is named twice in {names}")
         if self.joint is not None and self.joint.n_inputs > len(names):
             raise SettingError(f"{owner}: its joint support is of more inputs than its {len(names)}")
+        if self.band is not None and max(self.band.speeds, default=-1) >= len(names):
+            raise SettingError(f"{owner}: its band is of more inputs than its {len(names)}")
         self._check()
 
     # -- what a family fills in --------------------------------------------------------------------------------------
@@ -216,6 +222,25 @@ class ErrorModel(ABC):
         if self.joint is None:
             return np.zeros(np.shape(inputs)[:-1])
         return self.joint.distance(_bounded(inputs) - state.reference)
+
+    def half_width(self, state: State, inputs: FloatArray) -> FloatArray:
+        """Return the half-width of the band about the deviation of a reading.
+
+        Parameters
+        ----------
+        state : State
+            After the step that took the reading in.
+        inputs : ndarray of shape (..., n_inputs)
+            The reading.
+
+        Returns
+        -------
+        ndarray of shape (...,)
+            [unit]; nan without a band.
+        """
+        if self.band is None:
+            return np.full(np.shape(inputs)[:-1], np.nan)
+        return self.band.half_width(_bounded(inputs) - state.reference, self.distance(state, inputs))
 
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray

@@ -10,7 +10,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics.folds import halve
-from thermocomp.models.numerics.structures import average
+from thermocomp.models.numerics.structures import combine, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.models.timed import Time, TimedRegressor
 
@@ -73,6 +73,8 @@ class AveragedDynamic(TimedRegressor):
         Mean over what was left out of the root mean square error there [unit of y].
     chosen_by_ : str
         What was left out.
+    left_out_ : ndarray of shape (n_rows,)
+        Prediction of each row that was learned from by weights that were fitted without its cycle; nan elsewhere.
     gain_ : ndarray of shape (n_features_in_,)
         How much y follows each temperature within one step between rows, in absolute value [unit of y per degC]; 0 for
         a speed.
@@ -140,14 +142,29 @@ class AveragedDynamic(TimedRegressor):
         )
         parts, self.chosen_by_ = halve(folds, np.abs(rows[:, speeds]).max(axis=1, initial=0.0) > 0)
         moments = self._features.moments(rows, deviation[:, None], step, parts, self.noise)
-        weights, errors = average(moments, self._features.draw(self.structures, self.random_state))
-        self.coef_, self.cv_rms_ = weights[:, 0], float(errors.mean())
+        structures = self._features.draw(self.structures, self.random_state)
+        shares, errors = share_out(moments, structures)
+        everything = np.unique(parts[parts >= 0])
+        self.coef_, self.cv_rms_ = combine(moments, structures, shares, everything)[:, 0], float(errors.mean())
+        without = [np.setdiff1d(everything, parts[folds == k]) for k in range(int(folds.max()) + 1)]
+        weights = [combine(moments, structures, shares, others)[:, 0] for others in without]
+        self.left_out_ = self._leave_out(rows, step, folds, np.column_stack(weights))
         self.lags_, self.top_speed_ = self._features.lags, self._features.top_speed
         self.gain_ = np.zeros(rows.shape[1])
         self.gain_[list(self._features.temperatures)] = np.abs(self._features.shares(step) @ self._copies())
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
         return np.concatenate([table @ self.coef_ for table in self._features.tables(rows, step)])
+
+    def _leave_out(self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray) -> FloatArray:
+        """Predict each row by the weights of its fold, (n_features, n_folds); nan where it has none."""
+        by_fold = np.column_stack([weights, np.full(len(weights), np.nan)])
+        found, start = np.empty(len(rows)), 0
+        for table in self._features.tables(rows, step):
+            own = slice(start, start + len(table))
+            found[own] = np.einsum("ij,ji->i", table, by_fold[:, folds[own]])
+            start += len(table)
+        return found
 
     def _copies(self) -> FloatArray:
         """Return the weights of the temperatures and of their lags, (n_copies, n_temperatures)."""

@@ -13,11 +13,14 @@ from sklearn.base import BaseEstimator, clone
 from sklearn.metrics import r2_score
 
 from thermocomp import __version__
+from thermocomp.core.band import Band
 from thermocomp.core.exceptions import FitError
 from thermocomp.core.inputs import Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import Provenance
+from thermocomp.core.zero import STANDS
+from thermocomp.models.bands import find_band
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.foreign import adopt_estimator, catch_failures, check_numbers, title
@@ -73,6 +76,8 @@ class FittedMethod:
         The fit took [s].
     predicted : ndarray of shape (n_rows,)
         What it says of every row; nan where an input is missing.
+    left_out : ndarray of shape (n_rows,) or None
+        What it would have said of a row without that row's cycle; nan where it has not learned. None: it does not tell.
     """
 
     how: Method
@@ -81,6 +86,7 @@ class FittedMethod:
     seen: BoolArray
     seconds: float
     predicted: FloatArray
+    left_out: FloatArray | None = None
 
 
 def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: BoolArray) -> FittedMethod:
@@ -147,7 +153,11 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     with catch_failures(f"{how.name} cannot predict {channel.name}"):
         found = estimator.predict(frame.iloc[valid], **everywhere)
     predicted[valid] = check_numbers(found, int(valid.sum()), how.name)
-    return FittedMethod(how, estimator, columns, seen, seconds, predicted)
+    left_out = None
+    if hasattr(estimator, "left_out_"):
+        left_out = np.full(len(samples), np.nan)
+        left_out[rows] = estimator.left_out_
+    return FittedMethod(how, estimator, columns, seen, seconds, predicted, left_out)
 
 
 def train(
@@ -201,6 +211,8 @@ def train(
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
     model = replace(model, joint=_joint(model, samples, seen) if joint else None, zeroing=samples.zeroing)
+    if fit.left_out is not None and model.joint is not None:
+        model = replace(model, band=_band(model, samples, target, fit.left_out))
     return Trained(how.name, estimator, model, fit.seconds, r_squared, predicted)
 
 
@@ -220,6 +232,28 @@ def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     return find_joint_support(
         samples.change()[seen][:, columns], [samples.inputs[j] for j in columns], samples.cycle[seen]
+    )
+
+
+def _band(model: ErrorModel, samples: Samples, target: int, left_out: FloatArray) -> Band | None:
+    """Return the band of a model: from its errors on cycles left out, and how unlike the other cycles they were."""
+    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
+    channels = [samples.inputs[j] for j in columns]
+    change = samples.change()[:, columns]
+    speeds = [k for k, c in enumerate(channels) if c.quantity == "spindle_speed"]
+    known = np.isfinite(left_out)
+    distance = np.ones(len(samples))
+    for k in np.unique(samples.cycle[known]):
+        mine, rest = known & (samples.cycle == k), known & (samples.cycle != k)
+        covered = find_joint_support(change[rest], channels, samples.cycle[rest]) if rest.any() else None
+        if covered is not None:
+            distance[mine] = covered.distance(change[mine])
+    return find_band(
+        samples.deviations[known, target] - left_out[known],
+        samples.cycle[known],
+        np.asarray((np.abs(change[known][:, speeds]) > STANDS).any(axis=1)),
+        distance[known],
+        speeds,
     )
 
 

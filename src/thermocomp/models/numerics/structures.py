@@ -72,8 +72,6 @@ class Moments:
 def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
     """Return the weights of the features, averaged over structures, and what the average errs by on what was left out.
 
-    Each part is left out in turn. A structure's share is the less, the more it errs there, by `TRUST`.
-
     Parameters
     ----------
     moments : Moments
@@ -86,14 +84,36 @@ def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArr
         Root mean square error on each part, left out; nan if there is one part.
     """
     shares, errors = share_out(moments, structures)
-    weights = np.zeros(moments.cross.shape[1:])
-    for structure, share in zip(structures, shares, strict=True):
-        weights[structure.columns] += share * moments.solve(structure, range(len(moments.rows)))
-    return weights, errors
+    return combine(moments, structures, shares, range(len(moments.rows))), errors
+
+
+def combine(moments: Moments, structures: Sequence[Structure], shares: FloatArray, parts: Iterable[int]) -> FloatArray:
+    """Return the weights of the features, averaged over structures with given shares, fitted to some of the parts.
+
+    Parameters
+    ----------
+    moments : Moments
+    structures : sequence of Structure
+    shares : ndarray of shape (n_structures, n_targets)
+    parts : iterable of int
+        Without any, the weights are nan: nothing was learned.
+
+    Returns
+    -------
+    ndarray of shape (n_features, n_targets)
+    """
+    chosen = list(parts)
+    weights = np.full(moments.cross.shape[1:], 0.0 if chosen else np.nan)
+    for structure, share in zip(structures if chosen else (), shares, strict=bool(chosen)):
+        weights[structure.columns] += share * moments.solve(structure, chosen)
+    return weights
 
 
 def share_out(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
-    """Return the shares of structures in their average, (n_structures, n_targets), and the errors as `average` does."""
+    """Return the shares of structures in their average, (n_structures, n_targets), and the errors as `average` does.
+
+    Each part is left out in turn. A structure's share is the less, the more it errs there, by `TRUST`.
+    """
     n_parts, (n_features, n_targets) = len(moments.rows), moments.cross.shape[1:]
     shares = np.full((len(structures), n_targets), 1 / len(structures))
     if n_parts == 1:

@@ -1,0 +1,82 @@
+"""Band: how far a model's answer may be off, by the phase of the machine and by how unlike the training it is."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.bounds import COEFFICIENT, check_between
+from thermocomp.core.exceptions import SettingError
+from thermocomp.core.zero import STANDS
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Half-width of the band about a model's answer, fixed when the model was fitted.
+
+    Parameters
+    ----------
+    level : float
+        Share of the rows of unseen thermal cycles that the band is to hold.
+    basis : {'assumption', 'conformal'}
+        ``assumption``: errors of a cycle are normal, their size varies from cycle to cycle, and it is known from as
+        many cycles as there are; ``conformal``: distribution-free, over cycles that could as well have come in another
+        order.
+    cycles : int
+        Thermal cycles it was made from, each left out in turn.
+    running, stopped : float
+        Half-width while the spindle turns, and while it stands, where the inputs are like the training [unit].
+    speeds : tuple of int
+        Inputs that say whether the spindle turns; none: the larger half-width holds always.
+
+    Raises
+    ------
+    SettingError
+        A number is not in its range.
+    """
+
+    level: float
+    basis: Literal["assumption", "conformal"]
+    cycles: int
+    running: float
+    stopped: float
+    speeds: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_between("band", 0.0, 1.0, level=self.level)
+        check_between("band", 0.0, COEFFICIENT, running=self.running, stopped=self.stopped)
+        check_between("band", 2, COEFFICIENT, cycles=self.cycles)
+        if min(self.speeds, default=0) < 0:
+            raise SettingError("band: there is no input before the first")
+
+    @property
+    def words(self) -> str:
+        """What it is called wherever it is shown."""
+        by = "by assumption" if self.basis == "assumption" else "conformal"
+        return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
+
+    def half_width(self, change: FloatArray, distance: FloatArray) -> FloatArray:
+        """Return the half-width for states of the inputs.
+
+        Parameters
+        ----------
+        change : ndarray of shape (..., n_inputs)
+            Inputs minus their reference [their units].
+        distance : ndarray of shape (...,)
+            How unlike the training they are: `thermocomp.core.joint.JointSupport.distance`. Beyond 1 the half-width
+            grows in proportion.
+
+        Returns
+        -------
+        ndarray of shape (...,)
+            [unit]
+        """
+        if self.speeds:
+            turning = (np.abs(change[..., self.speeds]) > STANDS).any(axis=-1)
+            width = np.where(turning, self.running, self.stopped)
+        else:
+            width = np.asarray(max(self.running, self.stopped))
+        return width * np.maximum(1.0, distance)
