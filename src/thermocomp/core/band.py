@@ -1,4 +1,4 @@
-"""Band: how far a model's answer may be off, by the phase of the machine and by how unlike the training it is."""
+"""Band: how far a model's answer may be off, by the phase of the machine and by how far it is from what was covered."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,20 +17,25 @@ FloatArray = NDArray[np.float64]
 class Band:
     """Half-width of the band about a model's answer, fixed when the model was fitted.
 
+    It is ``factor * sqrt(floor^2 + spread^2)``. The spread is that of the structures a model is the average of: what
+    the training has not settled they answer differently. It is the distance to what was covered, in the unit of the
+    answer.
+
     Parameters
     ----------
     level : float
         Share of the rows of unseen thermal cycles that the band is to hold.
     basis : {'assumption', 'conformal'}
-        ``assumption``: errors of a cycle are normal, their size varies from cycle to cycle, and it is known from as
-        many cycles as there are; ``conformal``: distribution-free, over cycles that could as well have come in another
-        order.
+        ``assumption``: errors are normal, a cycle errs as a whole, and their size is known from as many cycles as there
+        are; ``conformal``: distribution-free, over cycles that could as well have come in another order.
     cycles : int
         Thermal cycles it was made from, each left out in turn.
+    floor : float
+        What is reckoned with where the structures agree [unit].
     running, stopped : float
-        Half-width while the spindle turns, and while it stands, where the inputs are like the training [unit].
+        Factor while the spindle turns, and while it stands [-].
     speeds : tuple of int
-        Inputs that say whether the spindle turns; none: the larger half-width holds always.
+        Inputs that say whether the spindle turns; none: the larger factor holds always.
 
     Raises
     ------
@@ -41,13 +46,14 @@ class Band:
     level: float
     basis: Literal["assumption", "conformal"]
     cycles: int
+    floor: float
     running: float
     stopped: float
     speeds: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         check_between("band", 0.0, 1.0, level=self.level)
-        check_between("band", 0.0, COEFFICIENT, running=self.running, stopped=self.stopped)
+        check_between("band", 0.0, COEFFICIENT, floor=self.floor, running=self.running, stopped=self.stopped)
         check_between("band", 2, COEFFICIENT, cycles=self.cycles)
         if min(self.speeds, default=0) < 0:
             raise SettingError("band: there is no input before the first")
@@ -58,25 +64,23 @@ class Band:
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
-    def half_width(self, change: FloatArray, distance: FloatArray) -> FloatArray:
+    def half_width(self, change: FloatArray, spread: FloatArray) -> FloatArray:
         """Return the half-width for states of the inputs.
 
         Parameters
         ----------
         change : ndarray of shape (..., n_inputs)
             Inputs minus their reference [their units].
-        distance : ndarray of shape (...,)
-            How unlike the training they are: `thermocomp.core.joint.JointSupport.distance`. Beyond 1 the half-width
-            grows in proportion.
+        spread : ndarray of shape (...,)
+            Of the structures [unit].
 
         Returns
         -------
         ndarray of shape (...,)
             [unit]
         """
+        factor: FloatArray | float = max(self.running, self.stopped)
         if self.speeds:
             turning = (np.abs(change[..., self.speeds]) > STANDS).any(axis=-1)
-            width = np.where(turning, self.running, self.stopped)
-        else:
-            width = np.asarray(max(self.running, self.stopped))
-        return width * np.maximum(1.0, distance)
+            factor = np.where(turning, self.running, self.stopped)
+        return np.asarray(factor * np.sqrt(self.floor**2 + spread**2))

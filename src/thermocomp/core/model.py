@@ -127,6 +127,10 @@ class ErrorModel(ABC):
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
         """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
 
+    def _spread(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002 - see `Band`
+        """Return the spread of the structures that the model is the average of, (...,) [unit]."""
+        return np.zeros(change.shape[:-1])
+
     @abstractmethod
     def _expression(self, change: Sequence[Node]) -> Node:
         """Return what `_advance` gives, made of the clipped changes of the inputs."""
@@ -238,9 +242,11 @@ class ErrorModel(ABC):
         ndarray of shape (...,)
             [unit]; nan without a band.
         """
-        if self.band is None:
+        if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
-        return self.band.half_width(_bounded(inputs) - state.reference, self.distance(state, inputs))
+        change = _bounded(inputs) - state.reference
+        low, high = self._bounds
+        return self.band.half_width(change, self._spread(state.memory, np.minimum(np.maximum(change, low), high)))
 
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray

@@ -104,6 +104,9 @@ class PacedDynamic(ErrorModel):
     top_speed : float
         n_top [1/min].
     states : tuple of SpeedState
+    spread : tuple of tuple of float
+        Read-outs of the same parts (temperatures, their lags, lag by lag, and the speed states), the root of the sum of
+        whose squares is the spread of the structures that the model is the average of [unit]; none: it is not known.
 
     Examples
     --------
@@ -131,6 +134,7 @@ class PacedDynamic(ErrorModel):
     temperatures: tuple[LaggedInput, ...]
     top_speed: float
     states: tuple[SpeedState, ...]
+    spread: tuple[tuple[float, ...], ...] = ()
 
     def _check(self) -> None:
         owner, temperatures, states = f"model of {self.target}", self.temperatures, self.states
@@ -146,6 +150,10 @@ class PacedDynamic(ErrorModel):
                 "a turning spindle must not be the slower one"
             )
         check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
+        parts = len(temperatures) * (1 + len(self.time_constants)) + len(states)
+        if any(len(row) != parts for row in self.spread):
+            raise SettingError(f"{owner}: want {parts} numbers in each row of its spread, one per part")
+        check_count(owner, ENTRIES, spread=[w for row in self.spread for w in row])
         check_between(owner, LEAST, RANGE, top_speed=self.top_speed)
         check_between(
             owner,
@@ -162,6 +170,7 @@ class PacedDynamic(ErrorModel):
             direct=[t.direct for t in temperatures],
             lagged=[w for t in temperatures for w in t.lagged],
             weight=[s.weight for s in states],
+            spread=[w for row in self.spread for w in row],
         )
 
     @cached_property
@@ -196,6 +205,20 @@ class PacedDynamic(ErrorModel):
         direct, weights = self.read_out
         memory = self.bank.advance(memory, change, dt)
         return memory, change @ direct + memory @ weights + self.intercept
+
+    def _spread(self, memory: FloatArray, change: FloatArray) -> FloatArray:
+        direct, lagged = self.spread_out
+        return np.asarray(np.sqrt(((change @ direct + memory @ lagged) ** 2).sum(axis=-1)))
+
+    @cached_property
+    def spread_out(self) -> tuple[FloatArray, FloatArray]:
+        """Read-outs of the spread: of the inputs, (n_inputs, n_spread), and of the states, (n_memory, n_spread)."""
+        count = len(self.temperatures)
+        table = np.array(self.spread, dtype=np.float64).reshape(len(self.spread), -1).T
+        direct = np.zeros((len(self.inputs), len(self.spread)))
+        for k, t in enumerate(self.temperatures if self.spread else ()):
+            direct[t.input] += table[k]
+        return direct, table[count:] if self.spread else np.zeros((len(self.bank.rates), 0))
 
     def _expression(self, change: Sequence[Node]) -> Node:
         weights: list[float] = []

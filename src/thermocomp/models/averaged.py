@@ -10,7 +10,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics.folds import halve
-from thermocomp.models.numerics.structures import combine, share_out
+from thermocomp.models.numerics.structures import Moments, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.models.timed import Time, TimedRegressor
 
@@ -23,6 +23,9 @@ POWERS = (1.0, 5 / 3, 3.0)
 #: time constants of the speed states at rest and at top speed [s]
 STOPPED = (10 * MINUTE, 30 * MINUTE, 90 * MINUTE, 270 * MINUTE)
 RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
+
+#: read-outs that a frozen model knows the structures' spread by
+DIRECTIONS = 12
 
 
 class AveragedDynamic(TimedRegressor):
@@ -73,8 +76,9 @@ class AveragedDynamic(TimedRegressor):
         Mean over what was left out of the root mean square error there [unit of y].
     chosen_by_ : str
         What was left out.
-    left_out_ : ndarray of shape (n_rows,)
-        Prediction of each row that was learned from by weights that were fitted without its cycle; nan elsewhere.
+    left_out_ : ndarray of shape (n_rows, 2)
+        Of each row that was learned from: prediction by structures that were fitted without its cycle, and their spread
+        [unit of y]; nan elsewhere.
     gain_ : ndarray of shape (n_features_in_,)
         How much y follows each temperature within one step between rows, in absolute value [unit of y per degC]; 0 for
         a speed.
@@ -145,10 +149,12 @@ class AveragedDynamic(TimedRegressor):
         structures = self._features.draw(self.structures, self.random_state)
         shares, errors = share_out(moments, structures)
         everything = np.unique(parts[parts >= 0])
-        self.coef_, self.cv_rms_ = combine(moments, structures, shares, everything)[:, 0], float(errors.mean())
+        each = fit_each(moments, structures, everything)[..., 0]
+        self.coef_, self.cv_rms_ = shares[:, 0] @ each, float(errors.mean())
+        self._spread = _main_directions(np.sqrt(shares) * (each - self.coef_), moments)
         without = [np.setdiff1d(everything, parts[folds == k]) for k in range(int(folds.max()) + 1)]
-        weights = [combine(moments, structures, shares, others)[:, 0] for others in without]
-        self.left_out_ = self._leave_out(rows, step, folds, np.column_stack(weights))
+        others = np.array([fit_each(moments, structures, kept)[..., 0] for kept in without])
+        self.left_out_ = self._leave_out(rows, step, folds, others, shares[:, 0])
         self.lags_, self.top_speed_ = self._features.lags, self._features.top_speed
         self.gain_ = np.zeros(rows.shape[1])
         self.gain_[list(self._features.temperatures)] = np.abs(self._features.shares(step) @ self._copies())
@@ -156,13 +162,18 @@ class AveragedDynamic(TimedRegressor):
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
         return np.concatenate([table @ self.coef_ for table in self._features.tables(rows, step)])
 
-    def _leave_out(self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray) -> FloatArray:
-        """Predict each row by the weights of its fold, (n_features, n_folds); nan where it has none."""
-        by_fold = np.column_stack([weights, np.full(len(weights), np.nan)])
-        found, start = np.empty(len(rows)), 0
+    def _leave_out(
+        self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """Return mean and spread of the structures, (n_rows, 2), by the weights (n_folds, ...) of each row's fold."""
+        found, start = np.full((len(rows), 2), np.nan), 0
         for table in self._features.tables(rows, step):
-            own = slice(start, start + len(table))
-            found[own] = np.einsum("ij,ji->i", table, by_fold[:, folds[own]])
+            for k, own in enumerate(weights):
+                mine = np.flatnonzero(folds[start : start + len(table)] == k)
+                answers = table[mine] @ own.T
+                mean = answers @ shares
+                found[start + mine, 0] = mean
+                found[start + mine, 1] = np.sqrt((answers - mean[:, None]) ** 2 @ shares)
             start += len(table)
         return found
 
@@ -185,6 +196,7 @@ class AveragedDynamic(TimedRegressor):
         temperatures = [(i, w) for i, w in zip(of.temperatures, copies, strict=True) if any(w)]
         weights = self.coef_[len(self.coef_) - len(of.states) :].tolist()
         states = [(state, w) for state, w in zip(of.states, weights, strict=True) if w != 0]
+        kept = np.append(np.tile(np.any(copies, axis=1), of.copies), np.array(weights) != 0)
         used = sorted({i for i, _ in temperatures} | {state[0] for state, _ in states})
         return PacedDynamic(
             **header,
@@ -193,4 +205,23 @@ class AveragedDynamic(TimedRegressor):
             temperatures=tuple(LaggedInput(used.index(i), w[0], tuple(w[1:])) for i, w in temperatures),
             top_speed=of.top_speed,
             states=tuple(SpeedState(used.index(i), p, slow, fast, w) for (i, p, slow, fast), w in states),
+            spread=tuple(tuple(float(f"{w:.5g}") for w in row) for row in self._spread[:, kept].tolist()),
         )
+
+
+def _main_directions(deviations: FloatArray, moments: Moments) -> FloatArray:
+    """Return the few read-outs, (n_spread, n_features), whose squares sum to those of the structures.
+
+    They are the largest directions of the spread, widened by what is left out.
+
+    Parameters
+    ----------
+    deviations : ndarray of shape (n_structures, n_features)
+        Weights less their mean, times the root of the structure's share.
+    moments : Moments
+    """
+    scale = np.sqrt(np.diag(moments.gram.sum(axis=0)) / moments.rows.sum())
+    scale[scale == 0] = 1.0
+    _, sizes, directions = np.linalg.svd(deviations * scale, full_matrices=False)
+    sizes = sizes[:DIRECTIONS] * np.sqrt((sizes**2).sum() / max((sizes[:DIRECTIONS] ** 2).sum(), np.finfo(float).tiny))
+    return np.asarray(sizes[:, None] * directions[: len(sizes)] / scale)

@@ -17,33 +17,34 @@ IntArray = NDArray[np.intp]
 LEVEL = 0.9
 #: cycles from which on a band is distribution-free: with fewer, the quantile of so many cycles is beyond all of them
 CONFORMAL = 9
+#: least spread that is counted with, in units of its root mean square on the cycles left out
+FLOOR = 0.5
 
 
 def find_band(
     residual: FloatArray,
+    spread: FloatArray,
     cycle: IntArray,
     turning: BoolArray,
-    distance: FloatArray,
     speeds: Sequence[int] = (),
     level: float = LEVEL,
 ) -> Band | None:
     """Return the band of a model by the errors on its training's cycles, each left out.
 
-    The error's size differs between run and stop, and grows in proportion to the distance from what was covered. Two
-    sources of doubt widen it: a cycle errs as a whole, so n cycles say of its size what n independent numbers do
-    (Student's t with n degrees of freedom, and one cycle more to come). From `CONFORMAL` cycles on nothing is assumed
-    but that the cycles could have come in any order: the quantile of the errors, each cycle counting the same and one
-    more, unknown, beside them.
+    The error is taken in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and stop. A
+    cycle errs as a whole, so n cycles say of that size what n independent numbers do: Student's t with n degrees of
+    freedom, and one cycle more to come. From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
+    come in any order: the quantile of the errors, each cycle counting the same and one more, unknown, beside them.
 
     Parameters
     ----------
     residual : ndarray of shape (n_rows,)
         Error on rows whose cycle the model had not seen [unit].
+    spread : ndarray of shape (n_rows,)
+        Of its structures there [unit].
     cycle : ndarray of int of shape (n_rows,)
     turning : ndarray of bool of shape (n_rows,)
         The spindle turns.
-    distance : ndarray of shape (n_rows,)
-        From what the other cycles cover, see `thermocomp.core.joint.JointSupport`.
     speeds : sequence of int
         Inputs that will say whether it turns.
     level : float
@@ -58,32 +59,31 @@ def find_band(
     Dunn, R., Wasserman, L., Ramdas, A.: Distribution-free prediction sets for two-layer hierarchical models. Journal of
     the American Statistical Association 118(544), 2023, 2491-2502. doi:10.1080/01621459.2022.2060112
     """
-    labels = np.unique(cycle)
-    n = len(labels)
+    rows = [cycle == c for c in np.unique(cycle)]
+    n = len(rows)
     if n < 2:
         return None
-    own = residual / np.maximum(1.0, distance)
-    sizes = _sizes(own, cycle, turning)
+    tiny = float(np.finfo(np.float64).tiny)
+    floor = max(FLOOR * float(np.sqrt(np.mean([np.mean(spread[mine] ** 2) for mine in rows]))), tiny)
+    own = residual / np.sqrt(floor**2 + spread**2)
+    stopped, running = (_size(own, rows, phase) for phase in (~turning, turning))
     basis: Literal["assumption", "conformal"] = "conformal" if n >= CONFORMAL else "assumption"
     if basis == "conformal":
-        scores = np.abs(own) / np.where(turning, sizes[1], sizes[0])
-        weights = np.concatenate([np.full(int((cycle == c).sum()), 1 / (cycle == c).sum()) for c in labels]) / (n + 1)
-        order = np.argsort(scores := np.concatenate([scores[cycle == c] for c in labels]))
-        reached = np.cumsum(weights[order])
-        factor = float(scores[order][min(int(np.searchsorted(reached, level - 1e-9)), len(order) - 1)])
+        scores = np.abs(own) / np.maximum(np.where(turning, running, stopped), tiny)
+        weights = sum(mine / mine.sum() for mine in rows) / (n + 1)
+        order = np.argsort(scores)
+        place = int(np.searchsorted(np.cumsum(weights[order]), level - 1e-9))
+        factor = float(scores[order][min(place, len(order) - 1)])
     else:
         factor = float(stats.t.ppf(0.5 + level / 2, n) * np.sqrt(1 + 1 / n))
-    return Band(level, basis, n, factor * sizes[1], factor * sizes[0], tuple(speeds))
+    return Band(level, basis, n, floor, factor * running, factor * stopped, tuple(speeds))
 
 
-def _sizes(residual: FloatArray, cycle: IntArray, turning: BoolArray) -> tuple[float, float]:
-    """Return the size of the error in stops and in runs: root mean square, every cycle counting the same.
+def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:
+    """Return the root mean square of errors in a phase, every cycle counting the same.
 
-    Each is drawn towards that of both, which weighs as much as one cycle more.
+    It is drawn towards that of all phases, which weighs as much as one cycle more.
     """
-    both = np.mean([np.mean(residual[cycle == c] ** 2) for c in np.unique(cycle)])
-    found = []
-    for phase in (~turning, turning):
-        squares = [np.mean(residual[rows] ** 2) for c in np.unique(cycle) if (rows := phase & (cycle == c)).any()]
-        found.append(float(np.sqrt((sum(squares) + both) / (len(squares) + 1))))
-    return max(found[0], np.finfo(np.float64).tiny), max(found[1], np.finfo(np.float64).tiny)
+    squares = [np.mean(errors[mine & phase] ** 2) for mine in rows if (mine & phase).any()]
+    squares.append(np.mean([np.mean(errors[mine] ** 2) for mine in rows]))
+    return float(np.sqrt(np.mean(squares)))

@@ -76,8 +76,9 @@ class FittedMethod:
         The fit took [s].
     predicted : ndarray of shape (n_rows,)
         What it says of every row; nan where an input is missing.
-    left_out : ndarray of shape (n_rows,) or None
-        What it would have said of a row without that row's cycle; nan where it has not learned. None: it does not tell.
+    left_out : ndarray of shape (n_rows, 2) or None
+        What it would have said of a row without that row's cycle, and the spread of its structures; nan where it has
+        not learned. None: it does not tell.
     """
 
     how: Method
@@ -155,7 +156,7 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     predicted[valid] = check_numbers(found, int(valid.sum()), how.name)
     left_out = None
     if hasattr(estimator, "left_out_"):
-        left_out = np.full(len(samples), np.nan)
+        left_out = np.full((len(samples), 2), np.nan)
         left_out[rows] = estimator.left_out_
     return FittedMethod(how, estimator, columns, seen, seconds, predicted, left_out)
 
@@ -211,7 +212,7 @@ def train(
         inputs = samples.only([i.name for i in model.inputs])
         model = replace(model, provenance=replace(model.provenance, prints=fingerprint(inputs, target, learn)))
     model = replace(model, joint=_joint(model, samples, seen) if joint else None, zeroing=samples.zeroing)
-    if fit.left_out is not None and model.joint is not None:
+    if fit.left_out is not None:
         model = replace(model, band=_band(model, samples, target, fit.left_out))
     return Trained(how.name, estimator, model, fit.seconds, r_squared, predicted)
 
@@ -236,23 +237,15 @@ def _joint(model: ErrorModel, samples: Samples, seen: BoolArray) -> JointSupport
 
 
 def _band(model: ErrorModel, samples: Samples, target: int, left_out: FloatArray) -> Band | None:
-    """Return the band of a model: from its errors on cycles left out, and how unlike the other cycles they were."""
-    columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
-    channels = [samples.inputs[j] for j in columns]
-    change = samples.change()[:, columns]
-    speeds = [k for k, c in enumerate(channels) if c.quantity == "spindle_speed"]
-    known = np.isfinite(left_out)
-    distance = np.ones(len(samples))
-    for k in np.unique(samples.cycle[known]):
-        mine, rest = known & (samples.cycle == k), known & (samples.cycle != k)
-        covered = find_joint_support(change[rest], channels, samples.cycle[rest]) if rest.any() else None
-        if covered is not None:
-            distance[mine] = covered.distance(change[mine])
+    """Return the band of a model by its errors on cycles left out."""
+    speeds = [k for k, i in enumerate(model.inputs) if i.quantity == "spindle_speed"]
+    columns = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    known = np.isfinite(left_out).all(axis=1)
     return find_band(
-        samples.deviations[known, target] - left_out[known],
+        samples.deviations[known, target] - left_out[known, 0],
+        left_out[known, 1],
         samples.cycle[known],
-        np.asarray((np.abs(change[known][:, speeds]) > STANDS).any(axis=1)),
-        distance[known],
+        np.asarray((np.abs(samples.change()[known][:, columns]) > STANDS).any(axis=1)),
         speeds,
     )
 

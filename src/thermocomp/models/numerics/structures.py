@@ -84,28 +84,28 @@ def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArr
         Root mean square error on each part, left out; nan if there is one part.
     """
     shares, errors = share_out(moments, structures)
-    return combine(moments, structures, shares, range(len(moments.rows))), errors
+    return (shares[:, None] * fit_each(moments, structures, range(len(moments.rows)))).sum(axis=0), errors
 
 
-def combine(moments: Moments, structures: Sequence[Structure], shares: FloatArray, parts: Iterable[int]) -> FloatArray:
-    """Return the weights of the features, averaged over structures with given shares, fitted to some of the parts.
+def fit_each(moments: Moments, structures: Sequence[Structure], parts: Iterable[int]) -> FloatArray:
+    """Return the weights of the features in each structure, fitted to some of the parts.
 
     Parameters
     ----------
     moments : Moments
     structures : sequence of Structure
-    shares : ndarray of shape (n_structures, n_targets)
     parts : iterable of int
         Without any, the weights are nan: nothing was learned.
 
     Returns
     -------
-    ndarray of shape (n_features, n_targets)
+    ndarray of shape (n_structures, n_features, n_targets)
     """
     chosen = list(parts)
-    weights = np.full(moments.cross.shape[1:], 0.0 if chosen else np.nan)
-    for structure, share in zip(structures if chosen else (), shares, strict=bool(chosen)):
-        weights[structure.columns] += share * moments.solve(structure, chosen)
+    weights = np.full((len(structures), *moments.cross.shape[1:]), 0.0 if chosen else np.nan)
+    for row, structure in zip(weights, structures, strict=True):
+        if chosen:
+            row[structure.columns] = moments.solve(structure, chosen)
     return weights
 
 
@@ -114,15 +114,11 @@ def share_out(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatA
 
     Each part is left out in turn. A structure's share is the less, the more it errs there, by `TRUST`.
     """
-    n_parts, (n_features, n_targets) = len(moments.rows), moments.cross.shape[1:]
+    n_parts, n_targets = len(moments.rows), moments.cross.shape[2]
     shares = np.full((len(structures), n_targets), 1 / len(structures))
     if n_parts == 1:
         return shares, np.full((1, n_targets), np.nan)
-    fitted = np.zeros((n_parts, len(structures), n_features, n_targets))
-    for k in range(n_parts):
-        rest = [p for p in range(n_parts) if p != k]
-        for row, structure in zip(fitted[k], structures, strict=True):
-            row[structure.columns] = moments.solve(structure, rest)
+    fitted = np.array([fit_each(moments, structures, set(range(n_parts)) - {k}) for k in range(n_parts)])
     own = np.array([moments.error(k, weights) for k, weights in enumerate(fitted)])
     own = np.log(np.maximum(own, np.finfo(np.float64).tiny)).mean(axis=0)
     shares = np.exp(TRUST / 2 * (own.min(axis=0) - own))
