@@ -1,15 +1,19 @@
 """A stack of models says what each of its models says alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.band import Band
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.stack import Stack
 from thermocomp.core.terms import Variable
@@ -43,7 +47,7 @@ def random_model(rng: np.random.Generator, number: int) -> ErrorModel:
     names = [x.name for x in taken]
     n_terms = int(rng.integers(0, 7)) if n else 0
     terms = tuple(tuple(rng.integers(0, n, rng.integers(1, 4)).tolist()) for _ in range(n_terms))
-    kind = rng.integers(5)
+    kind = rng.integers(7)
     if kind < 2:
         more = (Variable.difference(names, names[0], names[1]),) if n > 1 and rng.integers(2) else ()
         return Polynomial(
@@ -69,6 +73,23 @@ def random_model(rng: np.random.Generator, number: int) -> ErrorModel:
             lag_signals=tuple(rng.integers(0, max(n_terms, 1), n_lags).tolist()),
             time_constants=tuple(rng.uniform(1.0, 500.0, n_lags).tolist()),
             lagged=tuple(rng.normal(size=n_lags).tolist()),
+        )
+    if kind < 6:
+        n_lags = int(rng.integers(0, 3))
+        parts = n * (1 + n_lags) + n
+        pair = rng.choice([100.0, 500.0], 2)  # few different ones: some models share their states
+        return PacedDynamic(
+            target=f"t{number}",
+            unit="um",
+            inputs=taken,
+            support=support,
+            intercept=intercept,
+            time_constants=(60.0, 600.0)[:n_lags],
+            temperatures=tuple(LaggedInput(i, float(rng.normal()), tuple(rng.normal(size=n_lags))) for i in range(n)),
+            top_speed=5.0,
+            states=tuple(SpeedState(i, 1.5, float(max(pair)), float(min(pair)), float(rng.normal())) for i in range(n)),
+            spread=tuple(map(tuple, rng.normal(size=(2, parts)).tolist())),
+            band=Band(0.9, "assumption", 3, 0.5, 2.0, 1.0, (0,) if n else ()) if rng.integers(2) else None,
         )
     return Additive(
         target=f"a{number}",
@@ -104,6 +125,9 @@ def test_each_model_says_what_it_says_alone(seed: int, count: int, batch: tuple[
             # cubes of up to 20 times coefficients of about 1
             assert deviations[..., k] == pytest.approx(expected, rel=1e-12, abs=1e-9)
             assert state.deviation[..., k] == pytest.approx(alone[k].deviation, rel=1e-12, abs=1e-9)
+            widths = model.half_width(alone[k], values_of(stack, model, reading))
+            found = stack.half_widths(state, reading)[..., k]
+            assert found == pytest.approx(widths, rel=1e-12, nan_ok=True)
             beyond = alone[k].outside.any(axis=tuple(range(alone[k].outside.ndim - 1)))
             outside |= {i.name for i, out in zip(model.inputs, np.atleast_1d(beyond), strict=True) if out}
         assert stack.outside(state) == tuple(n for n in stack.inputs if n in outside)
@@ -191,3 +215,13 @@ def test_one_name_is_one_channel() -> None:
     )
     with pytest.raises(InputError, match=f"input {name}: temperature in degC for one model, spindle_speed in 1/min"):
         Stack([model, speed])
+
+
+def test_channels_of_one_machine_share_their_states() -> None:
+    rng = np.random.default_rng(5)
+    first = random_model(rng, 0)
+    while not isinstance(first, PacedDynamic) or first.support.policy != "clip" or len(first.inputs) < 2:
+        first = random_model(rng, 0)
+    other = replace(first, target="other", temperatures=tuple(replace(t, direct=9.0) for t in first.temperatures))
+    slower = replace(first, target="slower", states=tuple(replace(s, stopped=900.0) for s in first.states))
+    assert [g[0].tolist() for g in Stack([first, slower, other])._groups] == [[0, 2], [1]]

@@ -64,6 +64,10 @@ class Band:
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
+    def turning(self, change: FloatArray) -> NDArray[np.bool_]:
+        """Return whether the spindle turns in states of the inputs, (..., n_inputs)."""
+        return np.asarray((np.abs(change[..., self.speeds]) > STANDS).any(axis=-1))
+
     def half_width(self, change: FloatArray, spread: FloatArray) -> FloatArray:
         """Return the half-width for states of the inputs.
 
@@ -81,6 +85,5 @@ class Band:
         """
         factor: FloatArray | float = max(self.running, self.stopped)
         if self.speeds:
-            turning = (np.abs(change[..., self.speeds]) > STANDS).any(axis=-1)
-            factor = np.where(turning, self.running, self.stopped)
+            factor = np.where(self.turning(change), self.running, self.stopped)
         return np.asarray(factor * np.sqrt(self.floor**2 + spread**2))

@@ -196,17 +196,25 @@ class ErrorModel(ABC):
         reference = state.reference
         memory = state.memory
         if memory is None:
-            reference = np.where(np.isnan(reference), inputs, reference)
+            reference = self.settle(reference, inputs)
         change = inputs - reference
-        low, high = self._bounds
-        clipped = np.minimum(np.maximum(change, low), high)
-        outside = clipped != change
+        clipped, outside = self.clip(change)
         if memory is None:
             memory, dt = self._begin(clipped), 0.0
         memory, deviation = self._advance(memory, clipped, dt)
         if self.support.policy != "clip":
             deviation = self._supported(state.deviation, deviation, change, clipped)
         return State(reference, memory, deviation, outside), deviation
+
+    def settle(self, reference: FloatArray, inputs: FloatArray) -> FloatArray:
+        """Return the reference, (..., n_inputs), the first reading deciding where it is not known."""
+        return np.where(np.isnan(reference), inputs, reference)
+
+    def clip(self, change: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return inputs minus their reference within the trained range and its margin, and which were beyond."""
+        low, high = self._bounds
+        clipped = np.minimum(np.maximum(change, low), high)
+        return clipped, np.asarray(clipped != change)
 
     def distance(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return how far a reading is from what was trained, in all inputs together.
@@ -244,9 +252,8 @@ class ErrorModel(ABC):
         """
         if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
-        change = _bounded(inputs) - state.reference
-        low, high = self._bounds
-        return self.band.half_width(change, self._spread(state.memory, np.minimum(np.maximum(change, low), high)))
+        change, _ = self.clip(_bounded(inputs) - state.reference)
+        return self.band.half_width(change, self._spread(state.memory, change))
 
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray

@@ -11,8 +11,10 @@ from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import BoolArray, ErrorModel, FloatArray, State
+from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Term, TermTable, Variable
+from thermocomp.core.together import Together, TogetherState
 
 IndexArray = NDArray[np.intp]
 # an input as one model sees it: with that model's zero, bounds, margin and fading
@@ -26,6 +28,7 @@ class StackState(NamedTuple):
     memory: FloatArray | None  #: (..., n_lags); None before the first reading
     deviation: FloatArray  #: (..., n_models), last deviations given
     outside: BoolArray  #: (..., n_taps), inputs beyond the trained range
+    groups: tuple[TogetherState, ...]  #: of the paced models that share their states
     others: tuple[State, ...]  #: of the models that are stepped one by one
 
 
@@ -33,8 +36,8 @@ class Stack:
     """Several models behind one `init` and one `step`; each says what it says alone, to rounding.
 
     A `Polynomial` is a `LinearDynamic` without lags: models of the two families share one table of terms, one bank of
-    lags and one read-out, in which an input, variable or term that several of them use is evaluated once. The models of
-    the other families are stepped one by one.
+    lags and one read-out, in which an input, variable or term that several of them use is evaluated once. Each
+    `PacedDynamic` goes with those that have the same states. The models of the other families are stepped one by one.
 
     Parameters
     ----------
@@ -60,12 +63,27 @@ class Stack:
                 first = " in ".join(measured[i.name])
                 raise InputError(f"input {i.name}: {first} for one model, {i.quantity} in {i.unit} for another")
         self.inputs = tuple(measured)
-        self._others = [
-            (k, m, np.array([self.inputs.index(i.name) for i in m.inputs], dtype=np.intp))
-            for k, m in enumerate(self.models)
-            if not isinstance(m, Polynomial | LinearDynamic)
+        alike: dict[object, list[int]] = {}
+        for k, m in enumerate(self.models):
+            if isinstance(m, PacedDynamic) and (key := Together.key(m)) is not None:
+                alike.setdefault(key, []).append(k)
+        paced = [[m for k in group if isinstance(m := self.models[k], PacedDynamic)] for group in alike.values()]
+        self._groups = [
+            (np.array(group, dtype=np.intp), Together(members), self._places(members[0]))
+            for group, members in zip(alike.values(), paced, strict=True)
         ]
-        self._lay([(k, m) for k, m in enumerate(self.models) if isinstance(m, Polynomial | LinearDynamic)])
+        grouped = {k for group in alike.values() for k in group}
+        self._others = [
+            (k, m, self._places(m))
+            for k, m in enumerate(self.models)
+            if not isinstance(m, Polynomial | LinearDynamic) and k not in grouped
+        ]
+        linear = [(k, m) for k, m in enumerate(self.models) if isinstance(m, Polynomial | LinearDynamic)]
+        self._any_linear = bool(linear)
+        self._lay(linear)
+
+    def _places(self, model: ErrorModel) -> IndexArray:
+        return np.array([self.inputs.index(i.name) for i in model.inputs], dtype=np.intp)
 
     def _lay(self, linear: Sequence[tuple[int, Polynomial | LinearDynamic]]) -> None:
         """Lay the models of the two linear families beside each other."""
@@ -126,6 +144,7 @@ class Stack:
             None,
             np.zeros(len(self.models)),
             np.zeros(len(self._zero), dtype=np.bool_),
+            tuple(together.init() for _, together, _ in self._groups),
             tuple(m.init() for _, m, _ in self._others),
         )
 
@@ -154,6 +173,23 @@ class Stack:
         """
         if not np.isfinite(values).all() or not 0.0 <= dt < np.inf:
             raise ReadingError(f"inputs {values} of {', '.join(self.inputs)} or time step {dt} s not finite")
+        if self._any_linear or not self.models:
+            linear = self._step_linear(state, values, dt)
+            deviation = linear.deviation
+        else:
+            linear, deviation = state, np.empty((*values.shape[:-1], len(self.models)))
+        groups = []
+        for (members, together, columns), earlier in zip(self._groups, state.groups, strict=True):
+            later, deviation[..., members] = together.step(earlier, values[..., columns], dt)
+            groups.append(later)
+        others = []
+        for (k, model, columns), before in zip(self._others, state.others, strict=True):
+            after, deviation[..., k] = model.step(before, values[..., columns], dt)
+            others.append(after)
+        return linear._replace(deviation=deviation, groups=tuple(groups), others=tuple(others)), deviation
+
+    def _step_linear(self, state: StackState, values: FloatArray, dt: float) -> StackState:
+        """Step the models of the two linear families; the deviations of the others are their intercepts or zero."""
         seen, reference, memory = values[..., self._columns], state.reference, state.memory
         if memory is None:
             reference = np.where(np.isnan(reference), seen, reference)
@@ -178,19 +214,41 @@ class Stack:
                 last, now = state.deviation[..., models], deviation[..., models]
                 beyond = outside[..., taps].any(axis=-1) | ~(far[..., models] <= 1.0)
                 deviation[..., models] = np.where(beyond, last, now)
-        others = []
-        for (k, model, columns), before in zip(self._others, state.others, strict=True):
-            after, deviation[..., k] = model.step(before, values[..., columns], dt)
-            others.append(after)
-        return StackState(reference, memory, deviation, outside, tuple(others)), deviation
+        return StackState(reference, memory, deviation, outside, state.groups, state.others)
+
+    def half_widths(self, state: StackState, values: FloatArray) -> FloatArray:
+        """Return the half-widths of the bands about the deviations of a reading.
+
+        Parameters
+        ----------
+        state : StackState
+            After the step that took the reading in.
+        values : ndarray of shape (..., n_inputs)
+            The reading.
+
+        Returns
+        -------
+        ndarray of shape (..., n_models)
+            One per model [its unit]; nan for a model without a band.
+        """
+        found = np.full((*values.shape[:-1], len(self.models)), np.nan)
+        for (members, together, _), now in zip(self._groups, state.groups, strict=True):
+            found[..., members] = together.half_widths(now)
+        for (k, model, columns), s in zip(self._others, state.others, strict=True):
+            found[..., k] = model.half_width(s, values[..., columns])
+        return found
 
     def outside(self, state: StackState) -> tuple[str, ...]:
         """Return the names of the inputs that were outside the trained range of a model in the last step."""
         found = {
             name for name, out in zip(self._tap_names, np.moveaxis(state.outside, -1, 0), strict=True) if out.any()
         }
-        for (_, model, _), s in zip(self._others, state.others, strict=True):
-            found |= {i.name for i, out in zip(model.inputs, np.moveaxis(s.outside, -1, 0), strict=True) if out.any()}
+        ends: list[tuple[ErrorModel, BoolArray]] = [
+            (together.models[0], s.outside) for (_, together, _), s in zip(self._groups, state.groups, strict=True)
+        ]
+        ends += [(model, s.outside) for (_, model, _), s in zip(self._others, state.others, strict=True)]
+        for model, beyond in ends:
+            found |= {i.name for i, out in zip(model.inputs, np.moveaxis(beyond, -1, 0), strict=True) if out.any()}
         return tuple(name for name in self.inputs if name in found)
 
 
