@@ -19,6 +19,7 @@ LEVEL = 0.9
 CONFORMAL = 9
 #: least spread that is counted with, in units of its root mean square on the cycles left out
 FLOOR = 0.5
+_LEAST = 1e-6  # [unit], and of a size in units of that: nothing is divided by less
 
 
 def find_band(
@@ -33,7 +34,7 @@ def find_band(
 
     The error is taken in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and stop. A
     cycle errs as a whole, so n cycles say of that size what n independent numbers do: Student's t with n degrees of
-    freedom, and one cycle more to come. From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
+    freedom. From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
     come in any order: the quantile of the errors, each cycle counting the same and one more, unknown, beside them.
 
     Parameters
@@ -63,19 +64,18 @@ def find_band(
     n = len(rows)
     if n < 2:
         return None
-    tiny = float(np.finfo(np.float64).tiny)
-    floor = max(FLOOR * float(np.sqrt(np.mean([np.mean(spread[mine] ** 2) for mine in rows]))), tiny)
-    own = residual / np.sqrt(floor**2 + spread**2)
+    floor = max(FLOOR * float(np.sqrt(np.mean([np.mean(spread[mine] ** 2) for mine in rows]))), _LEAST)
+    own = residual / np.hypot(floor, spread)
     stopped, running = (_size(own, rows, phase) for phase in (~turning, turning))
     basis: Literal["assumption", "conformal"] = "conformal" if n >= CONFORMAL else "assumption"
     if basis == "conformal":
-        scores = np.abs(own) / np.maximum(np.where(turning, running, stopped), tiny)
+        scores = np.abs(own) / np.maximum(np.where(turning, running, stopped), _LEAST)
         weights = sum(mine / mine.sum() for mine in rows) / (n + 1)
         order = np.argsort(scores)
         place = int(np.searchsorted(np.cumsum(weights[order]), level - 1e-9))
         factor = float(scores[order][min(place, len(order) - 1)])
     else:
-        factor = float(stats.t.ppf(0.5 + level / 2, n) * np.sqrt(1 + 1 / n))
+        factor = float(stats.t.ppf(0.5 + level / 2, n))
     return Band(level, basis, n, floor, factor * running, factor * stopped, tuple(speeds))
 
 
