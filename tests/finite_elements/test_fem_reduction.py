@@ -131,6 +131,18 @@ def test_the_basis_is_orthonormal_in_the_capacity_and_holds_the_constant_field()
     assert reduced.stiffness([0.3]) @ reduced.one == pytest.approx(reduced.to_air([0.3])[:, 0])
 
 
+def test_observables_of_squared_temperatures_are_those_of_the_mesh() -> None:
+    model = small()
+    v = basis(model, 12, [{"nut": 10.0}, {"motor": 5.0}])
+    reduced = project(model, v, ("at@300", "at@600"))
+    assert reduced.squared == ("at@300", "at@600")
+    assert reduced.squares is not None
+    state = np.random.default_rng(1).normal(size=12)
+    for name, square in zip(reduced.squared, reduced.squares, strict=True):
+        assert state @ square @ state == pytest.approx(model.observables[name] @ (v @ state) ** 2)
+    assert project(model, v).squares is None is project(model, v).squared
+
+
 def test_a_reduced_screw_answers_like_the_full_one_the_better_the_larger() -> None:
     model = small()
     times = np.array([30.0, 300.0, 3000.0, 30000.0])
@@ -244,11 +256,17 @@ def test_the_spindle_is_much_faster_than_the_column(shipped: ReducedModel) -> No
     assert column > 120
 
 
-def test_the_tool_answers_like_its_full_model() -> None:
+@pytest.mark.parametrize("joints", [False, True])
+def test_the_tool_answers_like_its_full_model(joints: bool) -> None:
+    """Also where heat passes the joints beside their conductances, and surfaces lose more than by their films."""
     histories = []
-    for model in (tool(), ReducedModel.load("tool")):
+    given = {"heater": 30.0, "tip": 5.0, "surface": -3.0}
+    if joints:
+        given |= {"taper_a": -4.0, "taper_b": 4.0, "grip_a": 2.0, "grip_b": -2.0, "on_chuck": -1.0, "on_tool": -0.5}
+    for model in (tool(joints=joints), ReducedModel.load("tool_joints" if joints else "tool")):
         capacity, conduction, air = matrices(model, {})
-        heat = model.heat @ np.array([30.0, 5.0, -3.0]) + air @ np.array([22.0, 0.5, 0.0])
+        watts = np.array([given.get(name, 0.0) for name in model.inputs])
+        heat = model.heat @ watts + air @ np.array([22.0, 0.5, 0.0])
         fields = [REFERENCE_TEMPERATURE * model.one]
         for dt, count in ((2.0, 100), (60.0, 200)):
             fields += [s.temperatures for s in Stepper(capacity, conduction, dt).march(fields[-1], heat, count)]

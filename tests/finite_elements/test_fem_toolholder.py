@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 
 from finite_elements.materials import data
 from finite_elements.part import Part
-from finite_elements.revolution import Revolution
+from finite_elements.revolution import Revolution, with_joints
 from finite_elements.toolholder import toolholder
 from finite_elements.transient import Stepper
 
@@ -96,3 +96,16 @@ def test_a_mesh_of_half_the_size_says_the_same(part: Part) -> None:
             assert fine_found[name] == pytest.approx(coarse_found[name], abs=0.005 * greatest), name
         for name in part.observables:
             assert fine_found[name] == pytest.approx(coarse_found[name], rel=0.005), name
+
+
+def test_the_sides_of_named_joints_are_places(part: Part) -> None:
+    table = data("tool.toml")
+    joined = toolholder(with_joints(table))
+    assert set(joined.patches) - set(part.patches) == {"taper_a", "taper_b", "grip_a", "grip_b"}
+    # far from the tip's heat the chuck is the colder side; heat from behind comes from the shaft
+    conduction = csr_matrix(joined.conduction + sum(h * joined.surfaces[k].mass for k, h in table["film"].items()))
+    from_tip, from_behind = (spsolve(conduction.tocsc(), joined.patches[place]) for place in ("tip", "heater"))
+    assert joined.patches["grip_b"] @ from_tip > joined.patches["grip_a"] @ from_tip
+    assert joined.patches["taper_a"] @ from_behind > joined.patches["taper_b"] @ from_behind
+    assert "name" not in table["contact"][0]
+    assert part.patches.keys() == toolholder(table).patches.keys()

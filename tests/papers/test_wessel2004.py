@@ -65,8 +65,9 @@ def schedule(name: str, rows: int, pieces: int) -> FloatArray:
     return drawn[np.arange(rows) * pieces // rows]
 
 
-def stand_in(experiment: str, *, seed: int = 0) -> list[Recording]:
-    """Return the experiments of the study on the rod."""
+def stand_in(experiment: str, *, physics: str | None = None, seed: int = 0) -> list[Recording]:
+    """Return the experiments of the study on the rod, which has one physics."""
+    assert physics is None
 
     def rod(name: str, rows: int, pieces: int, n_t: int = 9, n_s: int = 3, room: float = 20.0) -> Recording:
         return heated_rod(name, schedule(f"{seed} {name}", rows, pieces), n_t=n_t, n_s=n_s, room=room)

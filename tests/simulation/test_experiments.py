@@ -131,7 +131,7 @@ def test_faults_befall_a_test() -> None:
 
 
 def test_a_seed_fixes_everything_on_every_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(experiments.MACHINES, "centre", FakeMachine)
+    monkeypatch.setitem(experiments.MACHINES, ("centre", "linear"), FakeMachine)
     plan = Plan(sampling=60.0, duration=3600.0, speed=1000.0, places=("usual",))
     experiment = Experiment(name="e", tests=(plan,))
     first, again, other = (next(iter(simulate(experiment, seed=s))) for s in (4, 4, 5))

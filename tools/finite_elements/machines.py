@@ -1,6 +1,8 @@
 """The machines of finite elements: their parts, what joins them, and what they do to the tool point."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,9 @@ from finite_elements.assembly import Assembly, Film, FullModel, Link, lump
 from finite_elements.bed import Bed
 from finite_elements.column import Column
 from finite_elements.materials import data, material
+from finite_elements.part import Part
 from finite_elements.reduction import basis, project, reduce
+from finite_elements.revolution import with_joints
 from finite_elements.screw import Screw
 from finite_elements.spindle import spindle
 from finite_elements.toolholder import toolholder
@@ -23,13 +27,22 @@ FloatArray = NDArray[np.float64]
 THETAS = ("rotation", "flow", "feed_x", "feed_y", "feed_z")
 
 
-def centre(table: dict[str, Any] | None = None) -> FullModel:
+#: joints of the spindle and of the tool whose sides the models with joints know
+JOINTS = {"centre": ("balls", "seat", "taper"), "tool": ("taper", "grip")}
+#: surfaces and lumps of the machining centre whose loss the model with joints corrects, and the work space it goes to
+EXPOSED = ("spindle.rotating", "spindle.front", "column.outside", "bed.outside")
+EXPOSED_LUMPS = ("headstock_front", "headstock_rear", "table", "x_bearing", "y_bearing", "z_bearing", "enclosure")
+
+
+def centre(table: dict[str, Any] | None = None, *, joints: bool = False) -> FullModel:
     """Return the full model of the machining centre.
 
     Parameters
     ----------
     table : dict, optional
         As ``data/centre.toml``, which is used without it.
+    joints : bool
+        With further inputs and places of the same names: the sides of `JOINTS`, the `EXPOSED` surfaces and lumps.
 
     Returns
     -------
@@ -51,12 +64,14 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
     lumps = table["lump"]
     parts = Assembly(
         [
-            spindle(),
-            column.part("column", material(table["column"]["material"]), STATIONS["y"]),
-            bed.part(
-                "bed",
-                material(table["bed"]["material"]),
-                {p: table["bed"]["bearing"] - screws["z"].distance(p) for p in STATIONS["z"]},
+            _with_means(spindle(with_joints(data("spindle.toml")))),
+            _with_means(column.part("column", material(table["column"]["material"]), STATIONS["y"])),
+            _with_means(
+                bed.part(
+                    "bed",
+                    material(table["bed"]["material"]),
+                    {p: table["bed"]["bearing"] - screws["z"].distance(p) for p in STATIONS["z"]},
+                )
             ),
             *(
                 screw.part(f"{axis}_screw", material(table["screw"][axis]["material"]), STATIONS[axis])
@@ -66,23 +81,30 @@ def centre(table: dict[str, Any] | None = None) -> FullModel:
         ]
     )
     hats = {f"{axis}_screw_{k}": f"{axis}_screw.hat_{k}" for axis in screws for k in range(N_HATS)}
+    more = {}
+    if joints:
+        more = {f"{joint}_{side}": f"spindle.{joint}_{side}" for joint in JOINTS["centre"] for side in "ab"}
+        more |= {name.replace(".", "_"): name.replace(".", ".on_") for name in EXPOSED}
+        more |= {name: name for name in EXPOSED_LUMPS}
     return parts.join(
         [Film(**f) for f in table["film"]] + [Film(f"{name}.air", values["air"]) for name, values in lumps.items()],
         [Link(a, b, value) for a, others in table["link"].items() for b, value in others.items()],
-        table["input"] | hats,
-        table["place"],
+        table["input"] | hats | more,
+        table["place"] | more,
         _observables(parts, table, column, foot - tool) | _components(parts, table, column, bed),
         THETAS,
     )
 
 
-def tool(table: dict[str, Any] | None = None) -> FullModel:
+def tool(table: dict[str, Any] | None = None, *, joints: bool = False) -> FullModel:
     """Return the full model of the resting tool (see `finite_elements.toolholder`).
 
     Parameters
     ----------
     table : dict, optional
         As ``data/tool.toml``, which is used without it.
+    joints : bool
+        With further inputs and places of the same names: the sides of `JOINTS`, and ``on_`` each surface.
 
     Returns
     -------
@@ -90,44 +112,74 @@ def tool(table: dict[str, Any] | None = None) -> FullModel:
         Without shares. Inputs and places are all patches, and ``surface``: all that stands in the room's air.
     """
     table = data("tool.toml") if table is None else table
-    part = toolholder(table)
+    part = _with_means(toolholder(with_joints(table))) if joints else toolholder(table)
     load = np.sum([part.surfaces[name].load for name in ("tool", "chuck", "shaft")], axis=0)
     part = replace(part, patches={**part.patches, "surface": load / load.sum()})
+    more = [f"{joint}_{side}" for joint in JOINTS["tool"] for side in "ab"] + [f"on_{name}" for name in table["film"]]
     places = {name: f"tool.{name}" for name in part.patches}
     parts = Assembly([part])
     return parts.join(
         [Film(f"tool.{surface}", coefficient) for surface, coefficient in table["film"].items()],
         [],
-        {name: places[name] for name in ("heater", "tip", "surface")},
+        {name: places[name] for name in ("heater", "tip", "surface", *(more if joints else ()))},
         places,
         {name: parts.observable("tool", name) for name in part.observables},
         (),
     )
 
 
-def reduced_centre() -> ReducedModel:
-    """Return the machining centre as it is shipped."""
+def reduced_centre(*, joints: bool = False) -> ReducedModel:
+    """Return the machining centre as it is shipped; with joints: for the one that is not linear."""
     settings = data("centre.toml")["reduction"]
     mixes = [
         {k: v for k, v in mix.items() if k != "screws"}
         | {f"{axis}_screw_{k}": mix["screws"] for axis in STATIONS for k in range(N_HATS) if "screws" in mix}
         for mix in settings["mix"]
     ]
-    full = centre()
+    full = centre(joints=joints)
     # The basis answers for what is measured at the test position; the components of the axes are sums of the same
     # displacements elsewhere, and take it as it is.
     main = replace(full, observables={name: row for name, row in full.observables.items() if name[0] != "E"})
-    return project(full, basis(main, settings["size"], mixes, settings["regime"]))
+    if not joints:
+        return project(full, basis(main, settings["size"], mixes, settings["regime"]))
+    more = settings["joints"]
+    exposed = [*(name.replace(".", "_") for name in EXPOSED), *EXPOSED_LUMPS]
+    v = basis(main, more["size"], mixes + _passing("centre", more, exposed), settings["regime"])
+    return project(full, v, ("nose", "tip"))
 
 
-def reduced_tool() -> ReducedModel:
-    """Return the resting tool as it is shipped."""
-    settings = data("tool.toml")["reduction"]
-    return reduce(tool(), settings["size"], settings["mix"], settings["regime"])
+def reduced_tool(*, joints: bool = False) -> ReducedModel:
+    """Return the resting tool as it is shipped; with joints: for the one that is not linear."""
+    table = data("tool.toml")
+    settings = table["reduction"]
+    full = tool(joints=joints)
+    if not joints:
+        return reduce(full, settings["size"], settings["mix"], settings["regime"])
+    more = settings["joints"]
+    mixes = settings["mix"] + _passing("tool", more, [f"on_{name}" for name in table["film"]])
+    return project(full, basis(full, more["size"], mixes, settings["regime"]), ("s1", "s2", "s3"))
 
 
 #: what makes each of the files in ``simulation/reduced``
-MODELS = {"centre": reduced_centre, "tool": reduced_tool}
+MODELS: dict[str, Callable[[], ReducedModel]] = {
+    "centre": reduced_centre,
+    "tool": reduced_tool,
+    "centre_joints": partial(reduced_centre, joints=True),
+    "tool_joints": partial(reduced_tool, joints=True),
+}
+
+
+def _passing(machine: str, settings: Mapping[str, float], exposed: Sequence[str]) -> list[dict[str, float]]:
+    """Return the usual heat that passes the joints of a machine, and that its surfaces lose beside their films [W]."""
+    passing = settings["passing"]
+    through = [{f"{joint}_a": -passing, f"{joint}_b": passing} for joint in JOINTS[machine]]
+    return through + [{name: settings["surface"]} for name in exposed]
+
+
+def _with_means(part: Part) -> Part:
+    """Return a part with the mean of each surface as a place, ``on_`` its name."""
+    means = {f"on_{name}": surface.load / surface.area for name, surface in part.surfaces.items()}
+    return replace(part, patches={**part.patches, **means})
 
 
 def dimensions(values: dict[str, Any]) -> dict[str, Any]:

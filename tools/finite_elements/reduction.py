@@ -108,9 +108,10 @@ def basis(
     return np.asarray(v)
 
 
-def project(full: FullModel, v: FloatArray) -> ReducedModel:
-    """Return the model in the basis V of shape (n, r), orthonormal in C."""
+def project(full: FullModel, v: FloatArray, squared: Sequence[str] = ()) -> ReducedModel:
+    """Return the model in the basis V of shape (n, r), orthonormal in C; some observables squared, too."""
     r = v.shape[1]
+    squares = np.array([_symmetric((v.T * full.observables[name]) @ v) for name in squared])
     return ReducedModel(
         conduction=_symmetric(v.T @ (full.conduction @ v)),
         conduction_theta=np.array([_symmetric(v.T @ (k @ v)) for k in full.conduction_theta.values()]).reshape(
@@ -126,13 +127,15 @@ def project(full: FullModel, v: FloatArray) -> ReducedModel:
         inputs=full.inputs,
         places=tuple(full.places),
         observables=tuple(full.observables),
+        squares=squares if squared else None,
+        squared=tuple(squared) or None,
     )
 
 
 def write(model: ReducedModel, path: Path) -> None:
     """Write a model as plain arrays; equal numbers make equal files."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        for name in (f.name for f in fields(model) if f.init):
+        for name in (f.name for f in fields(model) if f.init and getattr(model, f.name) is not None):
             # A fixed date: else every file would differ.
             with archive.open(zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), "w") as file:
                 value = np.ascontiguousarray(getattr(model, name))

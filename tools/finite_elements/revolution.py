@@ -33,8 +33,8 @@ class Revolution:
         ``size`` of the largest element [m]; ``height`` of the origin above the floor [m], and whether the axis is
         ``upright``; ``cuts`` where places end within blocks; lists ``block`` (see
         `finite_elements.blocks.Blocks`) and ``contact`` (``a``, ``b``, where, ``conductance`` [W/(m2 K)],
-        ``rotation``: what full speed adds to it, ``stiffness`` along r and z [N/m3]); mappings ``surface``,
-        ``patch``, ``support`` and ``observable``.
+        ``rotation``: what full speed adds to it, ``stiffness`` along r and z [N/m3]; ``name``: see `with_joints`);
+        mappings ``surface``, ``patch``, ``support`` and ``observable``.
 
     Attributes
     ----------
@@ -106,6 +106,13 @@ class Revolution:
         row = _rows(self, elastic)
         ties = [Tie(row(s), s.get("stiffness", np.inf)) for s in table["support"].values()]
         return elastic.observables({k: row(o) for k, o in table["observable"].items()}, ties, joints)
+
+
+def with_joints(table: Table) -> dict[str, Any]:
+    """Return a table in which both sides of every contact with a ``name`` are patches, ``name_a`` and ``name_b``."""
+    named = [c for c in table["contact"] if "name" in c]
+    sides = {f"{c['name']}_{s}": {"body": c[s], "r": c["r"], "z": c["z"]} for c in named for s in "ab"}
+    return {**table, "patch": {**table["patch"], **sides}}
 
 
 def _rows(revolution: Revolution, elastic: Elastic) -> Callable[[Table], FloatArray]:

@@ -20,6 +20,7 @@ from thermocomp.datasets import virtual
 from thermocomp.files import modelfile
 from thermocomp.files.mapping import Mapping
 from thermocomp.recording.recording import Recording
+from thermocomp.simulation.protocol import Physics
 
 DEFAULT_MODELS = ("ols", "partial-f", "mra", "dynamic", "averaged")
 SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
@@ -30,13 +31,21 @@ def _silent(_: str, steps: int = 1) -> None:
     """Say nothing."""
 
 
-def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | None = None) -> list[Recording]:
+def simulate(
+    experiment: str | Path = "demo",
+    *,
+    physics: Physics | None = None,
+    seed: int = 0,
+    noise: float | None = None,
+) -> list[Recording]:
     """Record an experiment on a virtual machine.
 
     Parameters
     ----------
     experiment : str or Path
         One that comes with the package, such as ``demo``, or a protocol of one's own (.toml).
+    physics : {'linear', 'nonlinear'}, optional
+        Of the machine; what the experiment says without it.
     seed : int
         Of weather and noise.
     noise : float, optional
@@ -59,7 +68,7 @@ def simulate(experiment: str | Path = "demo", *, seed: int = 0, noise: float | N
     >>> recording
     <Recording hwang: 37 rows, 6.0 h, 14 temperatures, 1 displacements, 4 thermal cycle(s)>
     """
-    return virtual.record(virtual.find_experiment(experiment), seed=seed, sensor_noise=noise)
+    return virtual.record(experiment, physics=physics, seed=seed, sensor_noise=noise)
 
 
 def compare(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from thermocomp.papers.study import Claim, Study, StudyTable
     from thermocomp.papers.study import Progress as Told
     from thermocomp.recording.recording import Recording
+    from thermocomp.simulation.protocol import Physics
 
 Name = Literal["chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017", "cross"]
 Names = Annotated[list[Name], Parameter(show_default=False)]
@@ -46,6 +47,7 @@ def papers(
     mapping: Path | None = None,
     target: list[str] | None = None,
     models: list[str] | None = None,
+    physics: Literal["linear", "nonlinear"] | None = None,
     seed: int = 0,
     repeats: int = 3,
     output: OptionalOutput = None,
@@ -68,6 +70,9 @@ def papers(
         Their displacements that cross judges; all of them if not given.
     models : list of str
         Methods of cross, or all; without it those that take seconds.
+    physics : {'linear', 'nonlinear'}
+        Of the virtual machine, for wessel2004: linear, or with joints, bearings and films that depend on temperature
+        and speed.
     seed : int
         Of the weather, the sensors' noise and what is drawn by lot.
     repeats : int
@@ -89,9 +94,13 @@ def papers(
         raise InputError(f"--seed {seed}: must not be negative")
     if repeats < 1:
         raise InputError(f"--repeats {repeats}: must be at least 1")
-    from thermocomp.papers.studies import STUDIES
+    from thermocomp.papers.studies import PHYSICS, STUDIES
 
     chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
+    for name in (n for n in chosen if physics and n not in PHYSICS):
+        raise InputError(
+            f"--physics is for {', '.join(PHYSICS)}, not for {name}: thermocomp papers {PHYSICS[0]} --physics {physics}"
+        )
     asked = {"--with": measured, "--mapping": mapping, "--target": target, "--models": models}
     for option in (o for o, value in asked.items() if value):
         if CROSS not in chosen:
@@ -109,7 +118,7 @@ def papers(
             run = (
                 partial(_cross, seed, tests=tests, models=models, targets=target)
                 if name == CROSS
-                else partial(_run, name, seed, repeats)
+                else partial(_run, name, seed, repeats, physics)
             )
             study = _tried(name, run, progress)
         done.append((study, time.perf_counter() - begin))
@@ -139,10 +148,10 @@ def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Stud
         return not_redone(name, explain(e))
 
 
-def _run(name: str, seed: int, repeats: int, progress: "Told") -> "Study":
+def _run(name: str, seed: int, repeats: int, physics: "Physics | None", progress: "Told") -> "Study":
     from thermocomp.papers import studies
 
-    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress)
+    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress, physics=physics)
 
 
 def _cross(

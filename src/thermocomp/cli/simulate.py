@@ -1,6 +1,6 @@
 """`thermocomp simulate`: an experiment on a virtual machine."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -19,6 +19,7 @@ def simulate(
     *,
     output: OptionalOutput = None,
     list_: Annotated[bool, Parameter(name="--list")] = False,
+    physics: Literal["linear", "nonlinear"] | None = None,
     seed: int = 0,
     noise: float | None = None,
     overwrite: bool = False,
@@ -38,6 +39,9 @@ def simulate(
         File to write (.parquet or .csv); an experiment of several tests gets one file per test.
     list_ : bool
         List the experiments and what they are.
+    physics : {'linear', 'nonlinear'}
+        Of the machine: joints, bearings and films by constant conductances, or as they depend on temperature and speed.
+        What the experiment says if not given.
     seed : int
         Of weather, noise, and what is drawn by lot.
     noise : float
@@ -70,7 +74,7 @@ def simulate(
     )
     refuse_existing(paths, overwrite)
     with show_steps(n_tests, hidden=json or quiet) as progress:
-        tests = virtual.record(found, seed=seed, sensor_noise=noise, progress=progress)
+        tests = virtual.record(found, physics=physics, seed=seed, sensor_noise=noise, progress=progress)
     for test, path in zip(tests, paths, strict=True):
         recordings.write(test, path, overwrite=overwrite)
     if not quiet:

@@ -1,6 +1,7 @@
 """Recordings of the virtual machines."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from thermocomp.files.protocols import read_protocol
 from thermocomp.recording.cycles import find_cycles, make_single_cycle
 from thermocomp.recording.recording import Recording
 from thermocomp.simulation.experiments import SimulatedTest, simulate
-from thermocomp.simulation.protocol import Experiment
+from thermocomp.simulation.protocol import Experiment, Physics
 from thermocomp.simulation.sensors import Fault
 
 _FOLDER = Path(__file__).parent / "protocols"
@@ -60,6 +61,7 @@ def find_experiment(experiment: str | Path) -> Experiment:
 def record(
     experiment: str | Path | Experiment,
     *,
+    physics: Physics | None = None,
     seed: int = 0,
     sensor_noise: float | None = None,
     faults: Sequence[Fault] = (),
@@ -71,6 +73,8 @@ def record(
     ----------
     experiment : str, Path or Experiment
         See `find_experiment`.
+    physics : {'linear', 'nonlinear'}, optional
+        Of the machine; what the experiment says if not given. See :doc:`/virtual_machine`.
     seed : int
         Of weather, noise, and what is drawn by lot; the machine and its sensors stay the same ones.
     sensor_noise : float, optional
@@ -88,9 +92,11 @@ def record(
     Raises
     ------
     InputError
-        There is no such experiment, or the file cannot be used.
+        There is no such experiment or physics, or the file cannot be used.
     """
     found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
+    if physics is not None:
+        found = replace(found, physics=physics)
     recordings = []
     for test in simulate(found, seed=seed, sensor_noise=sensor_noise, faults=faults):
         recordings.append(make_recording(test))

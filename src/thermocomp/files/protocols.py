@@ -28,7 +28,7 @@ TIMES = ("sampling", "duration", "every", "start", "end", "memory", "begin")
 SWITCHES = ("perfect", "cooled", "powered")
 TEXTS = ("description", "name", *TIMES)
 #: keys of the whole file; all others belong to the tests
-_OF_ALL = ("description", "machine", "tests")
+_OF_ALL = ("description", "machine", "physics", "tests")
 #: what stands under a key; numbers that are drawn by lot stand under any other
 _TABLES: dict[str, type] = {
     "tests": Plan,
@@ -126,7 +126,7 @@ def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
     tests = content.get("tests", [{}])
     if not isinstance(tests, list) or not all(isinstance(t, dict) for t in tests):
         raise SettingError("must be tables: [[tests]]", ("tests",))
-    head = {key: content[key] for key in ("description", "machine") if key in content}
+    head = {key: content[key] for key in _OF_ALL if key in content}
     return head | {"tests": [_table({**shared, **test}, ("tests", k)) for k, test in enumerate(tests)]}
 
 

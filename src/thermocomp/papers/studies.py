@@ -5,14 +5,17 @@ from dataclasses import replace
 from importlib import import_module
 
 from thermocomp.papers.study import Claim, Progress, Study, tell_nobody
+from thermocomp.simulation.protocol import Physics
 
 #: each is a package beside this module, with ``redo.run(seed, progress) -> Study``
 STUDIES = ("chen1996", "wessel2004", "hwang", "precompensation", "stepwise2017")
+#: those that also run on the nonlinear machines
+PHYSICS = ("wessel2004",)
 #: between the seeds of a study's repeated runs
 APART = 100
 
 
-def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody) -> Study:
+def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody, physics: Physics | None = None) -> Study:
     """Redo a paper's study on the virtual machine.
 
     Parameters
@@ -23,16 +26,26 @@ def run(name: str, *, seed: int = 0, progress: Progress = tell_nobody) -> Study:
         Of weather, noise and what is drawn by lot.
     progress : callable
         Told the share done and what comes next.
+    physics : {'linear', 'nonlinear'}, optional
+        Of the virtual machine, in `PHYSICS`; what the experiments say if not given.
 
     Returns
     -------
     Study
     """
-    study: Study = import_module(f"thermocomp.papers.{name}.redo").run(seed, progress)
+    options = {"physics": physics} if physics else {}
+    study: Study = import_module(f"thermocomp.papers.{name}.redo").run(seed, progress, **options)
     return study
 
 
-def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = tell_nobody) -> Study:
+def repeat(
+    name: str,
+    *,
+    seed: int = 0,
+    repeats: int = 3,
+    progress: Progress = tell_nobody,
+    physics: Physics | None = None,
+) -> Study:
     """Redo a study several times, each with a weather, a noise and lots of its own.
 
     Parameters
@@ -45,6 +58,8 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = t
         Number of runs.
     progress : callable
         Told the share done and what comes next.
+    physics : {'linear', 'nonlinear'}, optional
+        See `run`.
 
     Returns
     -------
@@ -55,7 +70,12 @@ def repeat(name: str, *, seed: int = 0, repeats: int = 3, progress: Progress = t
     for k in range(repeats):
         word = f"run {k + 1} of {repeats}, " if repeats > 1 else ""
         found.append(
-            run(name, seed=seed + APART * k, progress=lambda done, text: progress((k + done) / repeats, word + text))  # noqa: B023
+            run(
+                name,
+                seed=seed + APART * k,
+                progress=lambda done, text: progress((k + done) / repeats, word + text),  # noqa: B023
+                physics=physics,
+            )
         )
     return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
 

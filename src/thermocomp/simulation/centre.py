@@ -1,7 +1,7 @@
 """A virtual horizontal machining centre: reduced finite elements, friction, a chiller, joints."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
@@ -12,9 +12,11 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.simulation.heat import HeatSources
 from thermocomp.simulation.joints import Joints, slide_with_friction
 from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
 
 FloatArray = NDArray[np.float64]
+#: changes the state after a step of a drive, told what was watched before it and the air
+Correction = Callable[[FloatArray, list[float], FloatArray], object]
 
 #: places that friction and thermostat look at after every step
 _WATCHED = ("front_bearing", "rear_bearing", "shaft", "front_seat", "coolant", "bed_front")
@@ -127,33 +129,35 @@ class MachiningCentre:
     ) -> bool:
         """Fill in the fields after each step of one drive; return whether the chiller runs at the end."""
         self._check(drive)
-        heat, ratio = self.heat, abs(drive.speed) / self.heat.top_speed
-        operators = self.model.operators(self._theta(drive), dt, _WATCHED)
+        heat = self.heat
+        operators = self.model.operators(self._theta(drive), dt, self._watched)
+        correct = self._correction(operators, drive)
         flow = drive.cooled and drive.powered
         forcing = air @ operators.air.T + operators.heat @ self._given(drive)
         variable = operators.heat[:, [self.model.inputs.index(n) for n in _FRICTION]]
-        front, rear, shaft, seat, coolant, bed = (self.model.rows(_WATCHED) @ now).tolist()
+        seen = (self.model.rows(self._watched) @ now).tolist()
         n = len(now)
         power = np.zeros(len(_FRICTION))
-        turning = ratio > 0 and drive.powered
+        turning = drive.speed != 0 and drive.powered
         for k in range(len(fields)):
             if turning:
-                power[0] = heat.front.heat(ratio, front, shaft - seat)
-                power[1] = heat.rear.heat(ratio, rear, 0.0)  # it floats on springs
+                power[0], power[1] = self._friction(drive, seen)
             power[2] = -heat.chiller if flow and chilling else 0.0
             after = operators.state @ now
             after += forcing[k]
             after += variable @ power
+            if correct:
+                correct(after, seen, air[k])
             if flow:
                 end = after[n:].tolist()
-                share = heat.until_switch(chilling, coolant - bed, end[4] - end[5])
+                share = heat.until_switch(chilling, seen[4] - seen[5], end[4] - end[5])
                 if share < 1.0:
                     # The chiller runs a part of the step: without it the times of switching, and the step's length,
                     # would matter.
                     change = heat.chiller * (1.0 - share)
                     after += variable[:, 2] * (change if chilling else -change)
                     chilling = not chilling
-            front, rear, shaft, seat, coolant, bed = after[n:].tolist()
+            seen = after[n:].tolist()
             fields[k] = now = after[:n]
         return chilling and flow
 
@@ -164,13 +168,32 @@ class MachiningCentre:
         index = {name: k for k, name in enumerate(self.observables)}
         wish = observables[:, index["slide"]]
         slide = slide_with_friction(slid, wish, self.joints.stiction)
-        shaft = self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
+        shaft = self._shaft(place, ratio)
         # What the foot does not slide, the column is pushed.
         observables[:, index["z"]] += self.joints.share * (slide - wish) - shaft
         observables[:, index["y"]] += self.joints.lift * ratio**2
         observables[:, [index["nose"], index["tip"]]] += shaft[:, None]
         observables[:, index["slide"]] = slide
         return Truth(temperatures, observables), float(slide[-1])
+
+    @property
+    def _watched(self) -> tuple[str, ...]:
+        """Places looked at after every step; those of `_WATCHED` first."""
+        return _WATCHED
+
+    def _friction(self, drive: Drive, seen: list[float]) -> tuple[float, float]:
+        """Heat of the front and of the rear bearing, which floats on springs, at the temperatures watched [W]."""
+        front, rear, shaft, seat = seen[:4]
+        ratio = abs(drive.speed) / self.heat.top_speed
+        return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
+
+    def _correction(self, _operators: Operators, _drive: Drive) -> Correction | None:
+        """Return what changes the state after a step beside the reduced model: nothing."""
+        return None
+
+    def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:
+        """Shift of the shaft towards the workpiece [um]."""
+        return self.joints.shaft(place["shaft"] - place["front_seat"], ratio)
 
     def _theta(self, drive: Drive) -> tuple[float, ...]:
         """Return what decides the conductances, in steps of a 64th: nobody knows them better."""

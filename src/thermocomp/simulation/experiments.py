@@ -14,7 +14,8 @@ from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.instruments import Instrument
 from thermocomp.simulation.kits import Kit
 from thermocomp.simulation.machine import Truth, VirtualMachine
-from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Programme, make_seed
+from thermocomp.simulation.nonlinear import NonlinearCentre, NonlinearTool
+from thermocomp.simulation.protocol import FEED, SPEED, Experiment, Physics, Programme, make_seed
 from thermocomp.simulation.sensors import Fault, apply_lags, read, with_faults
 from thermocomp.simulation.toolsystem import RestingTool
 
@@ -27,8 +28,13 @@ LONGEST_TICK = 20.0
 BLOCK = 4096
 #: quantities that count from the first row
 MOVEMENTS = ("displacement", "angle")
-#: by the names that protocols use
-MACHINES: dict[str, Callable[[], VirtualMachine[Any]]] = {"centre": MachiningCentre, "tool": RestingTool}
+#: by the names that protocols use for machine and physics
+MACHINES: dict[tuple[str, Physics], Callable[[], VirtualMachine[Any]]] = {
+    ("centre", "linear"): MachiningCentre,
+    ("tool", "linear"): RestingTool,
+    ("centre", "nonlinear"): NonlinearCentre,
+    ("tool", "nonlinear"): NonlinearTool,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,7 @@ def simulate(
         raise InputError(f"seed {seed}: must not be negative")
     if sensor_noise is not None and not (sensor_noise >= 0 and np.isfinite(sensor_noise)):
         raise InputError(f"sensor noise {sensor_noise} degC: must be finite and not negative")
-    machine = MACHINES[experiment.machine]()
+    machine = MACHINES[experiment.machine, experiment.physics]()
 
     def test(programme: Programme) -> SimulatedTest:
         weather, noise = (np.random.default_rng(make_seed(seed, programme.name, what)) for what in ("weather", "noise"))

@@ -45,7 +45,7 @@ class Joints:
         return result
 
 
-def slide_with_friction(slid: float, wish: FloatArray, stiction: float) -> FloatArray:
+def slide_with_friction(slid: float, wish: FloatArray, stiction: float | FloatArray) -> FloatArray:
     """Return how far a part has slid that follows its wish, but for the friction that holds it.
 
     Parameters
@@ -54,7 +54,7 @@ def slide_with_friction(slid: float, wish: FloatArray, stiction: float) -> Float
         Before the first step [um].
     wish : ndarray of shape (n_steps,)
         Where it would be if nothing held it [um].
-    stiction : float
+    stiction : float, or ndarray of shape (n_steps,)
         How far it may want to slide before it does [um].
 
     Returns

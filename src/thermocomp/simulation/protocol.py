@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -25,6 +26,8 @@ SPEED = Channel("spindle_rpm", "spindle_speed", "1/min", "spindle")
 FEED = Channel("feed_mm_min", "feed", "mm/min", "of the axes, along the path")
 
 
+#: how the machine is modelled: heat and joints by constant conductances, or as they depend on temperature and speed
+Physics = Literal["linear", "nonlinear"]
 #: what a protocol may ask for; more is a mistake, or would take for ever
 MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
@@ -200,16 +203,21 @@ class Experiment:
         One line.
     machine : str
         A key of `thermocomp.simulation.kits.KITS`: the machining ``centre``, or the resting ``tool``.
+    physics : {'linear', 'nonlinear'}
+        See `thermocomp.simulation.nonlinear`.
     """
 
     name: str
     tests: tuple[Plan, ...]
     description: str = ""
     machine: str = "centre"
+    physics: Physics = "linear"
 
     def __post_init__(self) -> None:
         if self.machine not in KITS:
             raise explain_unknown("machine", self.machine, KITS, ("machine",))
+        if self.physics not in get_args(Physics):
+            raise explain_unknown("physics", self.physics, get_args(Physics), ("physics",))
         if not self.tests:
             raise SettingError("an experiment needs a test", ("tests",))
         for k, plan in enumerate(self.tests):

@@ -60,6 +60,11 @@ class ReducedModel:
         The state of a machine that is at 1 degC everywhere.
     theta, inputs, places, observables : tuple of str
         Names.
+    squares : ndarray of shape (n_squared, n_states, n_states), optional
+        ``d @ square @ d`` with ``d = z - 20 one`` is what an observable would be of the squared temperatures [um K]:
+        for materials whose expansion grows as they warm.
+    squared : tuple of str, optional
+        The observables it is known of.
     """
 
     conduction: FloatArray
@@ -74,6 +79,8 @@ class ReducedModel:
     inputs: tuple[str, ...]
     places: tuple[str, ...]
     observables: tuple[str, ...]
+    squares: FloatArray | None = None
+    squared: tuple[str, ...] | None = None
     _kept: dict[tuple[tuple[float, ...], float, tuple[str, ...]], Operators] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -83,16 +90,16 @@ class ReducedModel:
 
     @classmethod
     def load(cls, name: str) -> "ReducedModel":
-        """Return the numbers shipped under a name: ``centre`` or ``tool``."""
+        """Return the numbers shipped under a name: ``centre`` or ``tool``, or either with ``_joints``."""
         with as_file(files("thermocomp.simulation") / "reduced" / f"{name}.npz") as path:
             return cls.read(path)
 
     @classmethod
     def read(cls, path: Path) -> "ReducedModel":
         """Read a file of plain arrays; the keys are those of the parameters."""
-        names = ("theta", "inputs", "places", "observables")
+        names = ("theta", "inputs", "places", "observables", "squared")
         with np.load(path, allow_pickle=False) as data:
-            texts = {k: tuple(str(n) for n in data[k]) for k in names}
+            texts = {k: tuple(str(n) for n in data[k]) for k in names if k in data.files}
             # a dict of both kinds: the dataclass's own types decide what is what
             values: dict[str, Any] = {k: data[k] for k in data.files if k not in names} | texts
         return cls(**values)

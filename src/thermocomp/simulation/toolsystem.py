@@ -13,6 +13,8 @@ from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
+#: where heat can be put in
+LOADS = ("heater", "tip")
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +135,7 @@ class RestingTool:
             raise InputError("the resting tool cannot turn or move: its protocol takes loads only")
         given = np.zeros(len(self.model.inputs))
         for place, load in drive.loads.items():
-            if place not in self.model.inputs or place == "surface":
-                known = [name for name in self.model.inputs if name != "surface"]
-                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(known)}")
+            if place not in LOADS:
+                raise InputError(f"no heat can be put in at {place!r} but at {', '.join(LOADS)}")
             given[self.model.inputs.index(place)] = load if drive.powered else 0.0
         return given

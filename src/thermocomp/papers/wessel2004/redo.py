@@ -10,11 +10,12 @@ from thermocomp.papers.study import Progress, Study
 from thermocomp.papers.wessel2004.sets import appendix_b, told
 from thermocomp.papers.wessel2004.spindle import spindle
 from thermocomp.papers.wessel2004.tools import milling_machine, resting_tool
+from thermocomp.simulation.protocol import Physics
 
 TITLE = "Wessel et al. 2004: Predicting thermal displacements in modular tool systems"
 
 
-def run(seed: int, progress: Progress) -> Study:
+def run(seed: int, progress: Progress, physics: Physics | None = None) -> Study:
     """Redo the study on the virtual machines.
 
     Parameters
@@ -23,6 +24,8 @@ def run(seed: int, progress: Progress) -> Study:
         Of weather and noise.
     progress : callable
         Told the share done and what comes next.
+    physics : {'linear', 'nonlinear'}, optional
+        Of the virtual machines; what the experiments say if not given.
 
     Returns
     -------
@@ -32,9 +35,10 @@ def run(seed: int, progress: Progress) -> Study:
     def within(begin: float, end: float) -> Progress:
         return lambda done, what: progress(begin + done * (end - begin), what)
 
-    fem = spindle(seed, within(0.0, 0.03))
-    selection = appendix_b(seed, within(0.03, 0.5))
-    tool = resting_tool(seed, within(0.5, 0.93), selection)
-    milling = milling_machine(seed, within(0.93, 1.0))
+    fem = spindle(seed, within(0.0, 0.03), physics)
+    selection = appendix_b(seed, within(0.03, 0.5), physics)
+    tool = resting_tool(seed, within(0.5, 0.93), selection, physics)
+    milling = milling_machine(seed, within(0.93, 1.0), physics)
     progress(1.0, "done")
-    return Study.of("wessel2004", TITLE, fem, told(selection), tool, milling)
+    title = TITLE if physics in (None, "linear") else f"{TITLE}; {physics} virtual machines"
+    return Study.of("wessel2004", title, fem, told(selection), tool, milling)

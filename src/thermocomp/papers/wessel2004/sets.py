@@ -16,6 +16,7 @@ from thermocomp.models.selection.maximal_correlation import (
     subsets_up_to,
 )
 from thermocomp.papers.study import Claims, FloatArray, Ours, Part, Progress, StudyTable
+from thermocomp.simulation.protocol import Physics
 
 #: sets of nine temperatures, models of all and of at most three, and the data sets behind them (W-10)
 PAPER_SETS, PAPER_MODELS, PAPER_SMALL_SETS = 511, 35_259, 129
@@ -80,20 +81,21 @@ class Selection:
         return sets * len(self.rows) * len(self.psi.psi)
 
 
-def appendix_b(seed: int, progress: Progress) -> Selection:
+def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) -> Selection:
     """Redo Appendix B (W-10 to W-12).
 
     Parameters
     ----------
     seed : int
     progress : callable
+    physics : {'linear', 'nonlinear'}, optional
 
     Returns
     -------
     Selection
     """
     progress(0.0, "23 data sets on the resting tool")
-    recordings = record("wessel-sets", seed=seed)
+    recordings = record("wessel-sets", physics=physics, seed=seed)
     data = [DataSet(r.name, r.values(r.temperatures), r.values(r.displacements)) for r in recordings]
     every = subsets_up_to(len(recordings[0].temperatures))
     sets, larger = [s for s in every if len(s) <= MOST], [s for s in every if len(s) > MOST]

@@ -24,6 +24,7 @@ from thermocomp.papers.wessel2004.trial import (
     trial,
 )
 from thermocomp.recording.recording import Recording
+from thermocomp.simulation.protocol import Physics
 
 #: maximal correlation of the reference series, its rows and their interval [s] (W-06)
 PAPER_PSI, PAPER_ROWS, PAPER_INTERVAL = 0.9994, 199, 100.0
@@ -75,20 +76,21 @@ class Spindle:
         return {k: (rms(measured - e), rms(e - estimates[2])) for k, e in estimates.items()}
 
 
-def spindle(seed: int, progress: Progress) -> Part:
+def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
     """Redo section III (W-01 to W-07).
 
     Parameters
     ----------
     seed : int
     progress : callable
+    physics : {'linear', 'nonlinear'}, optional
 
     Returns
     -------
     Part
     """
     progress(0.0, "finite-element spindle")
-    recordings = record("wessel-fem", seed=seed)
+    recordings = record("wessel-fem", physics=physics, seed=seed)
     target = len(recordings[0].displacements) - 1  # S4, at the front tip of the tool
     temperatures = range(len(recordings[0].temperatures))
     found = trial(recordings, target, temperatures)

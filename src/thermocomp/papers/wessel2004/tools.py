@@ -27,6 +27,7 @@ from thermocomp.papers.wessel2004.trial import (
     trial,
 )
 from thermocomp.recording.recording import Recording
+from thermocomp.simulation.protocol import Physics
 
 #: RMS in the independent test by multiple linear regression and by ACE: resting tool, milling machine [um] (W-08, W-09)
 PAPER_TOOL, PAPER_MILLING = (5.7, 1.0), (5.0, 2.2)
@@ -71,7 +72,7 @@ class Resting:
         return sorted(self.by_set, key=lambda s: self.by_set[s])
 
 
-def resting_tool(seed: int, progress: Progress, selection: Selection) -> Part:
+def resting_tool(seed: int, progress: Progress, selection: Selection, physics: Physics | None = None) -> Part:
     """Redo section IV (W-08).
 
     Parameters
@@ -80,13 +81,14 @@ def resting_tool(seed: int, progress: Progress, selection: Selection) -> Part:
     progress : callable
     selection : Selection
         Of Appendix B; the paper's own set is looked at beside.
+    physics : {'linear', 'nonlinear'}, optional
 
     Returns
     -------
     Part
     """
     progress(0.0, "resting tool")
-    recordings = record("wessel-tool", seed=seed)
+    recordings = record("wessel-tool", physics=physics, seed=seed)
     paper, own = (trial(recordings, 0, chosen) for chosen in (PAPERS_OWN, selection.chosen))
     progress(0.5, "every set of temperatures on the test")
     r = Resting(paper, own, selection, _by_set(recordings, selection.small.subsets))
@@ -102,20 +104,21 @@ def resting_tool(seed: int, progress: Progress, selection: Selection) -> Part:
     return Part(resting(r), tables, _tool_figures(recordings, r), numbers)
 
 
-def milling_machine(seed: int, progress: Progress) -> Part:
+def milling_machine(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
     """Redo section V (W-09): four days are learned, the fifth is estimated.
 
     Parameters
     ----------
     seed : int
     progress : callable
+    physics : {'linear', 'nonlinear'}, optional
 
     Returns
     -------
     Part
     """
     progress(0.0, "milling machine, five days")
-    recordings = record("wessel-milling", seed=seed)
+    recordings = record("wessel-milling", physics=physics, seed=seed)
     found = trial(recordings, 0, range(len(recordings[0].temperatures)))
     tables = (found.table(f"Milling machine: {found.target} on the fifth day"),)
     numbers = found.numbers("milling") | found.rms_by_method("milling")

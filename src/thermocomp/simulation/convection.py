@@ -1,0 +1,123 @@
+"""What surfaces lose to the air, as it depends on temperature and speed: free and rotating convection, radiation.
+
+References
+----------
+S. W. Churchill and H. H. S. Chu, Correlating equations for laminar and turbulent free convection from a vertical plate,
+Int. J. Heat Mass Transfer 18 (1975) 1323; from a horizontal cylinder, 18 (1975) 1049. T. Fujii and H. Uehara, Laminar
+natural-convective heat transfer from the outer surface of a vertical cylinder, 13 (1970) 607. K. M. Becker,
+Measurements of convective heat transfer from a horizontal cylinder rotating in a tank of water, 6 (1963) 1053. S. W.
+Churchill, A comprehensive correlating equation for laminar, assisting, forced and free convection, AIChE J. 23 (1977)
+10. F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Tables A.4 (air) and A.11 (emissivity).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+GRAVITY, STEFAN_BOLTZMANN, KELVIN = 9.81, 5.670e-8, 273.15
+
+
+@dataclass(frozen=True)
+class Face:
+    """A surface in air.
+
+    Parameters
+    ----------
+    area : float
+        [m2]
+    length : float
+        Its height, or the diameter of a cylinder that lies [m].
+    films : float
+        What the linear model has in its place [W/(m2 K)].
+    emissivity : float
+    curvature : float
+        Length over diameter of a cylinder that stands; 0: flat.
+    lying : bool
+        A cylinder with a horizontal axis, which may turn.
+    wind : float
+        Forced convection at top speed by what turns beside it, with its power 2/3 [W/(m2 K)].
+    films_turning : float
+        What the linear model adds to `films` at top speed [W/(m2 K)].
+    """
+
+    area: float
+    length: float
+    films: float
+    emissivity: float
+    curvature: float = 0.0
+    lying: bool = False
+    wind: float = 0.0
+    films_turning: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Several surfaces at once; each field of `Face` is an array of shape (n,)."""
+
+    area: FloatArray
+    length: FloatArray
+    films: FloatArray
+    emissivity: FloatArray
+    curvature: FloatArray
+    lying: FloatArray
+    wind: FloatArray
+    films_turning: FloatArray
+
+    @classmethod
+    def of(cls, faces: Sequence[Face]) -> "Faces":
+        """Put surfaces together."""
+        return cls(**{f.name: np.array([float(getattr(face, f.name)) for face in faces]) for f in fields(Face)})
+
+    def linear(self, rotation: float) -> FloatArray:
+        """Return the conductances of the linear model [W/K], with a share of its rotating convection in force."""
+        return self.area * (self.films + self.films_turning * rotation)
+
+    def conductance(self, surface: ArrayLike, air: ArrayLike, speed: float = 0.0, wind: float = 0.0) -> FloatArray:
+        """Return the conductances [W/K].
+
+        Parameters
+        ----------
+        surface, air : ndarray of shape (n,)
+            Temperatures [degC].
+        speed : float
+            Of what lies and turns [1/min].
+        wind : float
+            Share of `Face.wind` in force.
+        """
+        hot, cold = (np.asarray(t, dtype=np.float64) + KELVIN for t in (surface, air))
+        film = (hot + cold) / 2.0
+        conductivity, viscosity, prandtl = air_at(film)
+        grashof = GRAVITY * np.abs(hot - cold) / film * self.length**3 / viscosity**2
+        nusselt = free_convection(grashof * prandtl, prandtl, self.lying) + 0.435 * self.curvature
+        if speed:
+            reynolds = self.lying * np.pi * abs(speed) / 60.0 * self.length**2 / viscosity
+            nusselt = np.cbrt(nusselt**3 + rotating_convection(reynolds, prandtl) ** 3)
+        radiation = self.emissivity * STEFAN_BOLTZMANN * (hot**2 + cold**2) * (hot + cold)
+        result: FloatArray = self.area * (conductivity / self.length * nusselt + radiation + self.wind * wind)
+        return result
+
+
+def air_at(temperature: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return conductivity [W/(m K)], kinematic viscosity [m2/s] and Prandtl number of air at a temperature [K].
+
+    A straight line through Incropera's values at 300 and 350 K.
+    """
+    share = (temperature - 300.0) / 50.0
+    return 26.3e-3 + 3.7e-3 * share, 15.89e-6 + 5.03e-6 * share, 0.707 - 0.007 * share
+
+
+def free_convection(rayleigh: FloatArray, prandtl: FloatArray, lying: FloatArray) -> FloatArray:
+    """Return the Nusselt numbers of vertical plates, and of cylinders that lie (Churchill and Chu 1975)."""
+    base, inner = np.where(lying > 0, 0.60, 0.825), np.where(lying > 0, 0.559, 0.492)
+    result: FloatArray = (base + 0.387 * rayleigh ** (1 / 6) / (1.0 + (inner / prandtl) ** (9 / 16)) ** (8 / 27)) ** 2
+    return result
+
+
+def rotating_convection(reynolds: FloatArray, prandtl: FloatArray) -> FloatArray:
+    """Return the Nusselt numbers of turning cylinders, with Re = u D / nu (Becker 1963)."""
+    result: FloatArray = 0.133 * reynolds ** (2 / 3) * np.cbrt(prandtl)
+    return result

@@ -1,0 +1,387 @@
+"""The nonlinear machines: the linear ones in the limit, energy, fixed points, and what opens and closes in them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.datasets.virtual import EXPERIMENTS, record
+from thermocomp.simulation.centre import CentreState, MachiningCentre
+from thermocomp.simulation.convection import Face, Faces
+from thermocomp.simulation.machine import Air, Drive, Truth
+from thermocomp.simulation.nonlinear import CENTRE_FACES, SEAT, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
+from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+from thermocomp.simulation.toolsystem import RestingTool, ToolState
+
+FloatArray = NDArray[np.float64]
+AIR = Air(22.0)
+HOUR = 3600.0
+LINEAR_TOOL: dict[str, Any] = {"faces": {}, "taper": None, "grip": None, "expansion_grows": 0.0}
+LINEAR_CENTRE: dict[str, Any] = LINEAR_TOOL | {"seat": None, "front": None, "rear": None}
+del LINEAR_CENTRE["grip"]
+HEATED = Drive(loads={"heater": 60.0, "tip": 5.0})
+
+
+@pytest.fixture(scope="module")
+def tool() -> NonlinearTool:
+    return NonlinearTool()
+
+
+@pytest.fixture(scope="module")
+def centre() -> NonlinearCentre:
+    return NonlinearCentre()
+
+
+def steps(n: int, air: Air = AIR) -> FloatArray:
+    return np.tile(air.values, (n, 1))
+
+
+def at(machine: RestingTool | MachiningCentre, truth: Truth, name: str) -> FloatArray:
+    if name in machine.places:
+        return truth.temperatures[:, machine.places.index(name)]
+    return truth.observables[:, machine.observables.index(name)]
+
+
+# -- limits --------------------------------------------------------------------------------------------------------
+
+
+def test_without_all_that_is_nonlinear_the_tool_is_the_linear_one() -> None:
+    model = ReducedModel.load("tool_joints")
+    machine = NonlinearTool(model=model, **LINEAR_TOOL)
+    linear = RestingTool(model=model, convection=0.0, stiction=0.0)
+    drives = [HEATED] * 200 + [Drive()] * 100
+    found, known = (m.run(m.init(AIR), drives, steps(300), 30.0)[1] for m in (machine, linear))
+    np.testing.assert_allclose(found.temperatures, known.temperatures, atol=1e-9)
+    np.testing.assert_allclose(found.observables, known.observables, atol=1e-9)
+
+
+def test_without_all_that_is_nonlinear_the_centre_is_the_linear_one() -> None:
+    model = ReducedModel.load("centre_joints")
+    drives = [Drive(2600.0, (500.0, 500.0, 0.0))] * 200 + [Drive(1000.0, cooled=False)] * 50 + [Drive()] * 100
+    machines = (NonlinearCentre(model=model, **LINEAR_CENTRE), MachiningCentre(model=model))
+    found, known = (m.run(m.init(AIR), drives, steps(350), 30.0)[1] for m in machines)
+    np.testing.assert_allclose(found.temperatures, known.temperatures, atol=1e-9)
+    np.testing.assert_allclose(found.observables, known.observables, atol=1e-9)
+
+
+def test_films_that_do_not_change_are_those_of_the_model(tool: NonlinearTool) -> None:
+    """A face whose conductance is a number: put in beside the model, or in the model, it is the same heat."""
+
+    class Constant(Faces):
+        def conductance(self, *_: object, **__: object) -> FloatArray:
+            return self.linear(0.0)
+
+    model = tool.model
+    known = RestingTool(model=model, convection=0.0, stiction=0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("thermocomp.simulation.nonlinear.Faces", Constant)
+        machine = NonlinearTool(model=model, **LINEAR_TOOL | {"faces": TOOL_FACES})
+        _, truth = machine.run(machine.init(AIR), [HEATED] * 100, steps(100), 60.0)
+    _, expected = known.run(known.init(AIR), [HEATED] * 100, steps(100), 60.0)
+    np.testing.assert_allclose(truth.temperatures, expected.temperatures, atol=1e-8)
+
+
+def test_the_new_models_answer_like_the_old_ones() -> None:
+    """Two reductions of one full model, each good to 1 % of a drift."""
+    drives = [Drive(2600.0)] * 540 + [Drive()] * 540
+    for old, new in ((MachiningCentre(), MachiningCentre(model=ReducedModel.load("centre_joints"))),):
+        first, second = (m.run(m.init(AIR), drives, steps(1080), 20.0)[1] for m in (old, new))
+        for name in ("z", "y", "tip", "front_seat", "shaft"):
+            known, found = at(old, first, name), at(new, second, name)
+            assert np.abs(known - found).max() < 0.01 * np.ptp(known), name
+
+
+@pytest.mark.parametrize("machine", [NonlinearTool(), NonlinearCentre()])
+def test_at_rest_in_its_air_it_stays_as_it_is(machine: Any) -> None:
+    start = machine.init(AIR)
+    _, truth = machine.run(start, [Drive(powered=False)] * 200, steps(200), 60.0)
+    np.testing.assert_allclose(truth.temperatures, 22.0, atol=1e-8)
+    np.testing.assert_allclose(truth.observables, truth.observables[:1].repeat(200, 0), atol=1e-7)
+
+
+# -- energy --------------------------------------------------------------------------------------------------------
+
+
+def left_over(
+    model: ReducedModel, fields: FloatArray, rates: Callable[[FloatArray], float], heat: FloatArray, dt: float
+) -> float:
+    """Return what is stored beyond what came in and went out, as a share of the heat that came in."""
+    stored = model.one @ (fields[-1] - fields[0])
+    went = np.array([rates(z) for z in fields])
+    return float(abs(stored - np.trapezoid(heat + went, dx=dt)) / np.trapezoid(np.abs(heat), dx=dt))
+
+
+def test_what_comes_into_the_tool_is_stored_or_lost_to_the_air(tool: NonlinearTool) -> None:
+    model, dt = tool.model, 2.0
+    faces = Faces.of(list(TOOL_FACES.values()))
+    rows, air = model.rows(tuple(TOOL_FACES)), AIR.values
+
+    def loss(z: FloatArray) -> float:
+        rise = rows @ z - air[0]
+        extra = (faces.conductance(rows @ z, air[0]) - faces.linear(0.0)) @ rise
+        return float(model.one @ (model.to_air(()) @ air - model.stiffness(()) @ z) - extra)
+
+    state, fields = tool.init(AIR), [tool.init(AIR).field]
+    for _ in range(900):
+        state, _ = tool.run(state, [HEATED], air[None], dt)
+        fields.append(state.field)
+    balance = left_over(model, np.array(fields), loss, np.full(901, 65.0), dt)
+    assert balance < 1e-3
+    # the joints move heat, and neither make nor lose it
+    for joint in ("taper", "grip"):
+        a, b = (model.inputs.index(f"{joint}_{side}") for side in "ab")
+        assert model.one @ (model.heat[:, a] - model.heat[:, b]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_long_heated_the_tool_loses_what_it_gets(tool: NonlinearTool) -> None:
+    _, truth = tool.run(tool.init(AIR), [HEATED] * 1000, steps(1000), 300.0)
+    names = list(TOOL_FACES)
+    surface = np.array([at(tool, truth, name)[-1] for name in names])
+    lost = Faces.of(list(TOOL_FACES.values())).conductance(surface, 22.0) @ (surface - 22.0)
+    foot = 60.0 * np.pi * 0.1**2 * (at(tool, truth, "on_foot")[-1] - 22.0)
+    assert lost + foot == pytest.approx(65.0, rel=2e-3)
+
+
+def test_what_comes_into_the_centre_is_stored_or_lost(centre: NonlinearCentre) -> None:
+    model, air, drive, dt = centre.model, AIR.values, Drive(2560.0, cooled=False), 5.0
+    faces = Faces.of(list(CENTRE_FACES.values()))
+    theta = centre._theta(drive)
+    rows = model.rows((*CENTRE_FACES, "enclosure"))
+    given = sum(centre.heat.given(drive).values())
+
+    def loss(z: FloatArray) -> float:
+        *surface, enclosure = rows @ z
+        room = np.array([name not in ("spindle_rotating", "spindle_front") for name in CENTRE_FACES])
+        around = np.where(room, air[0], enclosure)
+        wind = centre.heat.rotation(drive.speed)
+        extra = faces.conductance(surface, around, drive.speed, wind) - faces.linear(
+            theta[model.theta.index("rotation")]
+        )
+        return float(
+            model.one @ (model.to_air(theta) @ air - model.stiffness(theta) @ z)
+            - extra[room] @ (surface - around)[room]
+        )
+
+    def heat(z: FloatArray) -> float:
+        return given + sum(centre._friction(drive, (model.rows(centre._watched) @ z).tolist()))
+
+    state, fields = centre.init(AIR), [centre.init(AIR).field]
+    for _ in range(720):
+        state, _ = centre.run(state, [drive], air[None], dt)
+        fields.append(state.field)
+    put_in = np.array([heat(z) for z in fields])
+    assert put_in[-1] > 400.0
+    assert left_over(model, np.array(fields), loss, put_in, dt) < 2e-3
+
+
+# -- what feeds back -----------------------------------------------------------------------------------------------
+
+
+def test_preload_settles_where_its_fixed_point_is() -> None:
+    """Friction warms the inner ring, which tightens the bearing, which makes heat: solved by hand, and by running."""
+    machine = NonlinearCentre(faces={}, taper=None, seat=None, rear=None, longest_step=2000.0)
+    drive = Drive(3000.0, cooled=False)
+    assert machine.front is not None
+    model, theta = machine.model, machine._theta(drive)
+    given = machine._given(drive)
+    rows = model.rows(machine._watched)
+    heat, front = given.copy(), 0.0
+    for _ in range(200):
+        z = model.steady(heat, AIR.values, theta)
+        front, rear = machine._friction(drive, (rows @ z).tolist())
+        heat = given.copy()
+        heat[model.inputs.index("front_bearing")] += front
+        heat[model.inputs.index("rear_bearing")] += rear
+    state, truth = machine.run(machine.init(AIR), [drive] * 2000, steps(2000), 2000.0)
+    np.testing.assert_allclose(truth.temperatures[-1], model.temperature @ z, atol=0.02)
+    # without the feedback of temperatures it would be another one: the preload has grown, its heat too
+    inner, outer = (at(machine, truth, name)[-1] for name in ("balls_a", "balls_b"))
+    approach = float(machine.front.approach(inner, outer))
+    assert machine.front.force(approach) > 1.5 * machine.front.preload
+    fixed = machine.front.heat(3000.0, at(machine, truth, "front_bearing")[-1], machine.front.mounted)
+    assert front > 1.05 * fixed
+    del state
+
+
+def test_a_stiffer_step_does_not_make_it_unstable() -> None:
+    """A joint that conducts a hundred times as well, in steps of minutes: heat passes, and nothing rings."""
+    machine = NonlinearTool(taper=replace(TAPER, conductivity=4200.0), longest_step=600.0)
+    _, truth = machine.run(machine.init(AIR), [HEATED] * 60, steps(60), 600.0)
+    shaft, shank = (at(machine, truth, f"taper_{side}") for side in "ab")
+    assert np.abs(shaft - shank)[5:].max() < 0.1
+    assert (np.diff(at(machine, truth, "t1"))[:20] > 0).all()
+
+
+@pytest.mark.parametrize("cooled", [False, True])
+def test_the_step_size_hardly_matters(cooled: bool) -> None:
+    drives = [Drive(3000.0 * (k // 12 % 2 == 0), cooled=cooled) for k in range(48)]
+    fine, coarse = (
+        m.run(m.init(AIR), drives, steps(48), 300.0)[1]
+        for m in (NonlinearCentre(longest_step=2.5), NonlinearCentre(longest_step=20.0))
+    )
+    np.testing.assert_allclose(coarse.temperatures, fine.temperatures, atol=0.1)
+    np.testing.assert_allclose(coarse.observables, fine.observables, atol=0.2)
+    tools = NonlinearTool(longest_step=2.5), NonlinearTool(longest_step=20.0)
+    fine, coarse = (m.run(m.init(AIR), [HEATED] * 48, steps(48), 300.0)[1] for m in tools)
+    np.testing.assert_allclose(coarse.temperatures, fine.temperatures, atol=0.05)
+    np.testing.assert_allclose(coarse.observables, fine.observables, atol=0.15)
+
+
+# -- what each part does -------------------------------------------------------------------------------------------
+
+
+def test_an_open_taper_keeps_the_heat_behind(tool: NonlinearTool) -> None:
+    """Mounted with a gap of 200 um of air, less comes through: the shaft is warmer, the chuck colder."""
+    open_ = replace(tool, taper=replace(TAPER, squeeze=-200.0))
+    heated = Drive(loads={"heater": 60.0})
+    shut, apart = (m.run(m.init(AIR), [heated] * 400, steps(400), 60.0)[1] for m in (tool, open_))
+    for name, sign in (("taper_a", 1.0), ("taper_b", -1.0)):
+        assert sign * (at(tool, apart, name)[-1] - at(tool, shut, name)[-1]) > 0.05
+
+
+def test_the_shank_stays_behind_as_the_chuck_warms_and_keeps_some_of_it(tool: NonlinearTool) -> None:
+    held = replace(tool, grip=replace(tool.grip, friction=1e3)) if tool.grip else tool
+    drives = [HEATED] * 180 + [Drive()] * 600
+    free, stuck = (m.run(m.init(Air(20.0)), drives, steps(780, Air(20.0)), 60.0)[1] for m in (tool, held))
+    behind = at(tool, stuck, "s1") - at(tool, free, "s1")
+    assert tool.grip is not None
+    wish = tool.grip.wish(at(tool, free, "grip_b"), at(tool, free, "grip_a"))
+    hold = tool.grip.hold(tool.grip.pressure(at(tool, free, "grip_b"), at(tool, free, "grip_a")))
+    assert behind[179] == pytest.approx(wish[179] - hold[179], abs=1e-9)
+    assert behind[179] > 3.0
+    # cold again it has not come back by what friction holds
+    assert behind[-1] == pytest.approx(wish[-1] + hold[-1], abs=1e-9)
+    assert behind[-1] > 1.0
+    # friction is less where the chuck has let go: the pressure falls as both warm
+    assert hold[179] < 0.8 * hold[0]
+    for name in ("s2", "s3"):
+        np.testing.assert_allclose(at(tool, free, name), at(tool, stuck, name), atol=1e-9)
+
+
+def test_expansion_grows_as_it_warms(tool: NonlinearTool) -> None:
+    """Evenly warm, everything is alpha (T + T^2 / 2 grows) long, whatever the field of temperatures is made of."""
+    off = replace(tool, expansion_grows=0.0, grip=None)
+    bent = replace(off, expansion_grows=1e-3)
+    for warm in (30.0, 60.0):
+        small, large = (m.run(m.init(Air(warm)), [Drive()], steps(1, Air(warm)), 20.0)[1] for m in (off, bent))
+        for name in ("s1", "s2", "s3"):
+            share = at(bent, large, name)[0] / at(off, small, name)[0]
+            assert share == pytest.approx(1.0 + 1e-3 * (warm - REFERENCE_TEMPERATURE) / 2.0, rel=2e-3)
+
+
+def test_the_spindles_expansion_grows_too(centre: NonlinearCentre) -> None:
+    flat = replace(centre, expansion_grows=0.0)
+    bent, straight = (m.run(m.init(AIR), [Drive(3000.0)] * 300, steps(300), 60.0)[1] for m in (centre, flat))
+    more = at(centre, bent, "tip") - at(flat, straight, "tip")
+    assert 0.1 < more[-1] < 1.0
+    np.testing.assert_allclose(at(centre, bent, "z") - at(flat, straight, "z"), -more, atol=1e-9)
+    np.testing.assert_allclose(bent.temperatures, straight.temperatures)
+
+
+def test_the_gap_of_the_outer_rings_closes_and_cools_them(centre: NonlinearCentre) -> None:
+    tight = replace(centre, seat=replace(SEAT, squeeze=1.0))
+    loose = replace(centre, seat=replace(SEAT, squeeze=-20.0))
+    drives = [Drive(3000.0, cooled=True)] * 200
+    rings = {}
+    for name, machine in (("tight", tight), ("usual", centre), ("loose", loose)):
+        _, truth = machine.run(machine.init(AIR), drives, steps(200), 60.0)
+        rings[name] = at(machine, truth, "seat_a")[-1] - at(machine, truth, "seat_b")[-1]
+        if name == "usual":
+            gap = -SEAT.squeezed(at(machine, truth, "seat_a"), at(machine, truth, "seat_b"))
+            assert gap[-1] < -SEAT.squeeze - 1.0  # it closes as the rings warm
+    assert rings["tight"] < rings["usual"] < rings["loose"]
+
+
+def test_a_tight_seat_squeezes_the_raceway(centre: NonlinearCentre) -> None:
+    inner, outer = SEAT.compliances
+    assert centre._pressed(20.0, 20.0) == 0.0
+    closes = -SEAT.squeeze / (12.0e-3 * SEAT.radius)
+    more = 12.0e-3 * SEAT.radius * 2.0
+    assert centre._pressed(20.0 + closes + 2.0, 20.0) == pytest.approx(inner / (inner + outer) * more)
+    assert replace(centre, seat=None)._pressed(60.0, 20.0) == 0.0
+
+
+def test_the_shaft_is_pushed_out_by_its_preload(centre: NonlinearCentre) -> None:
+    assert centre.front is not None
+    drives = [Drive(3000.0, cooled=False)] * 100
+    _, truth = centre.run(centre.init(AIR), drives, steps(100), 60.0)
+    still = replace(centre, joints=replace(centre.joints, centrifugal=0.0))
+    _, drawn = still.run(still.init(AIR), drives, steps(100), 60.0)
+    model, field = centre.model, {name: at(centre, truth, name) for name in ("balls_a", "balls_b", "seat_a", "seat_b")}
+    pressed = centre._pressed(field["seat_a"], field["seat_b"])
+    shift = centre.front.shift(centre.front.approach(field["balls_a"], field["balls_b"], pressed))
+    assert shift[-1] > 0.5
+    # what the reduced model and the growing expansion say of the nose comes without it
+    flat = replace(still, expansion_grows=0.0)
+    state, grown = flat.run(flat.init(AIR), drives, steps(100), 60.0)
+    rest = model.observable[centre.observables.index("nose")] @ (state.field - REFERENCE_TEMPERATURE * model.one)
+    assert at(flat, grown, "nose")[-1] == pytest.approx(rest + shift[-1], abs=1e-9)
+    # and centrifugal forces draw it in, as in the linear machine
+    back = at(still, drawn, "nose") - at(centre, truth, "nose")
+    np.testing.assert_allclose(back, centre.joints.centrifugal * (3000.0 / 3500.0) ** 2, atol=1e-9)
+
+
+# -- as all machines -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("machine", "drives"),
+    [
+        (NonlinearTool(), [HEATED] * 70 + [Drive(loads={"tip": 8.0})] * 60 + [Drive()] * 70),
+        (NonlinearCentre(), [Drive(2000.0, (600.0, 0.0, 600.0))] * 100 + [Drive()] * 100),
+    ],
+)
+def test_in_blocks_it_is_the_same_and_nothing_hides_in_it(machine: Any, drives: list[Drive]) -> None:
+    air = steps(200)
+    air[:, 0] += np.linspace(0.0, 3.0, 200)
+    start = machine.init(AIR)
+    kept = start.field.copy()
+    end, whole = machine.run(start, drives, air, 30.0)
+    state, parts = start, []
+    for block in (slice(0, 1), slice(1, 90), slice(90, 140), slice(140, 200)):
+        state, truth = machine.run(state, drives[block], air[block], 30.0)
+        parts.append(truth)
+    np.testing.assert_allclose(np.vstack([p.observables for p in parts]), whole.observables, atol=1e-9)
+    np.testing.assert_allclose(np.vstack([p.temperatures for p in parts]), whole.temperatures, atol=1e-9)
+    np.testing.assert_array_equal(start.field, kept)
+    assert machine.run(start, drives, air, 30.0)[0].field.tobytes() == end.field.tobytes()
+
+
+def test_heat_without_a_place_is_refused(tool: NonlinearTool, centre: NonlinearCentre) -> None:
+    for place in ("on_chuck", "taper_a", "surface"):
+        with pytest.raises(InputError, match=f"'{place}' but at heater, tip$"):
+            tool.run(tool.init(AIR), [Drive(loads={place: 5.0})], steps(1), 1.0)
+    with pytest.raises(InputError, match="beyond the machine's 3500"):
+        centre.run(centre.init(AIR), [Drive(4000.0)], steps(1), 1.0)
+
+
+def test_a_recording_can_be_made_on_either(tmp_path: Any) -> None:
+    linear, same, other = (record("hwang", physics=p, seed=2)[0] for p in (None, "linear", "nonlinear"))
+    assert linear.table.equals(same.table)
+    assert list(linear.table) == list(other.table)
+    assert not linear.table.equals(other.table)
+    path = tmp_path / "mine.toml"
+    text = 'sampling = "60 s"\nmachine = "tool"\nphysics = "nonlinear"\nduration = "30 min"\nloads = { heater = 40 }\n'
+    path.write_text(text)
+    (mine,) = record(path, seed=1)
+    path.write_text(text.replace("nonlinear", "linear"))
+    assert mine.table.equals(record(path, physics="nonlinear", seed=1)[0].table)
+    assert not mine.table.equals(record(path, seed=1)[0].table)
+    path.write_text(text.replace("nonlinear", "quadratic"))
+    with pytest.raises(InputError, match="physics"):
+        record(path)
+    assert all(e.physics == "linear" for e in EXPERIMENTS.values())
+    unknown: Any = "quadratic"
+    with pytest.raises(InputError, match="no physics 'quadratic'; there are linear, nonlinear"):
+        record("hwang", physics=unknown)
+
+
+def test_states_are_those_of_the_linear_machines(tool: NonlinearTool, centre: NonlinearCentre) -> None:
+    assert isinstance(tool.init(AIR), ToolState)
+    assert isinstance(centre.init(AIR), CentreState)
+    assert tool.init(Air(20.0)).slipped == 0.0
+    assert isinstance(TOOL_FACES["on_tool"], Face)
