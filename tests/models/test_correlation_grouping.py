@@ -16,6 +16,8 @@ from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, lstsq, triangle
 from thermocomp.models.selection import exhaustive
 from thermocomp.models.selection.collinearity import spectrum
+from thermocomp.models.training import train
+from thermocomp.recording.samples import Samples
 
 FloatArray = NDArray[np.float64]
 
@@ -161,3 +163,7 @@ def test_grouping_lessens_collinearity(seed: int) -> None:
     assert found.spectrum_.smallest > ungrouped.smallest
     assert found.spectrum_.sum_inverse < ungrouped.sum_inverse / 2
     assert found.spectrum_.condition_number < ungrouped.condition_number
+
+
+def test_it_is_trained_as_a_method(samples: Samples) -> None:
+    assert np.isfinite(train("grouping", samples, 0, samples.valid).predicted).all()

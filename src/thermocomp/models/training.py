@@ -155,7 +155,7 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
         found = estimator.predict(frame.iloc[valid], **everywhere)
     predicted[valid] = check_numbers(found, int(valid.sum()), how.name)
     left_out = None
-    if hasattr(estimator, "left_out_"):
+    if isinstance(estimator, TimedRegressor) and hasattr(estimator, "left_out_"):  # of grouping they are columns
         left_out = np.full((len(samples), 2), np.nan)
         left_out[rows] = estimator.left_out_
     return FittedMethod(how, estimator, columns, seen, seconds, predicted, left_out)

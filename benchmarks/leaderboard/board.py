@@ -1,0 +1,125 @@
+"""Run models on tests, one after the other in a process of its own, and lay out what comes of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cases import CASES
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+from published import Line
+from work import attempt
+
+from thermocomp.assessment.pieces import explain
+from thermocomp.models.methods import METHODS
+
+Found = dict[str, Any]
+
+
+def models(folder: Path) -> dict[str, Path | None]:
+    """Return the models: every method, and the files of the folder by their names."""
+    files = sorted(p for p in folder.glob("*.py") if not p.name.startswith("_"))
+    return {**dict.fromkeys(METHODS), **{(f"{p.stem} (file)" if p.stem in METHODS else p.stem): p for p in files}}
+
+
+def run(entries: Mapping[str, Path | None], cases: Sequence[str], seconds: float) -> Iterator[tuple[str, str, Found]]:
+    """Yield what each model leaves on each test; nothing of one that takes more than `seconds` or kills its process."""
+    for name in METHODS.keys() & entries.keys():  # imports and compiled kernels are nobody's time
+        get_reusable_executor(max_workers=1, timeout=None).submit(attempt, name, None, "hwang").result()
+    for case in cases:
+        for name, file in entries.items():
+            executor = get_reusable_executor(max_workers=1, timeout=None)
+            try:
+                found: Found = executor.submit(attempt, name, file, case).result(timeout=seconds)
+            except TimeoutError:
+                executor.shutdown(kill_workers=True)
+                found = {"error": f"> {seconds:g} s", "late": True}
+            except TerminatedWorkerError as e:
+                found = {"error": explain(e)}
+            yield name, case, found
+
+
+def rank(results: Mapping[str, Mapping[str, Found]]) -> list[str]:
+    """Return the models that gave a figure, the best first."""
+    given = [name for name, of in results.items() if any("error" not in f for f in of.values())]
+    return sorted(given, key=lambda name: (score(results[name]), name))
+
+
+def score(of: Mapping[str, Found]) -> float:
+    """Return the mean of the shares of none; a test without a figure counts as none, 1."""
+    return float(sum(f.get("share_mae", 1.0) for f in of.values()) / len(of))
+
+
+def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
+    """Return the board as a page of Markdown."""
+    results, tests = board["models"], board["tests"]
+    cases = [c for c in tests if "skipped" not in tests[c]]
+    stressed = [c for c in cases if CASES[c].stress]
+    last = {line.name: line.mean for line in log if ", all " in line.model}
+    head = ["model", "mean", *cases, *(f"{c}: noise, lost" for c in stressed), "inputs", "s", "published"]
+    rows = [head, ["---", *["---:"] * (len(head) - 1)]]
+    for name in board["ranking"]:
+        of, figures = results[name]["tests"], [f for f in results[name]["tests"].values() if "error" not in f]
+        low, high = min(f["sensors"][0] for f in figures), max(f["sensors"][1] for f in figures)
+        rows.append(
+            [
+                name,
+                f"{results[name]['score']:.1%}",
+                *(_cell(of[c]) for c in cases),
+                *(_stress(of[c]) for c in stressed),
+                f"{low}" if low == high else f"{low}-{high}",
+                f"{sum(f['seconds'] for f in figures):.1f}",
+                last.get(name, ""),
+            ]
+        )
+    notes = {
+        (name, f["error"]): [c for c, g in results[name]["tests"].items() if g.get("error") == f["error"]]
+        for name in results
+        for f in results[name]["tests"].values()
+        if "error" in f and not f.get("late")
+    }
+    lines = [
+        "# Leaderboard",
+        "",
+        f"{board['date']}, thermocomp {board['version']}, commit {board['commit']}, {board['processor']}, one thread, "
+        f"at most {board['limit']:g} s per model and test. Made by `python benchmarks/leaderboard`.",
+        "",
+        "Models alone, without gate and limits. Per test: mean over the channels of the mean absolute error in rows "
+        "that were not learned from [um]; what that is of no compensation, and the worst channel's share. Sorted by "
+        "`mean`: the mean of these shares over all tests; a test without a figure counts as no compensation, 100 %. "
+        "`noise`: share of the RMS of no compensation that is left with 0.4 degC of normal noise on every temperature, "
+        "the zero's included; `lost`: in the worst channel with the worst input lost. `inputs`: that the models use, a "
+        "spindle speed among them; `s`: all fits together. `published`: latest mean absolute error on the published "
+        "test block of fl_thermal [um], by [the log](published_block.md), not counted in `mean`. All with RMS and "
+        "channels: `board.json`.",
+        "",
+        *(f"| {' | '.join(row)} |" for row in rows),
+        "",
+        "| test | learned | judged | rows | no compensation [um] |",
+        "|---|---|---|---:|---:|",
+        *(
+            f"| {c} | {t['learned']} | {t['judged']} | "
+            + (f"skipped: {t['skipped']} | |" if "skipped" in t else "")
+            + ("" if "skipped" in t else f"{_of(results, c, 'rows')} | {_of(results, c, 'none_mae')} |")
+            for c, t in tests.items()
+        ),
+        "",
+        *(["Without a figure:", ""] if notes else []),
+        *(f"- {name}: {', '.join(of)}: {' '.join(why.split())}" for (name, why), of in notes.items()),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _of(results: Mapping[str, Any], case: str, key: str) -> str:
+    found = next((m["tests"][case][key] for m in results.values() if key in m["tests"][case]), "")
+    return f"{found:.2f}" if isinstance(found, float) else f"{found}"
+
+
+def _cell(found: Found) -> str:
+    if "error" in found:
+        return str(found["error"]) if found.get("late") else "-"
+    return f"{found['mae']:.2f} ({found['share_mae']:.0%}, {found['worst']['share_mae']:.0%})"
+
+
+def _stress(found: Found) -> str:
+    return f"{found['noise_share_rms']:.0%}, {found['lost_share_rms']:.0%}" if "noise_share_rms" in found else "-"

@@ -1,0 +1,151 @@
+"""What the models are judged on: one line per test."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermocomp.datasets.virtual import record
+from thermocomp.files import recordings
+from thermocomp.files.mapping import read_mapping
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split, by_rows, leave_one_cycle_out, leave_one_file_out
+from thermocomp.recording.stacking import stack
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = Path(os.environ.get("THERMOCOMP_DATA", ROOT.parent / "shared" / "data"))
+FL_THERMAL = DATA / "fl_thermal" / "recording.csv"
+VORON = DATA / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv"
+#: first row of the published test block of fl_thermal; only `published.py` goes there
+PUBLISHED = 6669
+
+Made = tuple[Samples, Judging]
+
+
+def displacements(found: Sequence[Recording]) -> list[str]:
+    return [c.name for c in found[0].channels if c.quantity == "displacement"]
+
+
+def virtual(experiment: str, leave_out: Callable[[Samples], Judging], every: int = 1, **how: Any) -> Made:
+    """Make an experiment, whole cycles or files of it left out in turn; `how` is passed to `record`."""
+    found = record(experiment, **how)
+    samples = thin(stack(found, displacements(found)), every)
+    return samples, leave_out(samples)
+
+
+def thin(samples: Samples, every: int) -> Samples:
+    """Return every so many rows one: slow models get done, too."""
+    return samples.take(np.arange(len(samples)) % every == 0)
+
+
+def from_to(learn: str, judge: str, seed: int = 0, **how: Any) -> Made:
+    """Learn from all files of one experiment, judge on those of another, made with `seed`."""
+    known, unseen = record(learn, **how), record(judge, seed=seed, **how)
+    samples = stack([*known, *unseen], displacements(known))
+    first = len(known)
+    blocks = [
+        Split(f"file {samples.test_names[k]}", samples.test < first, samples.test == k, whole=True)
+        for k in range(first, len(samples.test_names))
+    ]
+    return samples, Judging(f"{learn} to learn, {judge} unseen", tuple(blocks))
+
+
+def fl_thermal_cycles() -> Made:
+    found = [recordings.read(FL_THERMAL)]
+    whole = stack(found, displacements(found))
+    samples = thin(whole.take(np.arange(len(whole)) < PUBLISHED), 4)
+    return samples, leave_one_cycle_out(samples)
+
+
+def voron_cooling() -> Made:
+    found = [recordings.read(VORON, read_mapping(ROOT / "docs" / "files" / "voron.toml"))]
+    samples = stack(found, displacements(found))
+    return samples, by_rows(samples, 0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A test.
+
+    Parameters
+    ----------
+    name : str
+    learned, judged : str
+        In words.
+    make : callable
+    stress : bool
+        Also with noise and each sensor lost.
+    needs : Path, optional
+        File without which it is skipped.
+    """
+
+    name: str
+    learned: str
+    judged: str
+    make: Callable[[], Made]
+    stress: bool = False
+    needs: Path | None = None
+
+    @property
+    def absent(self) -> str:
+        """Why it has to be skipped; empty if it need not be."""
+        here = self.needs is None or self.needs.is_file()
+        return "" if here else f"{self.needs} is not here; set THERMOCOMP_DATA to the folder of the measured data"
+
+
+CASES = {
+    c.name: c
+    for c in (
+        Case(
+            "fl-thermal",
+            "measured: a spindle, rows 0-6668, one a minute, three of the four thermal cycles",
+            "the fourth, each in turn (the last one without its end, which is in the published block)",
+            fl_thermal_cycles,
+            needs=FL_THERMAL,
+        ),
+        Case(
+            "voron",
+            "measured: frame of a printer, 3.3 h of heating",
+            "3.3 h of cooling; no spindle speed",
+            voron_cooling,
+            needs=VORON,
+        ),
+        Case(
+            "demo",
+            "five of six cycles, each at a speed of its own, in a changing room",
+            "the sixth, each in turn",
+            partial(virtual, "demo", leave_one_cycle_out, every=3),
+        ),
+        Case(
+            "chen1996",
+            "four of five speeds, 16 h each, from cold",
+            "the fifth speed, each in turn",
+            partial(virtual, "chen1996", leave_one_file_out),
+            stress=True,
+        ),
+        Case(
+            "random",
+            "all of chen1996: five constant speeds",
+            "12 h of short jobs at random speeds",
+            partial(from_to, "chen1996", "random"),
+        ),
+        Case(
+            "hwang",
+            "37 rows: stop, low and high speed in random order, axes moving",
+            "the same in another order on another day",
+            partial(from_to, "hwang", "hwang", seed=1),
+        ),
+        Case(
+            "stepwise2017",
+            "one day of four cycles, X moving much",
+            "another day at other speeds and stops",
+            partial(from_to, "stepwise2017", "stepwise2017-online"),
+            stress=True,
+        ),
+    )
+}
