@@ -56,6 +56,12 @@ class Moments:
         squares = ((self.gram[part] @ weights - 2 * self.cross[part]) * weights).sum(axis=-2) + self.power[part]
         return np.asarray(np.maximum(squares, 0.0) / self.rows[part])
 
+    def pooled(self, parts: Sequence[int]) -> "Moments":
+        """Return some of the parts as one; many structures are then solved without adding them up each time."""
+        chosen = list(parts)
+        sums = (a[chosen].sum(axis=0, keepdims=True) for a in (self.gram, self.cross, self.power, self.rows))
+        return Moments(*sums, self.noise)
+
     def solve(self, structure: Structure, parts: Iterable[int]) -> FloatArray:
         """Return the weights of a structure's features, fitted to some of the parts, (n_chosen, n_targets)."""
         columns, chosen = structure.columns, list(parts)
@@ -100,9 +106,9 @@ def share_out(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatA
         return shares, np.full((1, n_targets), np.nan)
     fitted = np.zeros((n_parts, len(structures), n_features, n_targets))
     for k in range(n_parts):
-        rest = [p for p in range(n_parts) if p != k]
+        rest = moments.pooled([p for p in range(n_parts) if p != k])
         for row, structure in zip(fitted[k], structures, strict=True):
-            row[structure.columns] = moments.solve(structure, rest)
+            row[structure.columns] = rest.solve(structure, [0])
     own = np.array([moments.error(k, weights) for k, weights in enumerate(fitted)])
     own = np.log(np.maximum(own, np.finfo(np.float64).tiny)).mean(axis=0)
     shares = np.exp(TRUST / 2 * (own.min(axis=0) - own))
