@@ -210,7 +210,7 @@ def budget(
     if max_sensors < 1 or not temperatures:
         raise InputError(f"a sensor budget of {max_sensors} among {len(temperatures)} temperatures: want at least 1")
     numbers = np.array([judged_blocks(samples, t, judging) for t in range(len(targets))])
-    splits = [split for split, all_of_them in zip(judging.splits, numbers.all(axis=0), strict=True) if all_of_them]
+    splits = [split for split, known in zip(judging.splits, numbers.T, strict=True) if known.all()]
     if not splits:
         called = ", ".join(c.name for c in targets)
         raise FitError(f"no block to judge by has a number of each of {called}; choose for fewer targets at once")

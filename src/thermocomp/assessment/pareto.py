@@ -74,7 +74,8 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
         targets,
         sensors,
         f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
-        f"unseen cycles{_mean(found)}, instead of {found.none_pooled():.2f} {found.unit}; {trade_off(found, model, place)}",
+        f"unseen cycles{_mean(found)}, instead of {found.none_pooled():.2f} {found.unit}; "
+        f"{trade_off(found, model, place)}",
         tuple(tables),
         tuple(notes),
         found,
@@ -230,9 +231,9 @@ def _stand_ins(found: Budget, place: int) -> Table:
         rows,
         None,
         "Each is made up from the one other that misses it least, and from the chosen sensors (a chosen one from the "
-        f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is left "
-        "of it. Loses: what the answer of `averaged` with all temperatures changes by if this one alone is made up from "
-        f"the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",
+        f"others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. Miss: RMS of what is "
+        "left of it. Loses: what the answer of `averaged` with all temperatures changes by if this one alone is made "
+        f"up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it are not named.",
     )
 
 
@@ -289,8 +290,9 @@ def _rule(found: Budget) -> str:
     what = "what a further sensor has to gain to be worth it"
     if found.unit == PERCENT or least < WORTH:
         what = f"{100 * SHARE:g} % of what there is without compensation, {what}"
+    unit = found.unit
     return (
-        f"Rule: the fewest sensors whose mean RMS over the unseen blocks is within {margin:.2f} {found.unit} of the "
-        f"smallest: the larger of one standard error between the blocks (Breiman 1984), {error:.2f} {found.unit}, and of "
-        f"{least:.2f} {found.unit}, {what}."
+        f"Rule: the fewest sensors whose mean RMS over the unseen blocks is within {margin:.2f} {unit} of the "
+        f"smallest: the larger of one standard error between the blocks (Breiman 1984), {error:.2f} {unit}, and of "
+        f"{least:.2f} {unit}, {what}."
     )

@@ -58,9 +58,10 @@ class Moments:
 
     def pooled(self, parts: Sequence[int]) -> "Moments":
         """Return some of the parts as one; many structures are then solved without adding them up each time."""
-        chosen = list(parts)
-        sums = (a[chosen].sum(axis=0, keepdims=True) for a in (self.gram, self.cross, self.power, self.rows))
-        return Moments(*sums, self.noise)
+        gram, cross, power, rows = (
+            a[list(parts)].sum(axis=0, keepdims=True) for a in (self.gram, self.cross, self.power, self.rows)
+        )
+        return Moments(gram, cross, power, rows, self.noise)
 
     def solve(self, structure: Structure, parts: Iterable[int]) -> FloatArray:
         """Return the weights of a structure's features, fitted to some of the parts, (n_chosen, n_targets)."""
