@@ -50,3 +50,22 @@ def crowded_machine() -> Recording:
     table["t6_C"] = 20 + np.cumsum(0.01 * other)
     more = tuple(Channel(n, "temperature", "degC") for n in ("t4_C", "t5_C", "t6_C"))
     return replace(plain, table=table, channels=(*plain.channels, *more))
+
+
+def two_that_matter(seed: int) -> Recording:
+    """Return six cycles in which two of eight sensors make the drift; the others feel a little of all, and the room."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 6 * 200 * 60.0, 60.0)
+    speed = np.concatenate([np.r_[np.full(100, n), np.zeros(100)] for n in rng.uniform(500, 3000, 6)])
+    steps = np.full(len(time), 60.0)
+    heat = np.column_stack([speed**2 / 1e6, speed / 1e3])
+    fast, slow = lagbank.run(heat, steps, np.array([1200.0, 5400.0])).T
+    columns = {"t1_C": 20 + 3 * fast, "t2_C": 20 + 2 * slow}
+    room = np.cumsum(0.01 * rng.normal(size=len(time)))
+    columns |= {f"t{k}_C": 20 + rng.uniform(0, 0.4) * fast + rng.uniform(0, 0.4) * slow + room for k in range(3, 9)}
+    table = pd.DataFrame(columns) + 0.03 * rng.normal(size=(len(time), 8))
+    table["spindle_rpm"] = speed
+    table["x_um"] = 6 * fast + 8 * slow + 0.3 * rng.normal(size=len(time))
+    quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
+    channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
+    return Recording("two", time, table, channels, find_cycles(time, speed))

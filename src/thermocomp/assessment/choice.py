@@ -16,7 +16,7 @@ LOOKED_AT_BY = {
     "unsigned": ("grouping",),
     "reference": ("grouping",),
     "max_sensors": ("subsets", "ace", "pareto"),
-    "seconds": ("subsets", "pareto"),
+    "seconds": ("subsets",),
     "criterion": ("subsets",),
     "models": ("pareto",),
     "level": ("ace",),
@@ -44,9 +44,9 @@ class Settings:
     reference : str
         grouping: temperature that is subtracted from the others.
     max_sensors : int
-        subsets, ace, pareto: most sensors; 10 if not given, 3 for ace.
+        subsets, ace, pareto: most sensors; if not given 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        subsets, pareto: stop a search for the best sets after about so long [s]; what is not proven then, is told.
+        subsets: stop the search for the best sets after about so long [s]; what is not proven then, is told.
     criterion : str
         subsets: what the number of sensors is chosen by.
     models : list of str
@@ -91,7 +91,7 @@ class Settings:
         """
         if self.max_sensors is not None and self.max_sensors < 1:
             raise InputError(f"--max-sensors {self.max_sensors}: want at least 1")
-        return self.max_sensors if self.max_sensors is not None else 3 if method == "ace" else 10
+        return self.max_sensors if self.max_sensors is not None else {"ace": 3, "pareto": 6}.get(method, 10)
 
 
 @dataclass(frozen=True)

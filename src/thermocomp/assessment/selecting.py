@@ -1,6 +1,7 @@
 """Selection of sensors by each method, brought to one form: the sensors, why, and the tables behind it."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
@@ -8,7 +9,7 @@ import numpy as np
 from joblib import effective_n_jobs
 from numpy.typing import NDArray
 
-from thermocomp.assessment import pareto
+from thermocomp.assessment import budget, pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.leaks import refuse_leaks
@@ -54,7 +55,7 @@ def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings
     int
     """
     if method == "pareto":
-        return len(samples.targets) * pareto.n_pieces(samples, judging, settings.models, settings.most("pareto"))
+        return budget.n_pieces(samples, judging, settings.models, settings.most("pareto"))
     if method == "ace":
         return len(samples.targets) * len(samples.cycle_names)
     return len(samples.targets)
@@ -88,8 +89,8 @@ def select(
     Returns
     -------
     tuple of Choice
-        One per target; for ``ace`` one for all targets together. Where a method fails it is one without sensors, with
-        `Choice.failure`.
+        One per target; for ``pareto`` and ``ace`` one for all targets together. Where a method fails for a target it is
+        one without sensors, with `Choice.failure`.
 
     Raises
     ------
@@ -110,17 +111,24 @@ def select(
     }
     found: list[Choice] = []
     errors: list[Exception] = []
+    together: list[int] = []
     for k, target in enumerate(samples.targets):
         try:
+            candidates = Candidates.of(samples, k)
             if method == "pareto":
-                found.append(pareto.choose(samples, k, judging, settings, jobs=jobs, progress=progress))
+                budget.judged_blocks(samples, k, judging)
+                together.append(k)
             else:
-                found.append(choosers[method](Candidates.of(samples, k)))
+                found.append(choosers[method](candidates))
                 progress(f"{target.name}: chosen")
         except Exception as e:  # noqa: BLE001 - whatever fails for one target, the others have their choice
             errors.append(e)
             why = explain(e)
             found.append(Choice(method, target.name, (), f"could not be chosen: {why}", (), failure=why))
+    if together:
+        few = tuple(samples.targets[k] for k in together)
+        samples = replace(samples, targets=few, deviations=samples.deviations[:, together])
+        found.append(pareto.choose(samples, judging, settings, jobs=jobs, progress=progress))
     if len(errors) == len(found):
         raise errors[0]
     return tuple(found)

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from thermocomp.assessment.budget import Budget
 from thermocomp.assessment.choice import Choice, Table
-from thermocomp.assessment.pareto import Budget
 from thermocomp.core.shown import shorten
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
@@ -29,8 +29,8 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     found = choice.details
     if isinstance(found, Budget):
         return budget(found), (
-            "Lines: all unseen blocks together; dots: each block. Ring: enough, for what more sensors bring is within "
-            "the margin of the rule. Condition: how far the sensors repeat each other."
+            "How many sensors are needed? Lines: all unseen blocks together; dots: each block. Ring: enough, for what "
+            "more sensors bring is within the margin of the rule. Condition: how far the sensors repeat each other."
         )
     if isinstance(found, CorrelationGrouping):
         return grouping(found, choice.target), (
@@ -107,30 +107,41 @@ def grouping(g: CorrelationGrouping, target: str) -> Drawn:
 
 
 def budget(b: Budget) -> Drawn:
-    """Show what each further sensor buys: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
+    """Show how many sensors are needed: RMS on unseen cycles, how surely a sensor is chosen, how far they repeat."""
     sizes = np.arange(1, len(b.sensors) + 1)
     names = [str(n) for n in b.sizes]
-    with drawing("budget" + b.target):
+    with drawing("budget" + ", ".join(b.targets)):
         figure = Figure(figsize=(9.6, 4.2 + 0.17 * len(b.candidates)), layout="constrained")
         errors, repeats, chosen = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1.1, 0.16 * len(b.candidates)])
+        recommended = b.recommended()
+        shown = b.models.index(recommended[0]) if recommended else 0
+        mean = ", mean" if len(b.targets) > 1 else ""
+        if mean:
+            for k, (target, values) in enumerate(zip(b.targets, (b.of_targets() / b.scales)[shown].T, strict=True)):
+                colour, label = COLOURS[(k + len(b.models)) % len(COLOURS)], shorten(target, LONGEST)
+                errors.plot(sizes, values, "--", color=colour, lw=1, label=f"{b.models[shown]}, {label}")
         for k, model in enumerate(b.models):
             colour = COLOURS[k % len(COLOURS)]
-            errors.plot(sizes, b.rms[k], ".", color=colour, alpha=0.35, ms=5)
-            errors.plot(sizes, b.pooled()[k], "-o", color=colour, label=model, ms=4)
+            errors.plot(sizes, b.of_blocks()[k], ".", color=colour, alpha=0.35, ms=5)
+            errors.plot(sizes, b.pooled()[k], "-o", color=colour, label=f"{model}{mean}", lw=2, ms=4)
             enough = b.enough(model)
             if enough is not None:
                 place = b.sizes.index(enough)
                 errors.plot(sizes[place], b.pooled()[k][place], "o", color=colour, mfc="none", ms=12, mew=1.6)
         errors.axhline(b.none_pooled(), color=NONE, lw=2.5, label="no compensation")
-        errors.plot([], [], ".", color="#888", label="one unseen block")
+        everything, colour = b.pooled()[shown, -1], COLOURS[shown % len(COLOURS)]
+        errors.axhline(everything, color=colour, ls=":", label=f"{b.models[shown]}, all {names[-1]} temperatures")
+        errors.plot([], [], ".", color="#888", label=f"one unseen block{mean}")
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
         _log(errors)
-        errors.set_ylabel("RMS unseen [um]")
-        errors.set_title(f"{shorten(b.target, LONGEST)}: error against the number of temperature sensors")
+        errors.set_ylabel(f"RMS unseen [{b.unit}]")
+        title = shorten(", ".join(b.targets), LONGEST)
+        errors.set_title(f"{title}: error against the number of temperature sensors")
         add_legend(errors, loc="center left", bbox_to_anchor=(1.0, 0.5))
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
         repeats.set_yscale("log")
+        repeats.yaxis.set_major_formatter("{x:g}")
         repeats.set_ylabel("condition")
         chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
         name_ticks(chosen.yaxis, b.candidates, fontsize=7)
@@ -145,7 +156,7 @@ def budget(b: Budget) -> Drawn:
             "s",
             color="#08306b",
             ms=6,
-            label="chosen without any\none block, and lighter:\nwithout some of them",
+            label="without any one block (lighter: some)",
         )
         add_legend(chosen, loc="center left", bbox_to_anchor=(1.0, 0.5))
         chosen.set_xlabel("number of temperature sensors")

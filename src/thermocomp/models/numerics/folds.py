@@ -84,4 +84,5 @@ def halve(folds: IntArray, turning: NDArray[np.bool_]) -> tuple[IntArray, str]:
         if not _LEAST_PART * rows.size <= stop <= (1 - _LEAST_PART) * rows.size:
             stop = rows.size // 2
         parts[rows[:stop]], parts[rows[stop:]] = 2 * k, 2 * k + 1
+    parts[folds >= 0] = np.unique(parts[folds >= 0], return_inverse=True)[1]  # of a fold of one row a half is empty
     return parts, f"halves of {n_folds} thermal cycles (run, stop), left out in turn"

@@ -56,6 +56,13 @@ class Moments:
         squares = ((self.gram[part] @ weights - 2 * self.cross[part]) * weights).sum(axis=-2) + self.power[part]
         return np.asarray(np.maximum(squares, 0.0) / self.rows[part])
 
+    def pooled(self, parts: Sequence[int]) -> "Moments":
+        """Return some of the parts as one; many structures are then solved without adding them up each time."""
+        gram, cross, power, rows = (
+            a[list(parts)].sum(axis=0, keepdims=True) for a in (self.gram, self.cross, self.power, self.rows)
+        )
+        return Moments(gram, cross, power, rows, self.noise)
+
     def solve(self, structure: Structure, parts: Iterable[int]) -> FloatArray:
         """Return the weights of a structure's features, fitted to some of the parts, (n_chosen, n_targets)."""
         columns, chosen = structure.columns, list(parts)
@@ -103,9 +110,9 @@ def fit_each(moments: Moments, structures: Sequence[Structure], parts: Iterable[
     """
     chosen = list(parts)
     weights = np.full((len(structures), *moments.cross.shape[1:]), 0.0 if chosen else np.nan)
-    for row, structure in zip(weights, structures, strict=True):
-        if chosen:
-            row[structure.columns] = moments.solve(structure, chosen)
+    pooled = moments.pooled(chosen)
+    for row, structure in zip(weights if chosen else (), structures, strict=bool(chosen)):
+        row[structure.columns] = pooled.solve(structure, [0])
     return weights
 
 

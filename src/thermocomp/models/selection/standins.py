@@ -27,11 +27,84 @@ class SensorSets:
         Mean root mean square error on what was left out [unit of the target].
     loss : ndarray of shape (n_sets, n_targets)
         Root mean square of what the answer with all temperatures loses [unit of the target].
+    answer : Answer
+        With all temperatures.
     """
 
     sets: tuple[tuple[int, ...], ...]
     error: FloatArray
     loss: FloatArray
+    answer: "Answer"
+
+
+@dataclass(frozen=True, eq=False)
+class StandIns:
+    """What each temperature can be made up from; one that is kept, from the other kept ones, as if its sensor failed.
+
+    Parameters
+    ----------
+    single : tuple of int
+        The one other temperature that makes up each best; itself where there is no other.
+    single_residual : ndarray of shape (n_temperatures,)
+        Root mean square of what is left of each then [degC]; inf where there is no other.
+    weights : ndarray of shape (n_temperatures, n_temperatures)
+        Column j makes temperature j from the kept ones.
+    residual : ndarray of shape (n_temperatures,)
+        Root mean square of what is left of each then [degC].
+    loss : ndarray of shape (n_temperatures, n_targets)
+        Of the answer with all temperatures, where that one alone is made up from the kept ones [unit of the target].
+    """
+
+    single: tuple[int, ...]
+    single_residual: FloatArray
+    weights: FloatArray
+    residual: FloatArray
+    loss: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a model with all temperatures makes of them and their lags.
+
+    Parameters
+    ----------
+    copies : ndarray of shape (n_copies, n_temperatures, n_targets)
+        Weights of the temperatures, and of their lags, lag by lag.
+    gram : ndarray of shape (n_copies * n_temperatures, n_copies * n_temperatures)
+        Mean products of these features [degC^2].
+    noise : float
+        Standard deviation of the temperatures in use [degC].
+    """
+
+    copies: FloatArray
+    gram: FloatArray
+    noise: float
+
+    @property
+    def temperatures(self) -> FloatArray:
+        """Mean products of the temperatures themselves [degC^2]."""
+        return self.gram[: self.copies.shape[1], : self.copies.shape[1]]
+
+    def lose(self, made: FloatArray) -> FloatArray:
+        """Return the root mean square that the answer loses if temperatures are made up, by `make_up`, (n_targets,)."""
+        missed = np.eye(len(made)) - made
+        lost = np.concatenate([missed @ copy for copy in self.copies])
+        return _root((lost * (self.gram @ lost)).sum(axis=0))
+
+    def stand_ins(self, kept: Sequence[int]) -> StandIns:
+        """Return what each temperature can be made up from, by one other and by those that are kept."""
+        gram, everything = self.temperatures, range(self.copies.shape[1])
+        pairs = np.full(gram.shape, np.inf)  # what one leaves of another
+        for k in everything:
+            others = [j for j in everything if j != k]
+            pairs[others, k] = _left(gram, make_up(gram, [k], self.noise))[others]
+        weights, losses = np.zeros_like(gram), []
+        for j in everything:
+            made = np.eye(len(gram))
+            weights[:, j] = made[:, j] = make_up(gram, [k for k in kept if k != j], self.noise)[:, j]
+            losses.append(self.lose(made))
+        single = tuple(int(k) for k in pairs.argmin(axis=1))
+        return StandIns(single, pairs.min(axis=1), weights, _left(gram, weights), np.array(losses))
 
 
 def reduce_sensors(
@@ -63,14 +136,15 @@ def reduce_sensors(
     """
     everything = list(range(len(features.temperatures)))
     weights, _ = average(moments, features.draw(structures, random_state))
-    copies = weights[: features.copies * len(everything)].reshape(features.copies, len(everything), -1)
-    gram = moments.gram.sum(axis=0)[: features.copies * len(everything), : features.copies * len(everything)]
-    gram = gram / moments.rows.sum()
+    count = features.copies * len(everything)
+    answer = Answer(
+        weights[:count].reshape(features.copies, len(everything), -1),
+        moments.gram.sum(axis=0)[:count, :count] / moments.rows.sum(),
+        noise,
+    )
 
     def lose(kept: Sequence[int]) -> FloatArray:
-        missed = np.eye(len(everything)) - make_up(gram[: len(everything), : len(everything)], kept, noise)
-        lost = np.concatenate([missed @ copy for copy in copies])
-        return np.asarray(np.sqrt(np.maximum((lost * (gram @ lost)).sum(axis=0), 0.0)))
+        return answer.lose(make_up(answer.temperatures, kept, noise))
 
     def err(kept: Sequence[int]) -> FloatArray:
         _, errors = share_out(moments, features.draw(_STRUCTURES, random_state, kept))
@@ -79,11 +153,13 @@ def reduce_sensors(
     kept, found = everything, [everything]
     while len(kept) > 1:
         smaller = [[k for k in kept if k != out] for out in kept]
-        costs = [lose(s).mean() + (err(s).mean() if len(kept) <= 2 * most else 0.0) for s in smaller]
-        kept = smaller[int(np.argmin(np.nan_to_num(costs, nan=np.inf)))]
+        # where nothing can be left out, there is no error to know
+        costs = [lose(s).mean() + (np.nan_to_num(err(s).mean()) if len(kept) <= 2 * most else 0.0) for s in smaller]
+        kept = smaller[int(np.argmin(costs))]
         if len(kept) <= most:
             found.insert(0, kept)
-    return SensorSets(tuple(map(tuple, found)), np.array([err(s) for s in found]), np.array([lose(s) for s in found]))
+    errors, losses = np.array([err(s) for s in found]), np.array([lose(s) for s in found])
+    return SensorSets(tuple(map(tuple, found)), errors, losses, answer)
 
 
 def make_up(gram: FloatArray, kept: Sequence[int], noise: float) -> FloatArray:
@@ -110,3 +186,13 @@ def make_up(gram: FloatArray, kept: Sequence[int], noise: float) -> FloatArray:
         made[known] = np.linalg.solve(gram[np.ix_(known, known)] + (noise**2 + tiny) * np.eye(len(known)), gram[known])
     made[:, known] = np.eye(len(gram))[:, known]
     return made
+
+
+def _left(gram: FloatArray, made: FloatArray) -> FloatArray:
+    """Return the root mean square of what is left of each temperature that is made up, (n_temperatures,) [degC]."""
+    missed = np.eye(len(gram)) - made
+    return _root((missed * (gram @ missed)).sum(axis=0))
+
+
+def _root(squares: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
