@@ -24,7 +24,7 @@ MODELS = {
     "broken": "raise RuntimeError('no licence')\n",
     "nameless": "SUMMARY = 'without an estimator'\n",
     "deadly": "import os\n\nSUMMARY = 'dies'\n\n\ndef estimator():\n    os._exit(7)\n",
-    "endless": "import time\n\nSUMMARY = 'waits'\n\n\ndef estimator():\n    time.sleep(600)\n",
+    "endless": "SUMMARY = 'never ends'\n\n\ndef estimator():\n    while True:\n        pass\n",
     "ols": "raise RuntimeError('has the name of a method')\n",
 }
 
@@ -56,7 +56,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def board(copied: Path) -> tuple[dict[str, Any], str]:
     models = "ols,averaged,mean-of-all,broken,nameless,deadly,endless,ols (file)"
-    return judged(copied, "--models", models, "--tests", "stepwise2017,voron", "--seconds", "8")
+    return judged(copied, "--models", models, "--tests", "stepwise2017,voron", "--seconds", "5")
 
 
 @pytest.mark.parametrize("name", ["ols", "averaged"])
@@ -85,13 +85,13 @@ def test_the_rest_is_judged_and_what_failed_is_named(board: tuple[dict[str, Any]
     assert why["broken"] == "RuntimeError: no licence"
     assert "nameless.py has no estimator" in why["nameless"]
     assert "process died" in why["deadly"]
-    assert why["endless"] == "> 8 s"
+    assert why["endless"] == "> 5 s"
     assert "name of a method" in why["ols (file)"]
     assert all(results[n]["score"] is None for n in ("broken", "nameless", "deadly", "endless", "ols (file)"))
     assert board[0]["ranking"] == sorted(("ols", "averaged", "mean-of-all"), key=lambda n: results[n]["score"])
     assert results["mean-of-all"]["summary"] == "a constant"
     assert "- broken: stepwise2017: RuntimeError: no licence" in page
-    assert "- endless: stepwise2017: > 8 s" in page
+    assert "- endless: stepwise2017: > 5 s" in page
 
 
 def test_a_test_without_its_data_is_skipped_and_says_so(copied: Path, board: tuple[dict[str, Any], str]) -> None:
@@ -106,7 +106,9 @@ def test_twice_the_same(copied: Path, board: tuple[dict[str, Any], str]) -> None
     again, _ = judged(copied, "--models", "ols,averaged", "--tests", "stepwise2017")
     for name in ("ols", "averaged"):
         one, two = (b["models"][name]["tests"]["stepwise2017"] for b in (board[0], again))
-        assert {**one, "seconds": 0} == {**two, "seconds": 0}
+        assert {k: v for k, v in one.items() if not k.endswith("_s")} == {
+            k: v for k, v in two.items() if not k.endswith("_s")
+        }
 
 
 def test_the_published_block_is_looked_at_three_times_at_most(copied: Path) -> None:
