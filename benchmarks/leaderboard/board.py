@@ -100,8 +100,8 @@ def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
         "`noise`: share of the RMS of no compensation that is left with 0.4 degC of normal noise on every temperature, "
         "the zero's included; `lost`: in the worst channel with the worst input lost. `inputs`: that the models use, a "
         "spindle speed among them; `s`: processor time of all fits and replays. `published`: latest mean absolute "
-        "error on the published test block of fl_thermal [um], by [the log](published_block.md), not counted in `mean`. "
-        "RMS, single channels and the time of the fits alone are in `board.json`.",
+        "error on the published test block of fl_thermal [um], by [the log](published_block.md), not in `mean`. RMS, "
+        "single channels and the time of the fits alone are in `board.json`.",
         "",
         *(f"| {' | '.join(row)} |" for row in rows),
         "",
