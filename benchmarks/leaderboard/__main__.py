@@ -31,10 +31,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="leaderboard", description=__doc__)
     parser.add_argument("--models", help="only these, separated by commas")
     parser.add_argument("--tests", help=f"only these of {', '.join(CASES)}")
-    parser.add_argument("--seconds", type=float, default=40.0, help="most per model and test (default 40)")
+    parser.add_argument(
+        "--seconds", type=float, default=20.0, help="processor time, most per model and test (default 20)"
+    )
     parser.add_argument("-o", "--output", type=Path, help="folder for board.json and board.md (default: this one)")
     parser.add_argument("--published", metavar="MODEL", help="evaluate the published block of fl_thermal once, log it")
     args = parser.parse_args()
+    if not args.seconds > 0:
+        parser.error(f"--seconds {args.seconds:g}: want more than 0")
     try:
         entries = models(HERE / "models")
         if args.published:
@@ -47,7 +51,7 @@ def main() -> int:
         page = table(found, log)
         print(page)
         # a part of the board does not take the place of the whole, unless a folder is named
-        folder = args.output or (None if args.models or args.tests else HERE)
+        folder = args.output or (HERE if args.models is args.tests is None else None)
         if folder:
             folder.mkdir(parents=True, exist_ok=True)
             write_text(json.dumps(found, indent=1) + "\n", folder / "board.json", overwrite=True)
@@ -60,7 +64,7 @@ def main() -> int:
 
 def chosen(text: str | None, known: Any, what: str) -> list[str]:
     names = list(known) if text is None else [n.strip() for n in text.split(",") if n.strip()]
-    for name in names:
+    for name in names or [""]:
         if name not in known:
             raise explain_unknown(what, name, known)
     return names
@@ -69,7 +73,8 @@ def chosen(text: str | None, known: Any, what: str) -> list[str]:
 def make(entries: dict[str, Path | None], tests: list[str], seconds: float) -> dict[str, Any]:
     absent = {c: reason for c in tests if (reason := CASES[c].absent)}
     if len(absent) == len(tests):
-        raise InputError(f"nothing to judge on: {'; '.join(absent.values()) or 'no test named'}")
+        raise InputError(f"nothing to judge on: {'; '.join(absent.values())}")
+    begun, code = datetime.now(UTC), commit()
     results: dict[str, dict[str, Any]] = {name: {} for name in entries}
     for name, case, result in run(entries, [c for c in tests if c not in absent], seconds):
         results[name][case] = result
@@ -81,9 +86,9 @@ def make(entries: dict[str, Path | None], tests: list[str], seconds: float) -> d
         name: next((f.pop("summary") for f in of.values() if "summary" in f), "") for name, of in results.items()
     }
     return {
-        "date": datetime.now(UTC).date().isoformat(),
+        "date": begun.date().isoformat(),
         "version": __version__,
-        "commit": commit(),
+        "commit": code,
         "processor": processor(),
         "limit": seconds,
         "tests": {

@@ -58,7 +58,7 @@ def from_to(learn: str, judge: str, seed: int = 0, **how: Any) -> Made:
 def fl_thermal_cycles() -> Made:
     found = [recordings.read(FL_THERMAL)]
     whole = stack(found, displacements(found))
-    samples = thin(whole.take(np.arange(len(whole)) < PUBLISHED), 4)
+    samples = thin(whole.take(np.arange(len(whole)) < PUBLISHED), 8)
     return samples, leave_one_cycle_out(samples)
 
 
@@ -103,7 +103,7 @@ CASES = {
     for c in (
         Case(
             "fl-thermal",
-            "measured: a spindle, rows 0-6668, one a minute, three of the four thermal cycles",
+            "measured: a spindle, rows 0-6668, every eighth, three of the four thermal cycles",
             "the fourth, each in turn (the last one without its end, which is in the published block)",
             fl_thermal_cycles,
             needs=FL_THERMAL,
@@ -117,9 +117,9 @@ CASES = {
         ),
         Case(
             "demo",
-            "five of six cycles, each at a speed of its own, in a changing room",
+            "five of six cycles, each at a speed of its own, in a changing room, a row every 3 min",
             "the sixth, each in turn",
-            partial(virtual, "demo", leave_one_cycle_out, every=3),
+            partial(virtual, "demo", leave_one_cycle_out, every=9),
         ),
         Case(
             "chen1996",

@@ -1,6 +1,8 @@
 """Judge one model on one test: what a worker process does."""
 
 import runpy
+import signal
+import time
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,10 @@ def _made(case: str) -> Made:
     return CASES[case].make()
 
 
+def ready() -> None:
+    """Do nothing: whose process has run this has imported what it needs."""
+
+
 def load(name: str, file: Path | None) -> tuple[str, str]:
     """Return a model as `compare` takes it, and its summary."""
     if file is None:
@@ -30,12 +36,23 @@ def load(name: str, file: Path | None) -> tuple[str, str]:
     return NamedEstimator(name, adopt_estimator(found["estimator"]())), str(found["SUMMARY"])
 
 
-def attempt(name: str, file: Path | None, case: str) -> dict[str, Any]:
-    """Return what `judge_model` finds, or why it finds nothing, as ``error``."""
+def attempt(name: str, file: Path | None, case: str, seconds: float = 0.0) -> dict[str, Any]:
+    """Return what `judge_model` finds, or why it finds nothing, as ``error``.
+
+    After more than `seconds` of processor time (0: never) the process is killed, whatever it is doing: what a model may
+    take does not depend on what else the machine does.
+    """
+    if hasattr(signal, "setitimer"):  # elsewhere only the parent watches
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+    begin = time.process_time()
     try:
-        return judge_model(name, file, case)
+        found = judge_model(name, file, case)
     except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a model raises, the others have their results
-        return {"error": explain(e)}
+        found = {"error": explain(e)}
+    finally:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+    return {**found, "processor_s": time.process_time() - begin}
 
 
 def judge_model(name: str, file: Path | None, case: str) -> dict[str, Any]:
@@ -58,7 +75,7 @@ def judge_model(name: str, file: Path | None, case: str) -> dict[str, Any]:
     found["worst"] = {"channel": worst.target, "share_mae": found["channels"][worst.target]["share_mae"]}
     found["rows"] = len(samples)
     found["sensors"] = [min(a.n_sensors[0] for a in whole), max(a.n_sensors[1] for a in whole)]
-    found["seconds"] = sum(a.fit_s for a in whole)
+    found["fit_s"] = sum(a.fit_s for a in whole)
     if all(a.robustness for a in whole):
         known = [a.robustness for a in whole if a.robustness]
         none_rms = np.mean([r.none_rms for r in known])

@@ -18,13 +18,14 @@ from thermocomp.datasets.virtual import record
 from thermocomp.models.training import train
 from thermocomp.recording.stacking import stack
 
+pytestmark = pytest.mark.long  # processes that import everything
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks" / "leaderboard"
 MODELS = {
     "mean-of-all": "from sklearn.dummy import DummyRegressor as estimator\n\nSUMMARY = 'a constant'\n",
     "broken": "raise RuntimeError('no licence')\n",
     "nameless": "SUMMARY = 'without an estimator'\n",
     "deadly": "import os\n\nSUMMARY = 'dies'\n\n\ndef estimator():\n    os._exit(7)\n",
-    "endless": "import time\n\nSUMMARY = 'waits'\n\n\ndef estimator():\n    time.sleep(600)\n",
+    "endless": "SUMMARY = 'never ends'\n\n\ndef estimator():\n    while True:\n        pass\n",
     "ols": "raise RuntimeError('has the name of a method')\n",
 }
 
@@ -55,11 +56,11 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def board(copied: Path) -> tuple[dict[str, Any], str]:
-    models = "ols,averaged,mean-of-all,broken,nameless,deadly,endless,ols (file)"
-    return judged(copied, "--models", models, "--tests", "stepwise2017,voron", "--seconds", "8")
+    models = "ols,dynamic,mean-of-all,broken,nameless,deadly,endless,ols (file)"
+    return judged(copied, "--models", models, "--tests", "stepwise2017,voron", "--seconds", "3")
 
 
-@pytest.mark.parametrize("name", ["ols", "averaged"])
+@pytest.mark.parametrize("name", ["ols", "dynamic"])
 def test_figures_are_those_of_an_own_replay(board: tuple[dict[str, Any], str], name: str) -> None:
     found = board[0]["models"][name]["tests"]["stepwise2017"]
     samples = stack([*record("stepwise2017"), *record("stepwise2017-online")], ["x1_um"])
@@ -85,13 +86,13 @@ def test_the_rest_is_judged_and_what_failed_is_named(board: tuple[dict[str, Any]
     assert why["broken"] == "RuntimeError: no licence"
     assert "nameless.py has no estimator" in why["nameless"]
     assert "process died" in why["deadly"]
-    assert why["endless"] == "> 8 s"
+    assert why["endless"] == "> 3 s"
     assert "name of a method" in why["ols (file)"]
     assert all(results[n]["score"] is None for n in ("broken", "nameless", "deadly", "endless", "ols (file)"))
-    assert board[0]["ranking"] == sorted(("ols", "averaged", "mean-of-all"), key=lambda n: results[n]["score"])
+    assert board[0]["ranking"] == sorted(("ols", "dynamic", "mean-of-all"), key=lambda n: results[n]["score"])
     assert results["mean-of-all"]["summary"] == "a constant"
     assert "- broken: stepwise2017: RuntimeError: no licence" in page
-    assert "- endless: stepwise2017: > 8 s" in page
+    assert "- endless: stepwise2017: > 3 s" in page
 
 
 def test_a_test_without_its_data_is_skipped_and_says_so(copied: Path, board: tuple[dict[str, Any], str]) -> None:
@@ -103,10 +104,12 @@ def test_a_test_without_its_data_is_skipped_and_says_so(copied: Path, board: tup
 
 
 def test_twice_the_same(copied: Path, board: tuple[dict[str, Any], str]) -> None:
-    again, _ = judged(copied, "--models", "ols,averaged", "--tests", "stepwise2017")
-    for name in ("ols", "averaged"):
+    again, _ = judged(copied, "--models", "ols,dynamic", "--tests", "stepwise2017")
+    for name in ("ols", "dynamic"):
         one, two = (b["models"][name]["tests"]["stepwise2017"] for b in (board[0], again))
-        assert {**one, "seconds": 0} == {**two, "seconds": 0}
+        assert {k: v for k, v in one.items() if not k.endswith("_s")} == {
+            k: v for k, v in two.items() if not k.endswith("_s")
+        }
 
 
 def test_the_published_block_is_looked_at_three_times_at_most(copied: Path) -> None:
@@ -125,6 +128,7 @@ def test_a_part_of_the_board_takes_no_place_and_names_are_checked(copied: Path) 
     before = (copied / "board.md").read_text() if (copied / "board.md").is_file() else None
     assert run(copied, "--models", "ols", "--tests", "hwang").returncode == 0
     assert ((copied / "board.md").read_text() if (copied / "board.md").is_file() else None) == before
-    done = run(copied, "--models", "olz")
-    assert done.returncode == 2
-    assert "no model 'olz'; the nearest are ols" in done.stderr
+    for wrong, why in {"olz": "no model 'olz'; the nearest are ols", ",": "no model ''"}.items():
+        done = run(copied, "--models", wrong)
+        assert done.returncode == 2
+        assert why in done.stderr
