@@ -161,9 +161,9 @@ def test_a_model_that_fails_on_the_way_to_few_sensors(samples: Samples, monkeypa
             raise MemoryError
         return train(name, *arguments, **how)
 
-    monkeypatch.setattr("thermocomp.assessment.pareto.train", some)
+    monkeypatch.setattr("thermocomp.assessment.budget.train", some)
     settings = Settings(models=["ols", "dynamic"], max_sensors=2)
-    (choice, _) = selecting.select("pareto", samples, judging, settings)
+    (choice,) = selecting.select("pareto", samples, judging, settings)
     assert choice.reason.startswith("dynamic with")
     assert "Not judged with some numbers of sensors: ols: the memory is full (MemoryError)" in choice.notes
     with pytest.raises(FitError, match="could be judged in every block: ols: the memory is full"):

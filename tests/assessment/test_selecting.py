@@ -34,7 +34,7 @@ def choices(crowd: Samples) -> dict[str, tuple[Choice, ...]]:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_chooses_temperatures_that_exist(choices: dict[str, tuple[Choice, ...]], method: str) -> None:
     found = choices[method]
-    assert [c.target for c in found] == (["x_um, z_um"] if method == "ace" else ["x_um", "z_um"])
+    assert [c.target for c in found] == (["x_um, z_um"] if method in ("ace", "pareto") else ["x_um", "z_um"])
     for c in found:
         assert c.method == method
         assert set(c.sensors) <= {f"t{k}_C" for k in range(1, 7)}
@@ -102,11 +102,48 @@ def test_too_few_cycles_for_the_wilcoxon_test_are_told(choices: dict[str, tuple[
 
 
 def test_the_budget_is_within_its_limit(choices: dict[str, tuple[Choice, ...]]) -> None:
-    for choice in choices["pareto"]:
-        errors = table(choice, "Error on unseen")
-        assert [row[0] for row in errors.rows] == [1, 2, 3, 6]
-        assert errors.marked is not None
-        assert str(errors.rows[errors.marked][-1]).split() == list(choice.sensors)
+    (choice,) = choices["pareto"]
+    errors = table(choice, "Error on unseen blocks: ")
+    assert [row[0] for row in errors.rows] == [1, 2, 3, 6]
+    assert errors.marked is not None
+    assert str(errors.rows[errors.marked][-1]).split() == list(choice.sensors)
+    each = table(choice, "Error on unseen blocks for each")
+    assert [row[0] for row in each.rows] == [0, 1, 2, 3, 6]
+    assert [np.mean(np.array(row[1:], dtype=float)) for row in each.rows[1:]] == pytest.approx(
+        [row[errors.columns.index("ols RMS [um]")] for row in errors.rows]
+    )
+    assert each.marked == errors.marked + 1
+
+
+def test_what_to_buy_next_is_what_the_next_row_has_more(choices: dict[str, tuple[Choice, ...]]) -> None:
+    (choice,) = choices["pareto"]
+    errors, bought = table(choice, "Error on unseen blocks: "), table(choice, "What to buy next")
+    for (size, joins, gain, worst, best), row, following in zip(
+        bought.rows, errors.rows, errors.rows[1:], strict=False
+    ):
+        assert size == row[0]
+        assert gain == pytest.approx(float(row[1] or 0) - float(following[1] or 0)) == row[2]
+        assert isinstance(worst, float)
+        assert isinstance(best, float)
+        assert worst <= best
+        new = set(str(following[-1]).split()) - set(str(row[-1]).split())
+        assert joins == (new.pop() if len(new) == 1 else "all 3 others")
+    assert any(n.startswith("Next to buy: ") for n in choice.notes)
+
+
+def test_stand_ins_name_the_copy(choices: dict[str, tuple[Choice, ...]]) -> None:
+    """t4_C repeats t1_C; the chosen sensors make up each of the others, and are made up from the others of them."""
+    (choice,) = choices["pareto"]
+    stands = table(choice, "What stands in")
+    assert [row[0] for row in stands.rows] == [f"t{k}_C" for k in range(1, 7)]
+    nearest = {str(row[0]): row[1:3] for row in stands.rows}
+    assert nearest["t4_C"][0] == "t1_C"
+    assert nearest["t1_C"][0] == "t4_C"
+    assert float(nearest["t4_C"][1] or 0) < 0.1  # degC
+    for name, _, _, parts, _, loses in stands.rows:
+        assert str(name) not in str(parts)
+        assert str(parts) == "none" or all(p.split()[1] in choice.sensors for p in str(parts).split(", "))
+        assert float(loses or 0) >= 0
 
 
 @pytest.mark.parametrize("method", METHODS)

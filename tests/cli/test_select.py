@@ -66,6 +66,7 @@ def test_refusals(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
             "--max-sensors is for --method subsets or ace or pareto, not for",
         ),
         (["--holm"], "--holm is for --method ace, not for pareto"),
+        (["--seconds", "5"], "--seconds is for --method subsets, not for pareto"),
         (["--method", "ace", "--max-sensors", "0"], "at least"),
         (["--method", "subsets", "--max-sensors", "0"], "at least 1"),
     ):
@@ -100,14 +101,15 @@ def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
         str(path),
         "--target",
         "x_um",
-        "--seconds",
-        "300",
         "--max-sensors",
         "16",
     ]
-    for method, code, told in (("subsets", 0, "interrupted"), ("pareto", 130, "stopped")):
+    for method, more, code, told in (
+        ("subsets", ["--seconds", "300"], 0, "interrupted"),
+        ("pareto", ["--verbose"], 130, "stopped"),
+    ):
         with subprocess.Popen(
-            [*line, "--method", method],
+            [*line, "--method", method, *more],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -65,7 +65,8 @@ def two_that_matter(seed: int) -> Recording:
     columns |= {f"t{k}_C": 20 + rng.uniform(0, 0.4) * fast + rng.uniform(0, 0.4) * slow + room for k in range(3, 9)}
     table = pd.DataFrame(columns) + 0.03 * rng.normal(size=(len(time), 8))
     table["spindle_rpm"] = speed
-    table["x_um"] = 6 * fast + 8 * slow + 0.3 * rng.normal(size=len(time))
+    # its zero is the first row, as that of the temperatures
+    table["x_um"] = 6 * (fast - fast[0]) + 8 * (slow - slow[0]) + 0.3 * rng.normal(size=len(time))
     quantities = {"C": ("temperature", "degC"), "rpm": ("spindle_speed", "1/min"), "um": ("displacement", "um")}
     channels = tuple(Channel(str(c), *quantities[str(c).split("_")[1]]) for c in table.columns)
     return Recording("two", time, table, channels, find_cycles(time, speed))
