@@ -59,7 +59,7 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row for each; errors and what was measured in um.
+        A row for each; errors, half-widths of bands and what was measured in um; nan where a model has no band.
     """
     return pd.DataFrame(
         {
@@ -71,6 +71,8 @@ def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
             "max_abs": [a.metric("max_abs") for a in assessments],
             "none_rms": [a.none_metric("rms") for a in assessments],
             "reduction_pct": [a.metric("reduction") for a in assessments],
+            "coverage": [a.coverage for a in assessments],
+            "half_width": [a.half_width for a in assessments],
             "sensors": [a.n_sensors[1] for a in assessments],
             "verdict": [a.word for a in assessments],
             "deployable": [deployable(a.model) for a in assessments],
@@ -186,6 +188,16 @@ class FittedModels(Result):
             raise InputError(f"there are models of {', '.join(self.models)}: take one of .models")
         return self.fitted.models[0]
 
+    @property
+    def coverage(self) -> dict[str, float]:
+        """Share of the unseen rows that the band held, by target; nan without a band."""
+        return {a.target: a.coverage for a in self.fitted.comparison.overall()}
+
+    @property
+    def half_width(self) -> dict[str, float]:
+        """Mean half-width of the band over the unseen rows, by target [um]; nan without a band."""
+        return {a.target: a.half_width for a in self.fitted.comparison.overall()}
+
     def predict(self, table: Columns, time: ArrayLike | str | None = None) -> pd.DataFrame:
         """Replay all models through a table; see `thermocomp.core.model.ErrorModel.predict`.
 
@@ -243,6 +255,16 @@ class Assessed(Result):
     judged: Judged
     recordings: tuple[Recording, ...]
     trouble: tuple[str, ...] = ()
+
+    @property
+    def coverage(self) -> dict[str, float]:
+        """Share of the judged rows that the band held, by target; nan without a band."""
+        return {a.target: a.coverage for a in self.judged.overall()}
+
+    @property
+    def half_width(self) -> dict[str, float]:
+        """Mean half-width of the band over the judged rows, by target [um]; nan without a band."""
+        return {a.target: a.half_width for a in self.judged.overall()}
 
     def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
         """Return a row per model; with `blocks` one per thermal cycle too."""

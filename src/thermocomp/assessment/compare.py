@@ -215,6 +215,7 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
                 measured=measured,
                 predicted=predicted,
                 alone=None if whole.alone is None else whole.alone[rows],
+                half_widths=None if whole.half_widths is None else whole.half_widths[rows],
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],
@@ -289,6 +290,10 @@ def _together(parts: Sequence[Assessment]) -> Assessment:
         alone=np.concatenate([a.predicted if a.alone is None else a.alone for a in parts]),
         rejected=sum(a.rejected for a in parts),
         turned_away=next((a.turned_away for a in parts if a.turned_away), ""),
+        half_widths=np.concatenate(
+            [np.full(len(a.measured), np.nan) if a.half_widths is None else a.half_widths for a in parts]
+        ),
+        band="; ".join(dict.fromkeys(a.band for a in parts if a.band)),
         frozen=None,
         failure=failures[0] if failures else "",
         overall=True,

@@ -118,6 +118,8 @@ def judge(
         limits=None if limits is None else ran.limits,
         rejected=0 if limits is None else int(ran.rejected.sum()),
         turned_away="" if limits is None else ran.why,
+        half_widths=None if model.band is None else ran.half_width,
+        band="" if model.band is None else model.band.words,
     )
 
 

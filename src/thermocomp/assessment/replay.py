@@ -37,6 +37,8 @@ class Replayed:
         The first reading it turned away; empty if none.
     limits : Limits or None
         None: they were not applied, because the model does not predict micrometres.
+    half_width : ndarray of shape (n_wanted,)
+        Of the band about `deviation` [its unit]; nan where there is none.
     """
 
     deviation: FloatArray
@@ -45,6 +47,7 @@ class Replayed:
     rejected: BoolArray
     why: str
     limits: Limits | None
+    half_width: FloatArray
 
 
 def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, limits: Limits = Limits()) -> Replayed:
@@ -68,7 +71,7 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
     """
     columns, within = _columns(model, samples), limits if model.unit == "um" else None
     n, why = len(samples), ""
-    deviation, compensated = np.zeros(n), np.zeros(n)
+    deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
     outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
     for test in np.unique(samples.test[rows]):
         mine = _until(samples, rows, test, model, columns)
@@ -84,10 +87,10 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
         )
         deviation[mine], compensated[mine] = found.deviation, found.compensated
-        outside[mine], rejected[mine] = found.outside, found.rejected
+        outside[mine], rejected[mine], half_width[mine] = found.outside, found.rejected, found.half_width
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
-    return Replayed(deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within)
+    return Replayed(deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows])
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:

@@ -86,6 +86,11 @@ class Assessment:
         Judged readings that the gate turned away though they were complete.
     turned_away : str
         The first reading that it turned away, and why.
+    half_widths : ndarray of shape (n_judged,), optional
+        Of the band about what the model alone predicts, by the rows it has learned from alone; nan in rows without one
+        [um].
+    band : str
+        What the band is called; empty without one.
     """
 
     model: str
@@ -111,6 +116,28 @@ class Assessment:
     limits: Limits | None = None
     rejected: int = 0
     turned_away: str = ""
+    half_widths: FloatArray | None = None
+    band: str = ""
+
+    @property
+    def coverage(self) -> float:
+        """Share of the judged rows that the band holds; nan without a band."""
+        known = self._banded
+        alone = self.predicted if self.alone is None else self.alone
+        if self.half_widths is None or not known.any():
+            return float("nan")
+        return float((np.abs(self.measured - alone) <= self.half_widths)[known].mean())
+
+    @property
+    def half_width(self) -> float:
+        """Mean half-width of the band over the judged rows [um]; nan without a band."""
+        known = self._banded
+        return float(self.half_widths[known].mean()) if self.half_widths is not None and known.any() else float("nan")
+
+    @property
+    def _banded(self) -> NDArray[np.bool_]:
+        """Judged rows with a band."""
+        return np.zeros(0, np.bool_) if self.half_widths is None else np.isfinite(self.half_widths)
 
     def metric(self, name: str) -> float:
         """Return a metric of `thermocomp.assessment.metrics`; nan if the method could not be fitted."""

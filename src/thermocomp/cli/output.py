@@ -16,6 +16,7 @@ from thermocomp.cli.terminal import mark, print_table, words
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report import records
+from thermocomp.report.bands import describe_bands
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
@@ -119,7 +120,8 @@ def show_choices(
 
 def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
     """Print models that were fitted and written."""
-    models = [records.model(m, r2) for m, r2 in zip(fitted.models, fitted.r_squared, strict=True)]
+    overall = fitted.comparison.overall()
+    models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
     if as_json:
         content = {
             "judging": fitted.comparison.judging.name,
@@ -144,7 +146,7 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     for m in fitted.models:
         if m.honest_error is not None:
             console.print(f"{mark(m.honest_error.word)} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
-    for line in describe_running(fitted.comparison.overall()):
+    for line in [*describe_running(overall), *describe_bands(fitted.models, overall)]:
         console.print(words(line))
     console.print(f"Model file: {words(path)}", soft_wrap=True)
 
@@ -177,7 +179,7 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             console.print(f"[yellow]but[/] {share} are outside the range {words(a.target)} was trained in")
         if a.robustness is not None and a.robustness.unlike > 0.1:
             console.print(f"[yellow]but[/] {words(a.target)}: {words(describe_unlike(a.robustness))}")
-    for line in describe_running(judged.overall()):
+    for line in [*describe_running(judged.overall()), *describe_bands(judged.models, judged.overall())]:
         console.print(words(line))
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     known = {name: v for name, v in fitted.items() if v is not None}
@@ -256,23 +258,33 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
     metrics = {"MAE": "mae", "RMS": "rms", "max": "max_abs"}
     rows: list[tuple[str | float, ...]] = []
     sections = []
+    banded = any(a.band for a in assessments)
     for mine in _by_target(assessments):
         sections.append(len(rows))
         none = (mine[0].none_metric(m) for m in metrics.values())
-        rows.append((Toned(f"{mine[0].target}, none", "strong"), *none, "", "", ""))
+        rows.append((Toned(f"{mine[0].target}, none", "strong"), *none, *[""] * (5 if banded else 3)))
         for a in mine:
             figures = (a.metric(m) for m in metrics.values())
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
-            rows.append((a.model, *figures, less, "-".join(map(str, dict.fromkeys(a.n_sensors))), verdict(a.word)))
-    headings = (*((h, ".2f") for h in metrics), ("less", ">"), ("sensors", ">"), ("verdict", ""))
+            held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
+            sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))
+            rows.append((a.model, *figures, less, *held, sensors, verdict(a.word)))
+    band = (("in band", ">"), ("+-", ".2f")) if banded else ()
+    headings = (*((h, ".2f") for h in metrics), ("less", ">"), *band, ("sensors", ">"), ("verdict", ""))
     columns = (Column("", 0), *(Column(h, k, form, whole=True) for k, (h, form) in enumerate(headings, start=1)))
     return Layout(
         columns,
         rows,
-        caption="residual in um where it was judged",
+        caption="residual in um where it was judged" + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),
     )
+
+
+def _band_words(assessments: Sequence[Assessment]) -> str:
+    """Return what the columns of the bands are, if there is a band."""
+    names = dict.fromkeys(name for a in assessments if a.overall and a.band for name in a.band.split("; "))
+    return f"; in band, +-: rows that the band held, its mean half-width ({'; '.join(names)})" if names else ""
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:

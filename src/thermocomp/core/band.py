@@ -64,6 +64,13 @@ class Band:
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
+    def tell(self, unit: str) -> str:
+        """Return it in words, with its half-widths where the structures agree, in a unit."""
+        rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
+        if not self.speeds:
+            rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
+        return f"{self.words}: half-width at least {rest} at rest and {run} running, more where its structures differ"
+
     def turning(self, change: FloatArray) -> NDArray[np.bool_]:
         """Return whether the spindle turns in states of the inputs, (..., n_inputs)."""
         return np.asarray((np.abs(change[..., self.speeds]) > STANDS).any(axis=-1))

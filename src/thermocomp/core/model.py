@@ -6,7 +6,7 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -252,8 +252,12 @@ class ErrorModel(ABC):
         """
         if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
-        change, _ = self.clip(_bounded(inputs) - state.reference)
+        change = self.change(state, inputs)
         return self.band.half_width(change, self._spread(state.memory, change))
+
+    def change(self, state: State, inputs: FloatArray) -> FloatArray:
+        """Return what the model makes of a reading: inputs minus their reference, within the trained range."""
+        return self.clip(_bounded(inputs) - state.reference)[0]
 
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
@@ -297,6 +301,43 @@ class ErrorModel(ABC):
         InputError
             A column is missing or holds something that is no number; or the time is missing for a model with a memory.
         """
+        said = [state.deviation for state, _ in self.walk(table, time, reference=reference)]
+        return np.array(said, dtype=np.float64)
+
+    def half_widths(
+        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    ) -> FloatArray:
+        """Return the half-widths of the band about what `predict` says of the same table.
+
+        Parameters
+        ----------
+        table, time, reference
+            Of `predict`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+            [unit]; nan without a band, and before the first complete row of a test.
+        """
+        found = [self.half_width(state, last) for state, last in self.walk(table, time, reference=reference)]
+        return np.array(found, dtype=np.float64)
+
+    def walk(
+        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    ) -> Iterator[tuple[State, FloatArray]]:
+        """Replay the model through a table as `predict` does, and yield its state after each row.
+
+        Parameters
+        ----------
+        table, time, reference
+            Of `predict`.
+
+        Yields
+        ------
+        state : State
+        values : ndarray of shape (n_inputs,)
+            The last complete reading [units of the inputs]; nan before there is one.
+        """
         columns = [read_numbers(table, i.name, f"model of {self.target}") for i in self.inputs]
         clock = read_clock(table, time, f"model of {self.target}", needed=self.remembers)
         n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
@@ -318,7 +359,7 @@ class ErrorModel(ABC):
                 zeros[a], values[a:b] = find_zero(
                     self.zeroing, self.init(reference).reference, clock[a:b], values[a:b], resting[a:b], usable[a:b]
                 )
-        found, state, since = np.empty(n), self.init(reference), 0.0
+        state, since, last = self.init(reference), 0.0, np.full(len(columns), np.nan)
         for k in range(n):
             if k in zeros:
                 state, since = self.init(zeros[k]), 0.0
@@ -326,9 +367,8 @@ class ErrorModel(ABC):
                 since += float(steps[k]) if np.isfinite(steps[k]) else 0.0
             if usable[k]:
                 state, _ = self.step(state, values[k], since)
-                since = 0.0
-            found[k] = state.deviation
-        return found
+                since, last = 0.0, values[k]
+            yield state, last
 
     # -- derived numbers ---------------------------------------------------------------------------------------------
 

@@ -20,6 +20,7 @@ MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
 #: how a dot is filled
 FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
+BAND = "#d6e8f5"
 #: characters of a name along an axis
 LONGEST = 28
 POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
@@ -129,6 +130,8 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
         for ax, block in zip(axes.flat, blocks, strict=False):
             hours = _clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
+            if block.band:
+                _draw_band(ax, block, hours, points)
             ax.plot(
                 *thin_points(hours, block.measured, points),
                 color=MEASURED,
@@ -154,6 +157,15 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             ax.set_ylabel(f"{shorten(assessment.target.removesuffix('_um'), LONGEST)} [um]")
         add_legend(figure, loc="outside upper left", ncols=3)
         return svg(figure)
+
+
+def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> None:
+    """Draw the band about what the model alone predicts; nothing where there is none."""
+    alone = block.predicted if block.alone is None else block.alone
+    assert block.half_widths is not None
+    rows = slice(None, None, max(1, len(hours) // points))
+    low, high = ((alone + sign * block.half_widths)[rows] for sign in (-1, 1))
+    ax.fill_between(hours[rows], low, high, color=BAND, lw=0, zorder=0.5, label=block.band)
 
 
 def robustness(comparison: Comparison, model: str) -> str:

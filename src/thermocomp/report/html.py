@@ -9,12 +9,14 @@ from markupsafe import Markup
 
 from thermocomp import __version__
 from thermocomp.assessment.choice import Choice
-from thermocomp.assessment.results import Comparison
+from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.core.draft import write_text
+from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
-from thermocomp.report import figures, selections
+from thermocomp.report import contributions, figures, selections
+from thermocomp.report.bands import describe_coverage
 from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
 
@@ -46,11 +48,18 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             blocks = [
                 a for a in comparison.assessments if (a.target, a.model) == (target, shown.model) and not a.overall
             ]
-            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times))
-    stressed = dict.fromkeys(model for model, _ in drawn.values())
+            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times), _held(shown))
+    stressed = dict.fromkeys(model for model, *_ in drawn.values())
+    content = summarise(comparison, recordings, samples)
+    models = {t["name"]: t["formula"]["model"] for t in content["targets"] if t["formula"]}
     return page(
         "report.html",
-        **summarise(comparison, recordings, samples),
+        **content,
+        answers={
+            target: contributions.explain(model, samples)
+            for target, model in models.items()
+            if samples is not None and isinstance(model, PacedDynamic)
+        },
         measured=[figures.measured(r) for r in recordings],
         overview=figures.overview(comparison),
         predictions=drawn,
@@ -60,6 +69,10 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             if any(a.model == m and a.robustness is not None for a in overall)
         },
     )
+
+
+def _held(shown: Assessment) -> str:
+    return describe_coverage(shown) if shown.band and not shown.failure else ""
 
 
 def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -> str:

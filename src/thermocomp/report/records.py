@@ -136,6 +136,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
         "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
         "readings_turned_away": a.rejected,
         "first_turned_away": a.turned_away,
+        **_band(a),
     }
     if a.robustness is not None:
         r = a.robustness
@@ -152,8 +153,13 @@ def assessment(a: Assessment) -> dict[str, Any]:
     return content
 
 
-def model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
-    """Return a frozen model with its honest error."""
+def _band(a: Assessment) -> dict[str, Any]:
+    """Return what the band of a model is called, what share of the judged rows it held, and how wide it was there."""
+    return {"band": a.band or None, "coverage_pct": 100 * a.coverage, "half_width_um": a.half_width}
+
+
+def model(m: ErrorModel, r_squared: float, overall: Assessment) -> dict[str, Any]:
+    """Return a frozen model with its honest error, and how the bands did where the method was judged."""
     honest = m.honest_error
     return {
         "target": m.target,
@@ -168,6 +174,8 @@ def model(m: ErrorModel, r_squared: float) -> dict[str, Any]:
         "none_rms_um": honest.none_rms if honest else None,
         "verdict": honest.word if honest else None,
         "reason": honest.why if honest else None,
+        **_band(overall),
+        "band": m.band.words if m.band else None,
     }
 
 

@@ -159,6 +159,7 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
             {"model": a.model, "cells": [{u.name: u for u in a.verdict.units}.get(name) for name in cycles]}
             for a in overall
         ],
+        "banded": any(a.band for a in overall),
         "best": best.model if best else None,
         "formula": _formula(comparison, best, samples),
     }
@@ -180,6 +181,8 @@ def _formula(comparison: Comparison, best: Assessment | None, samples: Samples |
     learned = model.provenance.cycles if model.provenance else ()
     return {
         "text": model.formula(),
+        "model": model,
+        "band": "" if model.band is None else model.band.tell(model.unit),
         "family": model.family,
         "support": model.support,
         "inputs": model.inputs,

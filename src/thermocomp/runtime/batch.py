@@ -29,6 +29,7 @@ class ModelRun(NamedTuple):
     outside: BoolArray  #: (n_rows,), an input of the model alone was outside the trained range
     rejected: BoolArray  #: (n_rows,), complete readings that the gate turned away
     why: str  #: the first of them; empty if there is none
+    half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without one, and where that counts anew
 
 
 def run(
@@ -69,14 +70,16 @@ def run(
     complete = np.asarray(np.isfinite(values).all(axis=1))
     gate = _gated(model, time, values, stands, model.init(reference).reference)
     zero, rested = find_test_zero(model, time, values, stands, complete, reference)
-    alone, outside = _said(model, time, rested, complete, zero)
+    alone, outside, half_width = _said(model, time, rested, complete, zero, band=model.band is not None)
     same = np.array_equal(gate.passed, complete)
     gated = alone if same else _said(model, time, *_of_gate(values, gate))[0]
     known = gate.known
     if anew is not None:
         alone, _ = _counted(alone, model, time, complete, stands, anew)
+        half_width = np.full(len(time), np.nan)  # it is that of a deviation from the cold machine
         gated, known = _counted(gated, model, time, gate.passed, stands, anew)
-    return ModelRun(alone, _moved(gated, gate.passed, time, limits, known), outside, complete & ~gate.passed, gate.why)
+    moved = _moved(gated, gate.passed, time, limits, known)
+    return ModelRun(alone, moved, outside, complete & ~gate.passed, gate.why, half_width)
 
 
 def find_test_zero(
@@ -167,28 +170,45 @@ def _counted(
 
 
 def _said(
-    model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray
-) -> tuple[FloatArray, BoolArray]:
-    """Return deviation and whether an input was outside, per row; a reading that is not used holds the last one."""
+    model: ErrorModel,
+    time: FloatArray,
+    values: FloatArray,
+    used: BoolArray,
+    zero: FloatArray,
+    *,
+    band: bool = False,
+) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Return deviation, whether an input was outside and the band's half-width, per row; an unused reading holds them.
+
+    Without `band` the half-width is nan.
+    """
     rows = np.flatnonzero(used)
-    deviation, outside = np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_)
+    deviation, outside, half_width = (
+        np.zeros(len(time)),
+        np.zeros(len(time), dtype=np.bool_),
+        np.full(len(time), np.nan),
+    )
     beyond: BoolArray
     if not rows.size:
-        return deviation, outside
+        return deviation, outside, half_width
     state = model.init()._replace(reference=zero)
+    width = np.full(len(rows), np.nan)
     if model.remembers or model.support.policy == "hold":
         said, beyond = np.empty(len(rows)), np.empty(len(rows), dtype=np.bool_)
         last = float(time[rows[0]])
         for k, row in enumerate(rows.tolist()):
             state, said[k] = model.step(state, values[row], float(time[row]) - last)
             beyond[k], last = bool(state.outside.any()), float(time[row])
+            if band:
+                width[k] = model.half_width(state, values[row])
     else:  # each reading stands alone: all in one step
         state, each = model.step(state, values[rows], 0.0)
         said, beyond = np.broadcast_to(each, rows.shape), np.asarray(state.outside.any(axis=-1))
+        width = model.half_width(state, values[rows])
     before = np.cumsum(used) - 1  # the last reading that was used, per row
     known = before >= 0
-    deviation[known], outside[known] = said[before[known]], beyond[before[known]]
-    return deviation, outside
+    deviation[known], outside[known], half_width[known] = (x[before[known]] for x in (said, beyond, width))
+    return deviation, outside, half_width
 
 
 def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: Limits | None, known: int) -> FloatArray:

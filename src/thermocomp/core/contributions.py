@@ -1,0 +1,98 @@
+"""What the answer of a paced model is made of: each input with its lags, and how much it counts."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.columns import Columns
+from thermocomp.core.model import FloatArray
+from thermocomp.core.paceddynamic import PacedDynamic
+
+
+class Gain(NamedTuple):
+    """How much an input counts: a temperature per degree, a spindle speed at the top speed of the training."""
+
+    name: str
+    quantity: str
+    instantaneous: float  #: followed within one step between rows [unit per degC, or unit]
+    settled: float  #: followed in the end, itself and all its lags [unit per degC, or unit]
+    bound: float  #: most that it can add, whatever it reads: inputs are clipped [unit]
+
+
+def contributions(
+    model: PacedDynamic, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+) -> dict[str, FloatArray]:
+    """Return what each input, with its lags or states, adds to the deviation.
+
+    With the intercept they sum up to what the model predicts, unless it holds or fades outside its trained range.
+
+    Parameters
+    ----------
+    model : PacedDynamic
+    table, time, reference
+        See `thermocomp.core.model.ErrorModel.predict`.
+
+    Returns
+    -------
+    dict of str to ndarray of shape (n_rows,)
+        By name of the input [unit of the model]; 0 before the first complete row of a test.
+
+    Raises
+    ------
+    InputError
+        See `thermocomp.core.model.ErrorModel.predict`.
+    """
+    direct, weights = model.read_out
+    of = np.zeros((len(weights), len(model.inputs)))
+    of[np.arange(len(weights)), _owners(model)] = weights
+    parts = []
+    for state, last in model.walk(table, time, reference=reference):
+        if state.memory is None:
+            parts.append(np.zeros(len(model.inputs)))
+        else:
+            parts.append(model.change(state, last) * direct + state.memory @ of)
+    found = np.array(parts, dtype=np.float64).reshape(-1, len(model.inputs))
+    return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
+
+
+def gains(model: PacedDynamic, step: float) -> list[Gain]:
+    """Return how much each input counts, the largest bound first.
+
+    Parameters
+    ----------
+    model : PacedDynamic
+    step : float
+        Time between two rows [s].
+
+    Returns
+    -------
+    list of Gain
+    """
+    direct, weights = model.read_out
+    owners, bank = _owners(model), model.bank
+    rates = bank.rates.copy()
+    rates[len(rates) - len(bank.gain) :] += bank.gain  # of a speed: at top speed
+    followed = weights * lagbank.step_response(step, 1.0 / rates)
+    low, high = model.clip(np.full(len(model.inputs), -np.inf))[0], model.clip(np.full(len(model.inputs), np.inf))[0]
+    found = []
+    for k, i in enumerate(model.inputs):
+        own = owners == k
+        if k in bank.temperatures:
+            parts = np.append(direct[k], weights[own])
+            ends = np.outer(parts, (low[k], high[k]))
+        else:
+            parts = weights[own]
+            share = max(abs(low[k]), abs(high[k])) / model.top_speed
+            ends = np.outer(parts, (0.0, 1.0)) * share ** bank.powers[bank.speeds == k][:, None]
+        bound = max(float(ends.max(axis=1).sum()), -float(ends.min(axis=1).sum()))
+        now = float(direct[k] + followed[own].sum())
+        found.append(Gain(i.name, i.quantity, now, float(parts.sum()), bound))
+    return sorted(found, key=lambda g: -g.bound)
+
+
+def _owners(model: PacedDynamic) -> NDArray[np.intp]:
+    """Return the input that each state of the memory follows."""
+    bank = model.bank
+    return np.append(np.tile(bank.temperatures, bank.taus), bank.speeds)

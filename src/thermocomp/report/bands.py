@@ -1,0 +1,36 @@
+"""How far models may be off, in words: their bands, and how those did where they were judged."""
+
+import math
+from collections.abc import Sequence
+
+from thermocomp.assessment.results import Assessment
+from thermocomp.core.model import ErrorModel
+
+
+def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessment]) -> list[str]:
+    """Return a line for each model that has a band.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+    assessments : sequence of Assessment
+        The last words on them, one per model, in their order.
+
+    Returns
+    -------
+    list of str
+    """
+    lines = []
+    for model, a in zip(models, assessments, strict=True):
+        if model.band is not None:
+            held = "" if math.isnan(a.coverage) else f". {describe_coverage(a)}"
+            lines.append(f"{model.target}: {model.band.tell(model.unit)}{held}")
+    return lines
+
+
+def describe_coverage(a: Assessment) -> str:
+    """Return what share of the judged rows the band held, and how wide it was there."""
+    return (
+        f"The band held {100 * a.coverage:.0f} % of the judged rows, with a mean half-width of {a.half_width:.2f} um"
+        f" ({a.band})"
+    )

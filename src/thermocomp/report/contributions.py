@@ -1,0 +1,98 @@
+"""What the answer of a paced model is made of: a figure and a table for the page."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from thermocomp.core.contributions import contributions, gains
+from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.core.shown import shorten
+from thermocomp.recording.samples import Samples
+from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
+from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
+from thermocomp.report.layout import Column, Layout
+
+#: inputs that are drawn; the others are drawn as one
+MOST = 6
+
+
+class Answer(NamedTuple):
+    """What the answer of a model is made of."""
+
+    figure: Drawn
+    table: Layout
+    lags: str  #: time constants, in words
+
+
+def explain(model: PacedDynamic, samples: Samples) -> Answer:
+    """Return what the answer of a model is made of in some recordings.
+
+    Parameters
+    ----------
+    model : PacedDynamic
+    samples : Samples
+        With all of its inputs.
+
+    Returns
+    -------
+    Answer
+    """
+    steps = samples.dt()
+    between = steps[np.isfinite(steps) & (steps > 0)]
+    return Answer(_draw(model, samples), _table(model, float(np.median(between))), _lags(model))
+
+
+def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
+    """Show what each input adds over time; recordings follow each other."""
+    names = [c.name for c in samples.inputs]
+    columns = [names.index(i.name) for i in model.inputs]
+    each: list[dict[str, FloatArray]] = []
+    for test in np.unique(samples.test).tolist():
+        mine = samples.test == test
+        table = dict(zip(names, samples.values[mine].T, strict=True))
+        each.append(contributions(model, table, samples.time[mine], reference=samples.reference()[test, columns]))
+    parts = {i.name: np.concatenate([one[i.name] for one in each]) for i in model.inputs}
+    ranked = sorted(parts, key=lambda name: -float(np.sqrt((parts[name] ** 2).mean())))
+    steps = samples.dt()
+    hours = np.cumsum(np.where(np.isfinite(steps), steps, 0.0)) / 3600
+    with drawing("answer" + model.target):
+        figure = Figure(figsize=(9.6, 3.4), layout="constrained")
+        ax = figure.subplots()
+        ax.axhline(0, color="#aaa", lw=0.8)
+        whole = np.sum(list(parts.values()), axis=0) + model.intercept
+        ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label="predicted: all together")
+        for name, colour in zip(ranked[:MOST], COLOURS, strict=False):
+            ax.plot(*thin_points(hours, parts[name]), color=colour, label=name)
+        if rest := ranked[MOST:]:
+            others = np.sum([parts[name] for name in rest], axis=0)
+            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"the other {len(rest)}")
+        ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
+        ax.set_xlabel("time [h]")
+        ax.margins(x=0)
+        add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.4)
+        return svg(figure)
+
+
+def _table(model: PacedDynamic, step: float) -> Layout:
+    per = {"temperature": f"{model.unit}/degC"}
+    top = f"{model.unit} at {model.top_speed:.0f} 1/min"
+    rows: list[dict[str, Any]] = [g._asdict() | {"per": per.get(g.quantity, top)} for g in gains(model, step)]
+    columns = (
+        Column("input", "name"),
+        Column(f"within {step:g} s", "instantaneous", "um"),
+        Column("settled", "settled", "um"),
+        Column("in", "per"),
+        Column("adds at most", "bound", "um", model.unit),
+    )
+    return Layout(columns, rows)
+
+
+def _lags(model: PacedDynamic) -> str:
+    lags = ", ".join(f"{tau / 60:g}" for tau in model.time_constants)
+    found = [f"Lags of the temperatures: {lags} min."] if lags else []
+    if model.states:
+        ends = [sorted({getattr(s, key) / 60 for s in model.states}) for key in ("stopped", "running")]
+        rest, run = (f"{e[0]:g} to {e[-1]:g}" for e in ends)
+        found.append(f"States of the speed: {rest} min at rest, {run} min at {model.top_speed:.0f} 1/min.")
+    return " ".join(found)
