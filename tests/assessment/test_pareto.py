@@ -293,4 +293,7 @@ def test_a_copy_is_never_recommended_beside_what_it_copies() -> None:
     nearest = {row[0]: row[1:3] for row in stands.rows}
     assert nearest["t7_C"][0] == "t1_C"
     assert nearest["t2_C"][0] == "t8_C"
-    assert all(isinstance(nearest[n][1], float) and nearest[n][1] < 0.2 for n in ("t1_C", "t2_C", "t7_C", "t8_C"))
+    for name in ("t1_C", "t2_C", "t7_C", "t8_C"):
+        left = nearest[name][1]
+        assert isinstance(left, float)
+        assert left < 0.2
