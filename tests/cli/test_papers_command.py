@@ -27,8 +27,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     """Studies that take no time; what was asked of them."""
     found: list[tuple[str, int]] = []
 
-    def made(name: str, *, seed: int, progress: Progress) -> Study:
-        found.append((name, seed))
+    def made(name: str, *, seed: int, progress: Progress, physics: str | None = None) -> Study:
+        found.append((name, seed) if physics is None else (f"{name}, {physics}", seed))
         progress(0.5, "half of it")
         panel = Panel("", "time [h]", "z [um]", [PlotCurve("z", np.arange(3.0), np.arange(3.0))])
         table = StudyTable("Errors", ("model", "RMS"), [["a", "1.25"]])
@@ -94,7 +94,7 @@ def test_some_for_programs(asked: list[tuple[str, int]], capsys: pytest.CaptureF
 
 
 def test_runs_that_do_not_agree_are_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    def made(name: str, *, seed: int, progress: Progress) -> Study:
+    def made(name: str, *, seed: int, progress: Progress, physics: str | None = None) -> Study:
         progress(1.0, "all of it")
         finding = "" if seed in (1, 100) else f"not with {seed}"
         claims = (
@@ -150,6 +150,11 @@ def test_an_unknown_name_is_told_the_names(capsys: pytest.CaptureFixture[str]) -
     assert all(f'"{name}"' in said for name in studies.STUDIES)
 
 
+def test_the_physics_is_asked_for_where_it_is_known(asked: list[tuple[str, int]]) -> None:
+    assert run(["papers", "wessel2004", "--physics", "nonlinear", "--repeats", "2", "--json"]) == 0
+    assert asked == [("wessel2004, nonlinear", 0), ("wessel2004, nonlinear", 100)]
+
+
 def test_refusals(asked: list[tuple[str, int]], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     drift = tmp_path / "drift.csv"
     recordings.write(small_machine(), drift)
@@ -157,6 +162,9 @@ def test_refusals(asked: list[tuple[str, int]], tmp_path: Path, capsys: pytest.C
         (["--seed", "-1"], "must not be negative"),
         (["hwang", "--with", str(drift)], "--with is for cross"),
         (["hwang", "--models", "ols"], "--models is for cross"),
+        (["hwang", "--physics", "nonlinear"], "--physics is for wessel2004, not for hwang"),
+        (["--physics", "linear"], "--physics is for wessel2004, not for chen1996"),
+        (["cross", "--physics", "nonlinear"], "--physics is for wessel2004, not for cross"),
         (["cross", "--target", "x_um"], "--target is for measured recordings"),
         (["cross", "--with", str(tmp_path / "no.csv")], "no.csv"),
         (["hwang", "-o", str(tmp_path / "no" / "p.html")], "there is no folder"),
@@ -181,7 +189,7 @@ def test_a_study_that_fails_leaves_the_others(
 ) -> None:
     made, (first, second, *_) = studies.run, studies.STUDIES
 
-    def some(name: str, *, seed: int, progress: Progress) -> Study:
+    def some(name: str, *, seed: int, progress: Progress, physics: str | None = None) -> Study:
         if name == first:
             raise ZeroDivisionError("by <zero>")
         return made(name, seed=seed, progress=progress)

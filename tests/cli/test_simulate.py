@@ -35,6 +35,15 @@ def test_a_protocol_of_ones_own(protocol: Path, tmp_path: Path, capsys: pytest.C
     assert recording.table["z_um"].abs().max() > 2.0
 
 
+def test_the_physics_of_the_machine_is_chosen(protocol: Path, tmp_path: Path) -> None:
+    for name, options in (("a", []), ("b", ["--physics", "linear"]), ("c", ["--physics", "nonlinear"])):
+        assert run(["simulate", str(protocol), "-o", str(tmp_path / f"{name}.csv"), *options]) == 0
+    plain, linear, nonlinear = ((tmp_path / f"{name}.csv").read_text() for name in "abc")
+    assert plain == linear != nonlinear
+    with pytest.raises(SystemExit):
+        run(["simulate", str(protocol), "-o", str(tmp_path / "d.csv"), "--physics", "quadratic"])
+
+
 def test_every_test_gets_a_file(protocol: Path, tmp_path: Path) -> None:
     protocol.write_text(PROTOCOL + "copies = 2\n", encoding="utf-8")
     assert run(["simulate", str(protocol), "-o", str(tmp_path / "rec.csv")]) == 0

@@ -36,6 +36,7 @@ def test_everything_that_can_be_written(tmp_path: Path) -> None:
     text = """
 description = "all of it"
 machine = "centre"
+physics = "nonlinear"
 sampling = "1 min"
 climate = {like = "stable", mean = 19, memory = "2 h", begin = "6.5 h"}
 places = {t1 = "housing", t2 = "table"}
@@ -84,7 +85,7 @@ perfect = false
     ):
         read_protocol(written(tmp_path, text))
     experiment = read_protocol(written(tmp_path, text.replace("90 s", "2 min")))
-    assert (experiment.description, experiment.machine) == ("all of it", "centre")
+    assert (experiment.description, experiment.machine, experiment.physics) == ("all of it", "centre", "nonlinear")
     assert experiment.names == ("mine-first", "mine-2-1", "mine-2-2")
     first, second = experiment.tests
     assert first.climate == Climate(

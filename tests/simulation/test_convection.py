@@ -37,14 +37,14 @@ def test_rotating_convection_is_beckers() -> None:
 
 
 def test_with_emissivity_alone_it_is_the_fourth_power() -> None:
-    face, still = (Faces.of([Face(0.5, 1.0, 8.0, e)]) for e in (0.9, 0.0))
+    face, still = (Faces([Face(0.5, 1.0, 8.0, e)]) for e in (0.9, 0.0))
     by_radiation = 70.0 * (face.conductance([90.0], [20.0]) - still.conductance([90.0], [20.0]))
     expected = 0.9 * 0.5 * STEFAN_BOLTZMANN * ((90.0 + KELVIN) ** 4 - (20.0 + KELVIN) ** 4)
     assert by_radiation == pytest.approx(expected)
 
 
 def test_laminar_convection_grows_with_a_power_of_the_rise_between_a_sixth_and_a_third() -> None:
-    bare = Faces.of([Face(1.0, 0.2, 8.0, 0.0)])
+    bare = Faces([Face(1.0, 0.2, 8.0, 0.0)])
     low, high = (float(bare.conductance([20.0 + rise], [20.0])[0]) for rise in (5.0, 40.0))
     assert 1 / 6 < math.log(high / low) / math.log(8.0) < 1 / 3
     # it does not matter which side is the warm one
@@ -52,7 +52,7 @@ def test_laminar_convection_grows_with_a_power_of_the_rise_between_a_sixth_and_a
 
 
 def test_speed_counts_only_for_what_lies_and_blends_with_free_convection() -> None:
-    lying, upright = (Faces.of([Face(1.0, 0.06, 8.0, 0.0, lying=flag)]) for flag in (True, False))
+    lying, upright = (Faces([Face(1.0, 0.06, 8.0, 0.0, lying=flag)]) for flag in (True, False))
     conductivity, viscosity, prandtl = air_at(np.array([30.0 + KELVIN]))
     still = lying.conductance([40.0], [20.0])
     turning = lying.conductance([40.0], [20.0], speed=3000.0)
@@ -66,7 +66,7 @@ def test_speed_counts_only_for_what_lies_and_blends_with_free_convection() -> No
 
 
 def test_wind_and_what_the_linear_model_has() -> None:
-    faces = Faces.of([Face(2.0, 0.2, 8.0, 0.0, wind=12.0, films_turning=12.0), Face(1.0, 0.2, 7.0, 0.0)])
+    faces = Faces([Face(2.0, 0.2, 8.0, 0.0, wind=12.0, films_turning=12.0), Face(1.0, 0.2, 7.0, 0.0)])
     assert faces.linear(0.0) == pytest.approx([16.0, 7.0])
     assert faces.linear(0.5) == pytest.approx([28.0, 7.0])
     more = faces.conductance([30.0, 30.0], [20.0, 20.0], wind=0.5) - faces.conductance([30.0, 30.0], [20.0, 20.0])

@@ -117,7 +117,7 @@ def left_over(
 
 def test_what_comes_into_the_tool_is_stored_or_lost_to_the_air(tool: NonlinearTool) -> None:
     model, dt = tool.model, 2.0
-    faces = Faces.of(list(TOOL_FACES.values()))
+    faces = Faces(list(TOOL_FACES.values()))
     rows, air = model.rows(tuple(TOOL_FACES)), AIR.values
 
     def loss(z: FloatArray) -> float:
@@ -141,14 +141,14 @@ def test_long_heated_the_tool_loses_what_it_gets(tool: NonlinearTool) -> None:
     _, truth = tool.run(tool.init(AIR), [HEATED] * 1000, steps(1000), 300.0)
     names = list(TOOL_FACES)
     surface = np.array([at(tool, truth, name)[-1] for name in names])
-    lost = Faces.of(list(TOOL_FACES.values())).conductance(surface, 22.0) @ (surface - 22.0)
+    lost = Faces(list(TOOL_FACES.values())).conductance(surface, 22.0) @ (surface - 22.0)
     foot = 60.0 * np.pi * 0.1**2 * (at(tool, truth, "on_foot")[-1] - 22.0)
     assert lost + foot == pytest.approx(65.0, rel=2e-3)
 
 
 def test_what_comes_into_the_centre_is_stored_or_lost(centre: NonlinearCentre) -> None:
     model, air, drive, dt = centre.model, AIR.values, Drive(2560.0, cooled=False), 5.0
-    faces = Faces.of(list(CENTRE_FACES.values()))
+    faces = Faces(list(CENTRE_FACES.values()))
     theta = centre._theta(drive)
     rows = model.rows((*CENTRE_FACES, "enclosure"))
     given = sum(centre.heat.given(drive).values())

@@ -11,7 +11,7 @@ Churchill, A comprehensive correlating equation for laminar, assisting, forced a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,27 +54,29 @@ class Face:
     films_turning: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
 class Faces:
-    """Several surfaces at once; each field of `Face` is an array of shape (n,)."""
+    """Several surfaces at once.
 
-    area: FloatArray
-    length: FloatArray
-    films: FloatArray
-    emissivity: FloatArray
-    curvature: FloatArray
-    lying: FloatArray
-    wind: FloatArray
-    films_turning: FloatArray
+    Parameters
+    ----------
+    faces : sequence of Face
+    """
 
-    @classmethod
-    def of(cls, faces: Sequence[Face]) -> "Faces":
-        """Put surfaces together."""
-        return cls(**{f.name: np.array([float(getattr(face, f.name)) for face in faces]) for f in fields(Face)})
+    def __init__(self, faces: Sequence[Face]) -> None:
+        columns = np.array([astuple(face) for face in faces], dtype=np.float64).reshape(-1, len(fields(Face))).T
+        self._area, self._length, self._films, self._emissivity, self._curvature = columns[:5]
+        self._lying, self._wind, self._films_turning = columns[5:]
 
     def linear(self, rotation: float) -> FloatArray:
-        """Return the conductances of the linear model [W/K], with a share of its rotating convection in force."""
-        return self.area * (self.films + self.films_turning * rotation)
+        """Return the conductances of the linear model [W/K].
+
+        Parameters
+        ----------
+        rotation : float
+            Share of `Face.films_turning` in force.
+        """
+        result: FloatArray = self._area * (self._films + self._films_turning * rotation)
+        return result
 
     def conductance(self, surface: ArrayLike, air: ArrayLike, speed: float = 0.0, wind: float = 0.0) -> FloatArray:
         """Return the conductances [W/K].
@@ -91,33 +93,53 @@ class Faces:
         hot, cold = (np.asarray(t, dtype=np.float64) + KELVIN for t in (surface, air))
         film = (hot + cold) / 2.0
         conductivity, viscosity, prandtl = air_at(film)
-        grashof = GRAVITY * np.abs(hot - cold) / film * self.length**3 / viscosity**2
-        nusselt = free_convection(grashof * prandtl, prandtl, self.lying) + 0.435 * self.curvature
+        grashof = GRAVITY * np.abs(hot - cold) / film * self._length**3 / viscosity**2
+        nusselt = free_convection(grashof * prandtl, prandtl, self._lying) + 0.435 * self._curvature
         if speed:
-            reynolds = self.lying * np.pi * abs(speed) / 60.0 * self.length**2 / viscosity
+            reynolds = self._lying * np.pi * abs(speed) / 60.0 * self._length**2 / viscosity
             nusselt = np.cbrt(nusselt**3 + rotating_convection(reynolds, prandtl) ** 3)
-        radiation = self.emissivity * STEFAN_BOLTZMANN * (hot**2 + cold**2) * (hot + cold)
-        result: FloatArray = self.area * (conductivity / self.length * nusselt + radiation + self.wind * wind)
+        radiation = self._emissivity * STEFAN_BOLTZMANN * (hot**2 + cold**2) * (hot + cold)
+        result: FloatArray = self._area * (conductivity / self._length * nusselt + radiation + self._wind * wind)
         return result
 
 
 def air_at(temperature: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return conductivity [W/(m K)], kinematic viscosity [m2/s] and Prandtl number of air at a temperature [K].
+    """Return conductivity [W/(m K)], kinematic viscosity [m2/s] and Prandtl number of air.
 
     A straight line through Incropera's values at 300 and 350 K.
+
+    Parameters
+    ----------
+    temperature : ndarray
+        [K]
     """
     share = (temperature - 300.0) / 50.0
     return 26.3e-3 + 3.7e-3 * share, 15.89e-6 + 5.03e-6 * share, 0.707 - 0.007 * share
 
 
 def free_convection(rayleigh: FloatArray, prandtl: FloatArray, lying: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of vertical plates, and of cylinders that lie (Churchill and Chu 1975)."""
+    """Return the Nusselt numbers of vertical plates, and of cylinders that lie (Churchill and Chu 1975).
+
+    Parameters
+    ----------
+    rayleigh, prandtl : ndarray
+        With the height of a plate, the diameter of a cylinder.
+    lying : ndarray
+        1 for cylinders, 0 for plates.
+    """
     base, inner = np.where(lying > 0, 0.60, 0.825), np.where(lying > 0, 0.559, 0.492)
     result: FloatArray = (base + 0.387 * rayleigh ** (1 / 6) / (1.0 + (inner / prandtl) ** (9 / 16)) ** (8 / 27)) ** 2
     return result
 
 
 def rotating_convection(reynolds: FloatArray, prandtl: FloatArray) -> FloatArray:
-    """Return the Nusselt numbers of turning cylinders, with Re = u D / nu (Becker 1963)."""
+    """Return the Nusselt numbers of turning cylinders (Becker 1963).
+
+    Parameters
+    ----------
+    reynolds : ndarray
+        u D / nu.
+    prandtl : ndarray
+    """
     result: FloatArray = 0.133 * reynolds ** (2 / 3) * np.cbrt(prandtl)
     return result

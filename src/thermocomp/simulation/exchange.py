@@ -41,7 +41,18 @@ class Exchange:
     def of(
         cls, model: ReducedModel, operators: Operators, watched: Sequence[str], paths: Sequence[tuple[str, str | None]]
     ) -> "Exchange":
-        """Prepare paths between places that are watched and are inputs of the same name; None: the room's air."""
+        """Prepare paths.
+
+        Parameters
+        ----------
+        model : ReducedModel
+        operators : Operators
+            Of the step.
+        watched : sequence of str
+            Places that `operators` tells of after the step.
+        paths : sequence of (str, str or None)
+            From a place that is watched, and an input of the same name, to another one, or to the room's air.
+        """
         n = len(model.one)
         heat = np.zeros((len(model.inputs), len(paths)))
         difference, to_air = np.zeros((len(paths), len(watched))), np.zeros((len(paths), 3))

@@ -35,12 +35,12 @@ class Fit:
         Of the joint [mm].
     squeeze : float
         By how much the inner part's radius is too large at 20 degC; negative: a gap [um].
+    linear : float
+        Conductance that the linear model has in its place [W/(m2 K)].
     expansion : tuple of float
         Of inner and outer part [um/(m K)].
     modulus, poisson : tuple of float
         Of inner and outer part [MPa].
-    linear : float
-        Conductance that the linear model has in its place [W/(m2 K)].
     behind : float
         Conductance in series, such as that of an oil film behind a sleeve [W/(m2 K)].
     friction : float

@@ -6,7 +6,6 @@ expansion that grows as a part warms. Each value has its source, or says that it
 chosen by what a method makes of it.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,7 +17,7 @@ from thermocomp.simulation.convection import Face, Faces
 from thermocomp.simulation.exchange import Exchange
 from thermocomp.simulation.fits import Fit
 from thermocomp.simulation.joints import slide_with_friction
-from thermocomp.simulation.machine import Air, Drive, Truth, check, stretches
+from thermocomp.simulation.machine import Air, Drive, Truth, stretches
 from thermocomp.simulation.preload import AngularContact
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, Operators, ReducedModel
 from thermocomp.simulation.toolsystem import RestingTool, ToolState
@@ -107,18 +106,17 @@ class NonlinearTool(RestingTool):
         state = super().init(air).field
         return ToolState(state, float(self._slip(state[None], 0.0)[0]))
 
-    def run(self, state: ToolState, drives: Sequence[Drive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
-        """Advance by one step of `dt` per drive; see `thermocomp.simulation.toolsystem.RestingTool.run`."""
-        check(drives, air, dt)
-        parts = math.ceil(dt / self.longest_step)
+    def _advance(
+        self, now: FloatArray, drives: Sequence[Drive], air: FloatArray, dt: float, fields: FloatArray
+    ) -> None:
+        parts = len(fields) // len(drives)
         watched = (*self.faces, "taper_a", "taper_b", "grip_a", "grip_b")
         paths = [*((name, None) for name in self.faces), ("taper_a", "taper_b"), ("grip_a", "grip_b")]
-        operators = self.model.operators((), dt / parts, watched)
+        operators = self.model.operators((), dt, watched)
         exchange = Exchange.of(self.model, operators, watched, paths)
-        faces, m = Faces.of(list(self.faces.values())), len(self.faces)
+        faces, m = Faces(list(self.faces.values())), len(self.faces)
         extra, linear = np.zeros(len(paths)), faces.linear(0.0)
-        fields = np.empty((len(drives) * parts, len(self.model.one)))
-        now, seen = state.field, self.model.rows(watched) @ state.field
+        seen = self.model.rows(watched) @ now
         for first, last in stretches(drives):
             forced = operators.heat @ self._given(drives[first])
             for k in range(first * parts, last * parts):
@@ -130,14 +128,14 @@ class NonlinearTool(RestingTool):
                 exchange.settle(after, extra, around)
                 fields[k] = now = after[: len(now)]
                 seen = after[len(now) :]
+
+    def _move(self, fields: FloatArray, slipped: float) -> tuple[FloatArray, float]:
         observables = self._linear(fields)
         for name, square in _squared(self.model, fields).items():
             observables[:, self.observables.index(name)] += self.expansion_grows / 2.0 * square
-        slipped = self._slip(fields, state.slipped)
-        observables[:, self.observables.index("s1")] -= slipped
-        ends = slice(parts - 1, None, parts)
-        truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])
-        return ToolState(now, float(slipped[-1])), truth
+        behind = self._slip(fields, slipped)
+        observables[:, self.observables.index("s1")] -= behind
+        return observables, float(behind[-1])
 
     def _slip(self, fields: FloatArray, slipped: float) -> FloatArray:
         """How far the shank stays behind the front of the chuck, which grows more than it [um]."""
@@ -193,7 +191,7 @@ class NonlinearCentre(MachiningCentre):
         rooms = ["enclosure" if name in IN_WORK_SPACE else None for name in self.faces]
         paths = [*zip(self.faces, rooms, strict=True), ("seat_a", "seat_b"), ("taper_a", "taper_b")]
         exchange = Exchange.of(self.model, operators, self._watched, paths)
-        faces, m, n = Faces.of(list(self.faces.values())), len(self.faces), len(super()._watched)
+        faces, m, n = Faces(list(self.faces.values())), len(self.faces), len(super()._watched)
         turning = dict(zip(self.model.theta, self._theta(drive), strict=True))["rotation"]
         linear, wind = faces.linear(turning), self.heat.rotation(drive.speed)
         in_work_space = np.array([room is not None for room in rooms])

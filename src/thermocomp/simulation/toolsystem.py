@@ -101,9 +101,20 @@ class RestingTool:
         check(drives, air, dt)
         parts = math.ceil(dt / self.longest_step)
         fields = np.empty((len(drives) * parts, len(self.model.one)))
-        operators = self.model.operators((), dt / parts, ("surface",))
+        self._advance(state.field, drives, air, dt / parts, fields)
+        observables, slipped = self._move(fields, state.slipped)
+        ends = slice(parts - 1, None, parts)
+        truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])
+        return ToolState(fields[-1].copy(), slipped), truth
+
+    def _advance(
+        self, now: FloatArray, drives: Sequence[Drive], air: FloatArray, dt: float, fields: FloatArray
+    ) -> None:
+        """Fill in the fields after each part of each step."""
+        parts = len(fields) // len(drives)
+        operators = self.model.operators((), dt, ("surface",))
         surface = self.model.inputs.index("surface")
-        now, watched = state.field, float((self.model.rows(("surface",)) @ state.field).item())
+        watched = float((self.model.rows(("surface",)) @ now).item())
         for first, last in stretches(drives):
             given = self._given(drives[first])
             for k in range(first * parts, last * parts):
@@ -112,13 +123,14 @@ class RestingTool:
                 after = operators.state @ now + operators.heat @ given + operators.air @ air[k // parts]
                 fields[k] = now = after[:-1]
                 watched = float(after[-1])
+
+    def _move(self, fields: FloatArray, slipped: float) -> tuple[FloatArray, float]:
+        """Return the displacements that temperatures make [um], and how far the shank has slipped at the end."""
         observables = self._linear(fields)
         wish = self._wish(observables)
-        slipped = slide_with_friction(state.slipped, wish, self.stiction)
-        observables[:, self.observables.index("s1")] += slipped - wish
-        ends = slice(parts - 1, None, parts)
-        truth = Truth((fields @ self.model.temperature.T)[ends], observables[ends])
-        return ToolState(now, float(slipped[-1])), truth
+        slides = slide_with_friction(slipped, wish, self.stiction)
+        observables[:, self.observables.index("s1")] += slides - wish
+        return observables, float(slides[-1])
 
     def _linear(self, fields: FloatArray) -> FloatArray:
         result: FloatArray = (fields - REFERENCE_TEMPERATURE * self.model.one) @ self.model.observable.T
