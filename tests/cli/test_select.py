@@ -104,12 +104,12 @@ def test_ctrl_c_ends_a_search_and_shows_what_it_has(tmp_path: Path) -> None:
         "--max-sensors",
         "16",
     ]
-    for method, options, code, told in (
+    for method, extra, code, told in (
         ("subsets", ["--seconds", "300"], 0, "interrupted"),
         ("pareto", ["--verbose"], 130, "stopped"),
     ):
         with subprocess.Popen(
-            [*line, "--method", method, *options],
+            [*line, "--method", method, *extra],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
