@@ -124,7 +124,7 @@ def test_the_tables_and_lines_say_it(comparison: Comparison, capsys: pytest.Capt
     whole = of(comparison, "averaged")[-1]
     show_comparison(comparison, None, (), console, as_json=False)
     shown = " ".join(capsys.readouterr().out.split())
-    assert "in band" in shown
+    assert "held" in shown
     assert f"{100 * whole.coverage:.0f} %" in shown
     assert "90 % band by assumption, 3 cycles" in shown
     bare = replace(comparison, assessments=tuple(of(comparison, "ols")))

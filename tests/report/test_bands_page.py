@@ -74,7 +74,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     assert "Lags of the temperatures: 10, 30, 90 min." in page
     bare = replace(comparison, assessments=tuple(a for a in comparison.assessments if a.model == "ols"))
     page = html.render(bare, [small_machine()], samples)
-    assert "in band" not in page
+    assert "share of the judged rows" not in page
     assert "made of" not in page
 
 
