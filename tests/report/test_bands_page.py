@@ -17,6 +17,7 @@ from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
 from thermocomp.report import contributions, figures, html
+from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um
 
 WORDS = "90 % band by assumption, 3 cycles"
@@ -32,7 +33,7 @@ def comparison(samples: Samples) -> Comparison:
     return compare(samples, ["averaged", "ols"], splits.leave_one_cycle_out(samples), robustness=False)
 
 
-def drawn(comparison: Comparison, model: str) -> figures.Drawn:
+def drawn(comparison: Comparison, model: str) -> Drawn:
     *blocks, whole = (a for a in comparison.assessments if a.model == model)
     return figures.prediction(whole, blocks, [small_machine().time])
 
