@@ -9,7 +9,7 @@ from rich.console import Console
 from smallmachine import small_machine
 
 from thermocomp.assessment import study
-from thermocomp.assessment.compare import compare
+from thermocomp.assessment.compare import compare, split_by_cycle
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.cli.output import show_assess, show_comparison, show_fit
 from thermocomp.core.band import Band
@@ -19,7 +19,9 @@ from thermocomp.models.training import train
 from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
+from thermocomp.recording.starts import Start
 from thermocomp.report import records
+from thermocomp.report.bands import describe_bands
 from thermocomp.runtime import batch
 
 MODEL = PacedDynamic(
@@ -119,12 +121,33 @@ def test_a_model_without_a_band_says_nothing(comparison: Comparison) -> None:
     assert records.assessment(a)["band"] is None
 
 
+def test_a_cycle_without_a_band_has_no_words(comparison: Comparison) -> None:
+    whole = of(comparison, "averaged")[-1]
+    widths = np.where(whole.cycle == 1, np.nan, 1.0)
+    cut = split_by_cycle(replace(whole, half_widths=widths))
+    assert [bool(a.band) for a in cut] == [True, False, True, True]
+
+
+def test_where_all_counts_anew_nothing_is_said_of_the_band(comparison: Comparison) -> None:
+    frozen = of(comparison, "averaged")[0].frozen
+    assert frozen is not None
+    warm = replace(small_machine((1500.0, 2000.0), seed=3), name="warm")
+    earlier = small_machine((1200.0, 2200.0), seed=2)
+    judged = study.assess([frozen], [warm], starts=Start("rezeroed", earlier=(earlier,)))
+    (whole,) = judged.overall()
+    assert np.isfinite(whole.metric("rms"))
+    assert whole.band == ""
+    assert np.isnan(whole.coverage)
+    assert len(describe_bands(judged.models, judged.overall())) == 1
+    assert "held" not in describe_bands(judged.models, judged.overall())[0]
+
+
 def test_the_tables_and_lines_say_it(comparison: Comparison, capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(width=120)
     whole = of(comparison, "averaged")[-1]
     show_comparison(comparison, None, (), console, as_json=False)
     shown = " ".join(capsys.readouterr().out.split())
-    assert "in band" in shown
+    assert "held" in shown
     assert f"{100 * whole.coverage:.0f} %" in shown
     assert "90 % band by assumption, 3 cycles" in shown
     bare = replace(comparison, assessments=tuple(of(comparison, "ols")))

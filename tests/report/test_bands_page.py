@@ -39,7 +39,9 @@ def drawn(comparison: Comparison, model: str) -> Drawn:
 
 
 def test_the_band_lies_about_the_prediction(comparison: Comparison) -> None:
-    shown = drawn(comparison, "averaged")
+    # as if limits had held the correction back: the band is that of the model
+    apart = tuple(replace(a, predicted=a.predicted - 50.0) for a in comparison.assessments)
+    shown = drawn(replace(comparison, assessments=apart), "averaged")
     assert WORDS in shown
     *blocks, _ = (a for a in comparison.assessments if a.model == "averaged")
     assert len(blocks) == 4
@@ -56,6 +58,15 @@ def test_without_a_band_nothing_is_drawn(comparison: Comparison) -> None:
     shown = drawn(comparison, "ols")
     assert "band" not in shown
     assert not any(isinstance(c, PolyCollection) for ax in shown.figure.axes for c in ax.collections)
+
+
+def test_a_model_without_an_input_is_drawn_as_a_constant(samples: Samples) -> None:
+    model = train("averaged", samples, 0, np.ones(len(samples), np.bool_)).model
+    assert isinstance(model, PacedDynamic)
+    bare = replace(model, inputs=(), temperatures=(), states=(), spread=(), band=None, joint=None, intercept=2.5)
+    answer = contributions.explain(bare, samples)
+    assert np.asarray(answer.figure.figure.axes[0].lines[1].get_ydata()).tolist() == [2.5] * len(samples)
+    assert not answer.table.rows
 
 
 def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
@@ -75,7 +86,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     assert "Lags of the temperatures: 10, 30, 90 min." in page
     bare = replace(comparison, assessments=tuple(a for a in comparison.assessments if a.model == "ols"))
     page = html.render(bare, [small_machine()], samples)
-    assert "in band" not in page
+    assert "share of the judged rows" not in page
     assert "made of" not in page
 
 

@@ -208,6 +208,7 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
     for unit, block in zip(whole.verdict.units, blocks, strict=True):
         rows = np.isin(whole.cycle, block)
         measured, predicted = whole.measured[rows], whole.predicted[rows]
+        half_widths = None if whole.half_widths is None else whole.half_widths[rows]
         found.append(
             replace(
                 whole,
@@ -215,7 +216,8 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
                 measured=measured,
                 predicted=predicted,
                 alone=None if whole.alone is None else whole.alone[rows],
-                half_widths=None if whole.half_widths is None else whole.half_widths[rows],
+                half_widths=half_widths,
+                band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],

@@ -119,7 +119,7 @@ def judge(
         rejected=0 if limits is None else int(ran.rejected.sum()),
         turned_away="" if limits is None else ran.why,
         half_widths=None if model.band is None else ran.half_width,
-        band="" if model.band is None else model.band.words,
+        band=model.band.words if model.band is not None and np.isfinite(ran.half_width).any() else "",
     )
 
 

@@ -90,7 +90,7 @@ class Assessment:
         Of the band about what the model alone predicts, by the rows it has learned from alone; nan in rows without one
         [um].
     band : str
-        What the band is called; empty without one.
+        What the band is called; empty if no row has one.
     """
 
     model: str

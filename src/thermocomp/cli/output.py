@@ -269,7 +269,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
             held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
             sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))
             rows.append((a.model, *figures, less, *held, sensors, verdict(a.word)))
-    band = (("in band", ">"), ("+-", ".2f")) if banded else ()
+    band = (("held", ">"), ("+-", ".2f")) if banded else ()
     headings = (*((h, ".2f") for h in metrics), ("less", ">"), *band, ("sensors", ">"), ("verdict", ""))
     columns = (Column("", 0), *(Column(h, k, form, whole=True) for k, (h, form) in enumerate(headings, start=1)))
     return Layout(
@@ -284,7 +284,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
 def _band_words(assessments: Sequence[Assessment]) -> str:
     """Return what the columns of the bands are, if there is a band."""
     names = dict.fromkeys(name for a in assessments if a.overall and a.band for name in a.band.split("; "))
-    return f"; in band, +-: rows that the band held, its mean half-width ({'; '.join(names)})" if names else ""
+    return f"; held, +-: rows within the band, its mean half-width ({'; '.join(names)})" if names else ""
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:

@@ -53,7 +53,7 @@ def contributions(
             parts.append(np.zeros(len(model.inputs)))
         else:
             parts.append(model.change(state, last) * direct + state.memory @ of)
-    found = np.array(parts, dtype=np.float64).reshape(-1, len(model.inputs))
+    found = np.array(parts, dtype=np.float64).reshape(len(parts), len(model.inputs))
     return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
 
 

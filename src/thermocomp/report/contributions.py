@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from thermocomp.core.contributions import contributions, gains
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import shorten
+from thermocomp.models.pacedfeatures import usual_step
 from thermocomp.recording.samples import Samples
 from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, FloatArray, thin_points
@@ -38,9 +39,7 @@ def explain(model: PacedDynamic, samples: Samples) -> Answer:
     -------
     Answer
     """
-    steps = samples.dt()
-    between = steps[np.isfinite(steps) & (steps > 0)]
-    return Answer(_draw(model, samples), _table(model, float(np.median(between))), _lags(model))
+    return Answer(_draw(model, samples), _table(model, usual_step(samples.dt())), _lags(model))
 
 
 def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
@@ -60,12 +59,12 @@ def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
         figure = Figure(figsize=(9.6, 3.4), layout="constrained")
         ax = figure.subplots()
         ax.axhline(0, color="#aaa", lw=0.8)
-        whole = np.sum(list(parts.values()), axis=0) + model.intercept
+        whole = sum(parts.values(), np.full(len(samples), model.intercept))
         ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label="predicted: all together")
         for name, colour in zip(ranked[:MOST], COLOURS, strict=False):
             ax.plot(*thin_points(hours, parts[name]), color=colour, label=name)
         if rest := ranked[MOST:]:
-            others = np.sum([parts[name] for name in rest], axis=0)
+            others = sum((parts[name] for name in rest), np.zeros(len(samples)))
             ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"the other {len(rest)}")
         ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
         ax.set_xlabel("time [h]")
