@@ -20,6 +20,7 @@ from smallmachine import small_machine
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.arx import ARX
 from thermocomp.models.arx_net import NetARX
+from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.methods import METHODS
 from thermocomp.models.timed import TimedRegressor, derive_steps
@@ -31,6 +32,7 @@ FloatArray = NDArray[np.float64]
 MINUTE = 60.0
 LAGS: dict[str, Any] = {"temperature_lags": ((), (20 * MINUTE,)), "speed_lags": ((20 * MINUTE, 90 * MINUTE),)}
 MAKERS: dict[str, Callable[..., TimedRegressor]] = {
+    "averaged": lambda **more: AveragedDynamic(speed=["spindle_rpm"], structures=20, **more),
     "dynamic": lambda **more: DynamicRidge(speed=["spindle_rpm"], **LAGS, **more),
     "arx": lambda **more: ARX(inputs=["spindle_rpm"], **more),
     "arx-free-run": lambda **more: ARX(inputs=["spindle_rpm"], criterion="free-run", k_max=1, m_max=1, **more),

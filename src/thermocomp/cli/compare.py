@@ -37,8 +37,8 @@ def compare(
     study : StudyOptions
         What is predicted from what, and on what it is judged.
     models : list of str
-        Methods to compare, or all: ols, partial-f, mra, dynamic, grouping, subsets, ace, ace-monotone, mlp,
-        mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+        Methods to compare, or all: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
+        mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
     primary : str
         Method that is named beforehand: it is judged as if it were the only one, the others are corrected for the
         number tried. Without it that goes for the recommended one, which is chosen anew without each cycle.

@@ -33,8 +33,9 @@ def find_band(
     """Return the band of a model by the errors on its training's cycles, each left out.
 
     The error is taken in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and stop. A
-    cycle errs as a whole, so n cycles say of that size what n independent numbers do: Student's t with n degrees of
-    freedom. From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
+    cycle errs as a whole, so n cycles say of that size what n independent numbers do, and the size is that of cycles
+    left out of n, not of one more: the interval for one more number of a sample, Student's t with n - 1 degrees of
+    freedom times sqrt(1 + 1/n). From `CONFORMAL` cycles on nothing is assumed but that the cycles could have
     come in any order: the quantile of the errors, each cycle counting the same and one more, unknown, beside them.
 
     Parameters
@@ -75,7 +76,7 @@ def find_band(
         place = int(np.searchsorted(np.cumsum(weights[order]), level - 1e-9))
         factor = float(scores[order][min(place, len(order) - 1)])
     else:
-        factor = float(stats.t.ppf(0.5 + level / 2, n))
+        factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt(1 + 1 / n))
     return Band(level, basis, n, floor, factor * running, factor * stopped, tuple(speeds))
 
 
