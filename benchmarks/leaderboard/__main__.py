@@ -32,7 +32,7 @@ def main() -> int:
     parser.add_argument("--models", help="only these, separated by commas")
     parser.add_argument("--tests", help=f"only these of {', '.join(CASES)}")
     parser.add_argument(
-        "--seconds", type=float, default=20.0, help="processor time, most per model and test (default 20)"
+        "--seconds", type=float, default=40.0, help="processor time, most per model and test (default 40)"
     )
     parser.add_argument("-o", "--output", type=Path, help="folder for board.json and board.md (default: this one)")
     parser.add_argument("--published", metavar="MODEL", help="evaluate the published block of fl_thermal once, log it")
