@@ -46,7 +46,7 @@ def demo(
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
     study = StudyOptions(target=[c.name for c in read_recordings([recording], None)[0].displacements])
     if not json:
-        console.print("\n[bold]2. Four methods, judged on thermal cycles they have not seen[/]")
+        console.print("\n[bold]2. Five methods, judged on thermal cycles they have not seen[/]")
     compare([recording], study=study, output=report, overwrite=overwrite, json=json)
     if not json:
         console.print("\n[bold]3. 'averaged', fitted to everything and frozen[/]")
