@@ -1,6 +1,6 @@
 """Bands of `averaged`: what share of unseen cycles they hold, and how wide they are.
 
-Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2]`` (hours with 200; 30 take half an hour). On
+Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2]`` (200 take an hour of two free cores). On
 the virtual machine: protocols drawn at random (speeds, feeds, lengths of run and stop, weather by seed), of which the
 first 3, 5 or 10 cycles are learned from and three more are judged, by the replay of the frozen model. Then, where the
 measured data are there, fl_thermal: rows 0-6668, each cycle left out.
@@ -118,8 +118,13 @@ def measured(jobs: int) -> None:
     for k, target in enumerate(targets):
         mine = [h for (j, _), h in zip(pieces, held, strict=True) if j == k]
         each = ", ".join(f"{100 * h.coverage:.0f} %" for h in mine)
-        show(f"fl_thermal {target} ({each})", [[h] for h in mine])
-    show("fl_thermal, a cycle counted as a recording", [held[k : k + len(targets)] for k in range(0, len(held), 5)])
+        width, rms = np.mean([h.half_width for h in mine]), np.sqrt(np.mean([h.rms**2 for h in mine]))
+        print(f"fl_thermal {target}: held {each} of the cycles left out; half-width / RMS error {width / rms:.2f}")
+    width, rms = np.mean([h.half_width for h in held]), np.sqrt(np.mean([h.rms**2 for h in held]))
+    print(
+        f"fl_thermal, all: held {100 * np.mean([h.coverage for h in held]):.1f} %; half-width / RMS error "
+        f"{width / rms:.2f} ({width:.2f} um); {', '.join(sorted({h.words for h in held}))}"
+    )
 
 
 def _left_out(samples: Samples, piece: tuple[int, int]) -> Held:
