@@ -198,13 +198,17 @@ def test_preload_settles_where_its_fixed_point_is() -> None:
         heat[model.inputs.index("rear_bearing")] += rear
     state, truth = machine.run(machine.init(AIR), [drive] * 2000, steps(2000), 2000.0)
     np.testing.assert_allclose(truth.temperatures[-1], model.temperature @ z, atol=0.02)
+    seen = dict(zip(machine._watched, machine.model.rows(machine._watched) @ state.field, strict=True))
+    sprung = replace(machine, rear=NonlinearCentre().rear)
+    assert sprung.rear is not None
+    _, rear = sprung._friction(drive, list(seen.values()))
+    assert rear == pytest.approx(sprung.rear.heat(3000.0, seen["rear_bearing"], sprung.rear.mounted))
     # without the feedback of temperatures it would be another one: the preload has grown, its heat too
     inner, outer = (at(machine, truth, name)[-1] for name in ("balls_a", "balls_b"))
     approach = float(machine.front.approach(inner, outer))
     assert machine.front.force(approach) > 1.5 * machine.front.preload
     fixed = machine.front.heat(3000.0, at(machine, truth, "front_bearing")[-1], machine.front.mounted)
     assert front > 1.05 * fixed
-    del state
 
 
 def test_a_stiffer_step_does_not_make_it_unstable() -> None:
@@ -232,6 +236,66 @@ def test_the_step_size_hardly_matters(cooled: bool) -> None:
 
 
 # -- what each part does -------------------------------------------------------------------------------------------
+
+
+#: a joint of parts that grow as none does: the side that is warmer decides
+EAGER: dict[str, Any] = {"squeeze": 0.0, "expansion": (2e4, 2e4), "behind": np.inf}
+
+
+def test_a_warmer_outer_part_opens_its_joint_and_a_warmer_inner_one_closes_it(
+    tool: NonlinearTool, centre: NonlinearCentre
+) -> None:
+    """In the taper heat comes from outside, in the other joints from inside."""
+    assert tool.grip is not None
+    apart = {}
+    for name, machine in (
+        ("eager", replace(tool, taper=replace(TAPER, **EAGER), grip=replace(tool.grip, **EAGER))),
+        ("linear", replace(tool, taper=None, grip=None)),
+    ):
+        _, truth = machine.run(machine.init(AIR), [HEATED] * 200, steps(200), 60.0)
+        for joint, warm, cold in (("taper", "taper_a", "taper_b"), ("grip", "grip_b", "grip_a")):
+            apart[name, joint] = at(machine, truth, warm)[-1] - at(machine, truth, cold)[-1]
+    assert apart["eager", "taper"] > 1.2 * apart["linear", "taper"] > 0.0  # the face conducts beside it
+    assert 0.0 < apart["eager", "grip"] < apart["linear", "grip"] / 2.0
+    # such a housing would crush the bearings
+    free = replace(centre, front=None, seat=replace(SEAT, **EAGER), taper=replace(TAPER, **EAGER))
+    drives = [Drive(3000.0, loads={"tool_tip": 100.0})] * 100
+    differences = {}
+    for name, machine in (("eager", free), ("linear", replace(free, seat=None, taper=None))):
+        _, truth = machine.run(machine.init(AIR), drives, steps(100), 60.0)
+        for joint, inner, outer in (("seat", "seat_a", "seat_b"), ("taper", "taper_b", "taper_a")):
+            differences[name, joint] = at(machine, truth, inner)[-1] - at(machine, truth, outer)[-1]
+    for joint in ("seat", "taper"):
+        assert 0.0 < differences["eager", joint] < differences["linear", joint] / 2.0
+
+
+def test_what_passes_is_what_each_path_conducts_beside_the_model(centre: NonlinearCentre) -> None:
+    """In a step of a microsecond nothing has changed: heat is the conductance that is missing times the difference."""
+    drive = Drive(2000.0)
+    watched = dict.fromkeys(centre._watched, 40.0) | {"enclosure": 60.0, "seat_a": 55.0, "taper_b": 35.0}
+    temperatures = np.array(list(watched.values()))
+    correct = centre._correction(centre.model.operators(centre._theta(drive), 1e-6, centre._watched), drive)
+    after = np.concatenate([np.zeros(len(centre.model.one)), temperatures])
+    passed = np.asarray(correct(after, temperatures.tolist(), AIR.values))
+    around = np.array([60.0 if name in ("spindle_rotating", "spindle_front") else 22.0 for name in CENTRE_FACES])
+    faces = Faces(list(CENTRE_FACES.values()))
+    share = centre._theta(drive)[centre.model.theta.index("rotation")]
+    extra = faces.conductance(np.full(10, 40.0), around, 2000.0, centre.heat.rotation(2000.0)) - faces.linear(share)
+    np.testing.assert_allclose(passed[:10], -extra * (40.0 - around), rtol=1e-4)
+    seat, taper = SEAT.conductance(55.0, 40.0), TAPER.conductance(35.0, 40.0)
+    expected = [-(seat - 3500.0 * SEAT.area) * 15.0, -(taper - 4000.0 * TAPER.area) * 5.0]
+    np.testing.assert_allclose(passed[10:], expected, rtol=1e-3)
+
+
+def test_the_preload_falls_where_the_housing_is_the_warmer_part(centre: NonlinearCentre) -> None:
+    """The hall is 30 K warmer at once: the housing follows first."""
+    assert centre.front is not None
+    air = steps(150, Air(20.0))
+    air[50:, 0] = 50.0
+    _, truth = centre.run(centre.init(Air(20.0)), [Drive(powered=False)] * 150, air, 60.0)
+    approach = centre.front.approach(at(centre, truth, "balls_a"), at(centre, truth, "balls_b"))
+    assert approach[40] == pytest.approx(centre.front.mounted)
+    assert 500.0 < centre.front.force(float(approach.min())) < 560.0
 
 
 def test_an_open_taper_keeps_the_heat_behind(tool: NonlinearTool) -> None:
