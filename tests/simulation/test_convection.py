@@ -71,3 +71,10 @@ def test_wind_and_what_the_linear_model_has() -> None:
     assert faces.linear(0.5) == pytest.approx([28.0, 7.0])
     more = faces.conductance([30.0, 30.0], [20.0, 20.0], wind=0.5) - faces.conductance([30.0, 30.0], [20.0, 20.0])
     assert more == pytest.approx([12.0, 0.0])
+
+
+def test_a_slender_cylinder_that_stands_loses_more_than_a_plate() -> None:
+    """Fujii and Uehara: Nu + 0.435 L / D."""
+    plate, slender = (Faces([Face(2.0, 0.11, 9.0, 0.0, curvature=c)]) for c in (0.0, 5.5))
+    more = slender.conductance([40.0], [20.0]) - plate.conductance([40.0], [20.0])
+    assert more == pytest.approx(2.0 * air_at(np.array([303.15]))[0] / 0.11 * 0.435 * 5.5)

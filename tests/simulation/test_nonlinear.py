@@ -13,8 +13,8 @@ from thermocomp.datasets.virtual import EXPERIMENTS, record
 from thermocomp.simulation.centre import CentreState, MachiningCentre
 from thermocomp.simulation.convection import Face, Faces
 from thermocomp.simulation.machine import Air, Drive, Truth
-from thermocomp.simulation.nonlinear import CENTRE_FACES, SEAT, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
-from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE, ReducedModel
+from thermocomp.simulation.nonlinear import CENTRE_FACES, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
+from thermocomp.simulation.statespace import ReducedModel
 from thermocomp.simulation.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
@@ -198,13 +198,17 @@ def test_preload_settles_where_its_fixed_point_is() -> None:
         heat[model.inputs.index("rear_bearing")] += rear
     state, truth = machine.run(machine.init(AIR), [drive] * 2000, steps(2000), 2000.0)
     np.testing.assert_allclose(truth.temperatures[-1], model.temperature @ z, atol=0.02)
+    seen = dict(zip(machine._watched, machine.model.rows(machine._watched) @ state.field, strict=True))
+    sprung = replace(machine, rear=NonlinearCentre().rear)
+    assert sprung.rear is not None
+    _, rear = sprung._friction(drive, list(seen.values()))
+    assert rear == pytest.approx(sprung.rear.heat(3000.0, seen["rear_bearing"], sprung.rear.mounted))
     # without the feedback of temperatures it would be another one: the preload has grown, its heat too
     inner, outer = (at(machine, truth, name)[-1] for name in ("balls_a", "balls_b"))
     approach = float(machine.front.approach(inner, outer))
     assert machine.front.force(approach) > 1.5 * machine.front.preload
     fixed = machine.front.heat(3000.0, at(machine, truth, "front_bearing")[-1], machine.front.mounted)
     assert front > 1.05 * fixed
-    del state
 
 
 def test_a_stiffer_step_does_not_make_it_unstable() -> None:
@@ -229,100 +233,6 @@ def test_the_step_size_hardly_matters(cooled: bool) -> None:
     fine, coarse = (m.run(m.init(AIR), [HEATED] * 48, steps(48), 300.0)[1] for m in tools)
     np.testing.assert_allclose(coarse.temperatures, fine.temperatures, atol=0.05)
     np.testing.assert_allclose(coarse.observables, fine.observables, atol=0.15)
-
-
-# -- what each part does -------------------------------------------------------------------------------------------
-
-
-def test_an_open_taper_keeps_the_heat_behind(tool: NonlinearTool) -> None:
-    """Mounted with a gap of 200 um of air, less comes through: the shaft is warmer, the chuck colder."""
-    open_ = replace(tool, taper=replace(TAPER, squeeze=-200.0))
-    heated = Drive(loads={"heater": 60.0})
-    shut, apart = (m.run(m.init(AIR), [heated] * 400, steps(400), 60.0)[1] for m in (tool, open_))
-    for name, sign in (("taper_a", 1.0), ("taper_b", -1.0)):
-        assert sign * (at(tool, apart, name)[-1] - at(tool, shut, name)[-1]) > 0.05
-
-
-def test_the_shank_stays_behind_as_the_chuck_warms_and_keeps_some_of_it(tool: NonlinearTool) -> None:
-    held = replace(tool, grip=replace(tool.grip, friction=1e3)) if tool.grip else tool
-    drives = [HEATED] * 180 + [Drive()] * 600
-    free, stuck = (m.run(m.init(Air(20.0)), drives, steps(780, Air(20.0)), 60.0)[1] for m in (tool, held))
-    behind = at(tool, stuck, "s1") - at(tool, free, "s1")
-    assert tool.grip is not None
-    wish = tool.grip.wish(at(tool, free, "grip_b"), at(tool, free, "grip_a"))
-    hold = tool.grip.hold(tool.grip.pressure(at(tool, free, "grip_b"), at(tool, free, "grip_a")))
-    assert behind[179] == pytest.approx(wish[179] - hold[179], abs=1e-9)
-    assert behind[179] > 3.0
-    # cold again it has not come back by what friction holds
-    assert behind[-1] == pytest.approx(wish[-1] + hold[-1], abs=1e-9)
-    assert behind[-1] > 1.0
-    # friction is less where the chuck has let go: the pressure falls as both warm
-    assert hold[179] < 0.8 * hold[0]
-    for name in ("s2", "s3"):
-        np.testing.assert_allclose(at(tool, free, name), at(tool, stuck, name), atol=1e-9)
-
-
-def test_expansion_grows_as_it_warms(tool: NonlinearTool) -> None:
-    """Evenly warm, everything is alpha (T + T^2 / 2 grows) long, whatever the field of temperatures is made of."""
-    off = replace(tool, expansion_grows=0.0, grip=None)
-    bent = replace(off, expansion_grows=1e-3)
-    for warm in (30.0, 60.0):
-        small, large = (m.run(m.init(Air(warm)), [Drive()], steps(1, Air(warm)), 20.0)[1] for m in (off, bent))
-        for name in ("s1", "s2", "s3"):
-            share = at(bent, large, name)[0] / at(off, small, name)[0]
-            assert share == pytest.approx(1.0 + 1e-3 * (warm - REFERENCE_TEMPERATURE) / 2.0, rel=2e-3)
-
-
-def test_the_spindles_expansion_grows_too(centre: NonlinearCentre) -> None:
-    flat = replace(centre, expansion_grows=0.0)
-    bent, straight = (m.run(m.init(AIR), [Drive(3000.0)] * 300, steps(300), 60.0)[1] for m in (centre, flat))
-    more = at(centre, bent, "tip") - at(flat, straight, "tip")
-    assert 0.1 < more[-1] < 1.0
-    np.testing.assert_allclose(at(centre, bent, "z") - at(flat, straight, "z"), -more, atol=1e-9)
-    np.testing.assert_allclose(bent.temperatures, straight.temperatures)
-
-
-def test_the_gap_of_the_outer_rings_closes_and_cools_them(centre: NonlinearCentre) -> None:
-    tight = replace(centre, seat=replace(SEAT, squeeze=1.0))
-    loose = replace(centre, seat=replace(SEAT, squeeze=-20.0))
-    drives = [Drive(3000.0, cooled=True)] * 200
-    rings = {}
-    for name, machine in (("tight", tight), ("usual", centre), ("loose", loose)):
-        _, truth = machine.run(machine.init(AIR), drives, steps(200), 60.0)
-        rings[name] = at(machine, truth, "seat_a")[-1] - at(machine, truth, "seat_b")[-1]
-        if name == "usual":
-            gap = -SEAT.squeezed(at(machine, truth, "seat_a"), at(machine, truth, "seat_b"))
-            assert gap[-1] < -SEAT.squeeze - 1.0  # it closes as the rings warm
-    assert rings["tight"] < rings["usual"] < rings["loose"]
-
-
-def test_a_tight_seat_squeezes_the_raceway(centre: NonlinearCentre) -> None:
-    inner, outer = SEAT.compliances
-    assert centre._pressed(20.0, 20.0) == 0.0
-    closes = -SEAT.squeeze / (12.0e-3 * SEAT.radius)
-    more = 12.0e-3 * SEAT.radius * 2.0
-    assert centre._pressed(20.0 + closes + 2.0, 20.0) == pytest.approx(inner / (inner + outer) * more)
-    assert replace(centre, seat=None)._pressed(60.0, 20.0) == 0.0
-
-
-def test_the_shaft_is_pushed_out_by_its_preload(centre: NonlinearCentre) -> None:
-    assert centre.front is not None
-    drives = [Drive(3000.0, cooled=False)] * 100
-    _, truth = centre.run(centre.init(AIR), drives, steps(100), 60.0)
-    still = replace(centre, joints=replace(centre.joints, centrifugal=0.0))
-    _, drawn = still.run(still.init(AIR), drives, steps(100), 60.0)
-    model, field = centre.model, {name: at(centre, truth, name) for name in ("balls_a", "balls_b", "seat_a", "seat_b")}
-    pressed = centre._pressed(field["seat_a"], field["seat_b"])
-    shift = centre.front.shift(centre.front.approach(field["balls_a"], field["balls_b"], pressed))
-    assert shift[-1] > 0.5
-    # what the reduced model and the growing expansion say of the nose comes without it
-    flat = replace(still, expansion_grows=0.0)
-    state, grown = flat.run(flat.init(AIR), drives, steps(100), 60.0)
-    rest = model.observable[centre.observables.index("nose")] @ (state.field - REFERENCE_TEMPERATURE * model.one)
-    assert at(flat, grown, "nose")[-1] == pytest.approx(rest + shift[-1], abs=1e-9)
-    # and centrifugal forces draw it in, as in the linear machine
-    back = at(still, drawn, "nose") - at(centre, truth, "nose")
-    np.testing.assert_allclose(back, centre.joints.centrifugal * (3000.0 / 3500.0) ** 2, atol=1e-9)
 
 
 # -- as all machines -----------------------------------------------------------------------------------------------
