@@ -187,6 +187,15 @@ def test_a_dead_sensor_has_no_weight(samples: Samples) -> None:
     assert np.isfinite(estimator.coef_).all()
 
 
+def test_a_spindle_that_turned_before_and_stands_now(samples: Samples) -> None:
+    standing = samples.values[:, [c.name for c in samples.inputs].index("spindle_rpm")] == 0
+    cycle = np.where(standing & (samples.cycle > 0), samples.cycle, -1)
+    estimator = fitted(samples, cycle=cycle)
+    assert estimator.top_speed_ > 1000.0
+    residual = (estimator.predict(samples.frame(), dt=samples.dt()) - samples.deviations[:, 0])[cycle >= 0]
+    assert np.sqrt(np.mean(residual**2)) < 0.1 * np.abs(samples.deviations[:, 0]).max()
+
+
 @pytest.mark.parametrize("settings", [{"structures": 0}, {"noise": -1.0}, {"noise": float("nan")}])
 def test_settings_of_nonsense_are_refused(settings: dict[str, Any], samples: Samples) -> None:
     with pytest.raises(InputError, match="structures"):

@@ -75,6 +75,8 @@ class PacedFeatures:
             Of `thermocomp.models.averaged.AveragedDynamic`.
         """
         usual = usual_step(step)
+        # where the spindle stood in the rows learned from, it may have turned before
+        turned = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0)
         return cls(
             tuple(i for i in range(rows.shape[1]) if i not in speeds),
             tuple(float(t) for t in lags if t >= SHORTEST_LAG * usual or not np.isfinite(usual)),
@@ -86,7 +88,7 @@ class PacedFeatures:
                 for fast in running
                 if fast <= slow  # a turning spindle is not the slower one
             ),
-            max(float(np.abs(rows[learned][:, list(speeds)]).max(initial=0.0)), LEAST),
+            max(float(turned[learned].max(initial=0.0)) or float(turned.max(initial=0.0)), LEAST),
         )
 
     @property

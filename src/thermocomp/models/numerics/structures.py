@@ -73,7 +73,9 @@ class Moments:
         gram += self.noise[among]
         # a feature that is zero in all rows keeps the weight zero
         gram[np.diag_indices(len(columns))] += np.where(squares > 0, structure.strengths * squares, 1.0)
-        return np.linalg.solve(gram, sum(self.cross[k][columns] for k in chosen) / n)
+        scale = 1.0 / np.sqrt(np.diag(gram))  # powers of a speed may be of another size altogether
+        right = sum(self.cross[k][columns] for k in chosen) / n
+        return scale[:, None] * np.linalg.solve(gram * scale * scale[:, None], scale[:, None] * right)
 
 
 def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
