@@ -3,9 +3,9 @@
 Run with ``python benchmarks/bench_fl_thermal.py``. Rows 0-6668 are learned from, rows 6669-8891 are the published test
 block. Published figures: FL_THERMAL (GitHub CAIVIAC/FL_THERMAL). Skipped where the measured data are absent.
 
-``averaged`` was judged on that block `LOGGED` times and is not judged on it here: a block that is looked at whenever
-something changes is learned from. It is judged on whole cycles: inside rows 0-6668, its six sensors chosen without the
-judged cycle, and over the file.
+How often ``averaged`` was judged on that block stands in `LOG`; it is not judged on it here: a block that is looked at
+whenever something changes is learned from. It is judged on whole cycles: inside rows 0-6668, its six sensors chosen
+without the judged cycle, and over the file.
 """
 
 import os
@@ -17,20 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.compare import compare
+from thermocomp.assessment.sensorsets import choose_sets
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.files import recordings
-from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
-from thermocomp.models.numerics.folds import halve, number_folds
-from thermocomp.models.pacedfeatures import PacedFeatures
-from thermocomp.models.selection.standins import reduce_sensors
 from thermocomp.models.training import fit_method
 from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
 
 FloatArray = NDArray[np.float64]
-#: of temperatures in use [degC]
-NOISE = 0.4
 
 PUBLISHED = {
     "least squares (published)": (9.25, 7.62, 11.86, 12.09, 5.24),
@@ -41,13 +36,8 @@ PUBLISHED = {
 BEST = PUBLISHED["GRU with attention (published best)"]
 GOAL_MEAN = 1.9
 
-#: each judgement of `averaged` on the published block: commit, sensors, mean absolute errors [um]
-LOGGED = (
-    ("39562d1", "t4 t5 t7 t9 t11 t16", (1.79, 1.43, 1.75, 1.79, 0.96)),
-    ("39562d1", "all 16", (1.55, 1.20, 1.92, 1.96, 1.59)),
-    ("be262a8", "t4 t5 t7 t9 t11 t16", (1.79, 1.47, 1.41, 1.38, 1.01)),
-    ("be262a8", "all 16", (1.58, 1.27, 1.65, 1.74, 1.78)),
-)
+#: each judgement of a method on the published block
+LOG = Path(__file__).resolve().parent / "leaderboard" / "published_block.md"
 #: of `averaged`: mean and worst channel on the block with six sensors, mean with all; mean of cycles left out, nested
 GOAL_SIX, GOAL_WORST, GOAL_ALL, GOAL_NESTED = 1.4, 1.8, 1.3, 1.5
 #: what `dynamic` left of each channel, cycles of the whole file left out, before there was `averaged` [um]
@@ -73,9 +63,13 @@ def main() -> int:
     none = [a.none_metric("mae") for a in result.overall() if a.model == "ols"]
     for name, values in {"none": none, **PUBLISHED, **errors}.items():
         print(f"{name:<42}" + "".join(f"{v:>8.2f}" for v in values) + f"{np.mean(values):>8.2f}")
-    for commit, sensors, values in LOGGED:
-        print(f"{f'averaged at {commit}, {sensors}':<42}" + "".join(f"{v:>8.2f}" for v in (*values, np.mean(values))))
-    dynamic, six, every = errors["dynamic"], LOGGED[-2][2], LOGGED[-1][2]
+    logged = [[cell.strip() for cell in line.split("|")] for line in LOG.read_text(encoding="utf-8").splitlines()]
+    judged = [
+        (row[1], row[2], [float(v) for v in row[3].split()]) for row in logged if row[2:3] and "averaged" in row[2]
+    ]
+    for commit, model, values in judged:
+        print(f"{f'{model} ({commit})':<42}" + "".join(f"{v:>8.2f}" for v in (*values, np.mean(values))))
+    dynamic, (_, _, six), (_, _, every) = errors["dynamic"], *judged[-2:]
     whole = stack([recordings.read(path)], targets)
     nested, chosen = leave_out(whole.take(np.arange(len(whole)) < LEARNED), most=6)
     print(f"whole cycles left out, rows 0-{LEARNED - 1}, six sensors chosen without the judged cycle:")
@@ -105,22 +99,15 @@ def leave_out(samples: Samples, most: int | None = None) -> tuple[FloatArray, li
     errors, chosen = [], []
     for cycle in np.unique(samples.cycle).tolist():
         learn = samples.cycle != cycle
-        taken = samples if most is None else samples.only([*_sensors(samples, learn, most), "spindle_rpm"])
+        taken = samples
+        if most is not None:
+            places = choose_sets(samples, most, learn).sets[most - 1]
+            temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
+            taken = samples.only([*(temperatures[k] for k in places), "spindle_rpm"])
         chosen.append(tuple(c.name for c in taken.inputs if c.quantity == "temperature"))
         fits = [fit_method("averaged", taken, k, learn) for k in range(len(taken.targets))]
         errors.append([np.abs(f.predicted - taken.deviations[:, k])[~learn].mean() for k, f in enumerate(fits)])
     return np.mean(errors, axis=0), chosen
-
-
-def _sensors(samples: Samples, learn: NDArray[np.bool_], most: int) -> list[str]:
-    speeds = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
-    change, dt = samples.change(), samples.dt()
-    folds, _ = number_folds(np.where(learn, samples.cycle, -1), len(samples))
-    parts, _ = halve(folds, np.abs(change[:, speeds]).max(axis=1) > 0)
-    features = PacedFeatures.of(change, dt, learn, speeds, lags=LAGS, powers=POWERS, stopped=STOPPED, running=RUNNING)
-    moments = features.moments(change, samples.deviations, dt, parts, NOISE)
-    found = reduce_sensors(features, moments, NOISE, most, structures=200)
-    return [samples.inputs[features.temperatures[k]].name for k in found.sets[most - 1]]
 
 
 if __name__ == "__main__":

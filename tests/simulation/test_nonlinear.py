@@ -6,24 +6,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nonlinearmachines import AIR, HEATED, at, steps
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.datasets.virtual import EXPERIMENTS, record
 from thermocomp.simulation.centre import CentreState, MachiningCentre
 from thermocomp.simulation.convection import Face, Faces
-from thermocomp.simulation.machine import Air, Drive, Truth
+from thermocomp.simulation.machine import Air, Drive
 from thermocomp.simulation.nonlinear import CENTRE_FACES, TAPER, TOOL_FACES, NonlinearCentre, NonlinearTool
 from thermocomp.simulation.statespace import ReducedModel
 from thermocomp.simulation.toolsystem import RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
-AIR = Air(22.0)
 HOUR = 3600.0
 LINEAR_TOOL: dict[str, Any] = {"faces": {}, "taper": None, "grip": None, "expansion_grows": 0.0}
 LINEAR_CENTRE: dict[str, Any] = LINEAR_TOOL | {"seat": None, "front": None, "rear": None}
 del LINEAR_CENTRE["grip"]
-HEATED = Drive(loads={"heater": 60.0, "tip": 5.0})
 
 
 @pytest.fixture(scope="module")
@@ -34,16 +33,6 @@ def tool() -> NonlinearTool:
 @pytest.fixture(scope="module")
 def centre() -> NonlinearCentre:
     return NonlinearCentre()
-
-
-def steps(n: int, air: Air = AIR) -> FloatArray:
-    return np.tile(air.values, (n, 1))
-
-
-def at(machine: RestingTool | MachiningCentre, truth: Truth, name: str) -> FloatArray:
-    if name in machine.places:
-        return truth.temperatures[:, machine.places.index(name)]
-    return truth.observables[:, machine.observables.index(name)]
 
 
 # -- limits --------------------------------------------------------------------------------------------------------

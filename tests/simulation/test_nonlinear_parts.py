@@ -5,18 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nonlinearmachines import AIR, HEATED, at, steps
 from numpy.typing import NDArray
 
-from thermocomp.simulation.centre import MachiningCentre
 from thermocomp.simulation.convection import Faces
-from thermocomp.simulation.machine import Air, Drive, Truth
+from thermocomp.simulation.machine import Air, Drive
 from thermocomp.simulation.nonlinear import CENTRE_FACES, SEAT, TAPER, NonlinearCentre, NonlinearTool
 from thermocomp.simulation.statespace import REFERENCE_TEMPERATURE
-from thermocomp.simulation.toolsystem import RestingTool
 
 FloatArray = NDArray[np.float64]
-AIR = Air(22.0)
-HEATED = Drive(loads={"heater": 60.0, "tip": 5.0})
 
 
 @pytest.fixture(scope="module")
@@ -27,16 +24,6 @@ def tool() -> NonlinearTool:
 @pytest.fixture(scope="module")
 def centre() -> NonlinearCentre:
     return NonlinearCentre()
-
-
-def steps(n: int, air: Air = AIR) -> FloatArray:
-    return np.tile(air.values, (n, 1))
-
-
-def at(machine: RestingTool | MachiningCentre, truth: Truth, name: str) -> FloatArray:
-    if name in machine.places:
-        return truth.temperatures[:, machine.places.index(name)]
-    return truth.observables[:, machine.observables.index(name)]
 
 
 #: a joint of parts that grow as none does: the side that is warmer decides

@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import FitError
 from thermocomp.models.averaged import AveragedDynamic
-from thermocomp.models.numerics.folds import halve, number_folds
-from thermocomp.models.pacedfeatures import PacedFeatures
+from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.selection.standins import SensorSets, reduce_sensors
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.splits import MIN_ROWS
@@ -80,17 +79,7 @@ def choose_sets(samples: Samples, most: int, learn: BoolArray) -> SensorSets:
     speeds = [j for j, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
     how, step = AveragedDynamic(), driven.dt()
     folds, _ = number_folds(np.where(learned, driven.cycle, -1), len(driven))
-    features = PacedFeatures.of(
-        change,
-        step,
-        learned,
-        speeds,
-        lags=how.lags,
-        powers=how.powers,
-        stopped=how.stopped,
-        running=how.running,
-    )
-    parts, _ = halve(folds, np.abs(change[:, speeds]).max(axis=1, initial=0.0) > 0)
+    features, parts, _ = how.lay_out(change, step, folds, speeds)
     targets = np.where(learned[:, None], driven.deviations / scales, 0.0)
     moments = features.moments(change, targets, step, parts, how.noise)
     return reduce_sensors(features, moments, how.noise, most, structures=how.structures, random_state=how.random_state)

@@ -134,17 +134,7 @@ class AveragedDynamic(TimedRegressor):
         if self.structures < 1 or not 0 <= self.noise < np.inf:
             raise InputError(f"structures {self.structures}, noise {self.noise}: want at least 1, and at least 0 degC")
         speeds = [self._place(s, "speed column") for s in self.speed]
-        self._features = PacedFeatures.of(
-            rows,
-            step,
-            folds >= 0,
-            speeds,
-            lags=self.lags,
-            powers=self.powers,
-            stopped=self.stopped,
-            running=self.running,
-        )
-        parts, self.chosen_by_ = halve(folds, np.abs(rows[:, speeds]).max(axis=1, initial=0.0) > 0)
+        self._features, parts, self.chosen_by_ = self.lay_out(rows, step, folds, speeds)
         moments = self._features.moments(rows, deviation[:, None], step, parts, self.noise)
         structures = self._features.draw(self.structures, self.random_state)
         shares, errors = share_out(moments, structures)
@@ -158,6 +148,42 @@ class AveragedDynamic(TimedRegressor):
         self.lags_, self.top_speed_ = self._features.lags, self._features.top_speed
         self.gain_ = np.zeros(rows.shape[1])
         self.gain_[list(self._features.temperatures)] = np.abs(self._features.shares(step) @ self._copies())
+
+    def lay_out(
+        self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]
+    ) -> tuple[PacedFeatures, IntArray, str]:
+        """Return the features that rows have something to say about, and what of the rows is left out together.
+
+        Parameters
+        ----------
+        rows : ndarray of shape (n_rows, n_inputs)
+            Inputs minus their reference.
+        step : ndarray of shape (n_rows,)
+            Time since the row before [s], inf where a test starts.
+        folds : ndarray of int of shape (n_rows,)
+            As `thermocomp.models.numerics.folds.number_folds` gives them.
+        speeds : sequence of int
+            Columns that are spindle speeds; the others are temperatures.
+
+        Returns
+        -------
+        features : PacedFeatures
+        parts : ndarray of int of shape (n_rows,)
+        description : str
+            See `thermocomp.models.numerics.folds.halve`.
+        """
+        features = PacedFeatures.of(
+            rows,
+            step,
+            folds >= 0,
+            speeds,
+            lags=self.lags,
+            powers=self.powers,
+            stopped=self.stopped,
+            running=self.running,
+        )
+        turning = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0) > 0
+        return features, *halve(folds, turning)
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
         return np.concatenate([table @ self.coef_ for table in self._features.tables(rows, step)])

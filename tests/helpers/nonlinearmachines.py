@@ -1,0 +1,22 @@
+"""What tests of the nonlinear machines ask them for."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.simulation.centre import MachiningCentre
+from thermocomp.simulation.machine import Air, Drive, Truth
+from thermocomp.simulation.toolsystem import RestingTool
+
+FloatArray = NDArray[np.float64]
+AIR = Air(22.0)
+HEATED = Drive(loads={"heater": 60.0, "tip": 5.0})
+
+
+def steps(n: int, air: Air = AIR) -> FloatArray:
+    return np.tile(air.values, (n, 1))
+
+
+def at(machine: RestingTool | MachiningCentre, truth: Truth, name: str) -> FloatArray:
+    if name in machine.places:
+        return truth.temperatures[:, machine.places.index(name)]
+    return truth.observables[:, machine.observables.index(name)]
