@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.compare import compare
+from thermocomp.assessment.replay import replay
 from thermocomp.assessment.sensorsets import choose_sets
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.files import recordings
-from thermocomp.models.training import fit_method
+from thermocomp.models.training import train
 from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
@@ -105,9 +106,15 @@ def leave_out(samples: Samples, most: int | None = None) -> tuple[FloatArray, li
             temperatures = [c.name for c in samples.inputs if c.quantity == "temperature"]
             taken = samples.only([*(temperatures[k] for k in places), "spindle_rpm"])
         chosen.append(tuple(c.name for c in taken.inputs if c.quantity == "temperature"))
-        fits = [fit_method("averaged", taken, k, learn) for k in range(len(taken.targets))]
-        errors.append([np.abs(f.predicted - taken.deviations[:, k])[~learn].mean() for k, f in enumerate(fits)])
+        errors.append([np.abs(_unseen(taken, k, learn)).mean() for k in range(len(taken.targets))])
     return np.mean(errors, axis=0), chosen
+
+
+def _unseen(samples: Samples, target: int, learn: NDArray[np.bool_]) -> FloatArray:
+    """Return the error of the frozen model, its inputs clipped to what it has seen, in the rows not learned from."""
+    model = train("averaged", samples, target, learn).model
+    deviation, _ = replay(model, samples, ~learn)
+    return np.asarray(deviation - samples.deviations[~learn, target])
 
 
 if __name__ == "__main__":
