@@ -1,9 +1,9 @@
 """Bands of `averaged`: what share of unseen cycles they hold, and how wide they are.
 
-Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2]`` (200 take an hour of two free cores). On
-the virtual machine: protocols drawn at random (speeds, feeds, lengths of run and stop, weather by seed), of which the
-first 3, 5 or 10 cycles are learned from and three more are judged, by the replay of the frozen model. Then, where the
-measured data are there, fl_thermal: rows 0-6668, each cycle left out.
+Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2] [--physics nonlinear]`` (200 take an hour of
+two free cores). On a virtual machine: protocols drawn at random (speeds, feeds, lengths of run and stop, weather by
+seed), of which the first 3, 5 or 10 cycles are learned from and three more are judged, by the replay of the frozen
+model. Then, where the measured data are there, fl_thermal: rows 0-6668, each cycle left out.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from thermocomp.files import recordings
 from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
+from thermocomp.simulation.protocol import Physics
 
 TARGETS = ("x1_um", "y1_um", "z_um")
 LEARNED, JUDGED = (3, 5, 10), 3
@@ -72,12 +73,12 @@ def hold(samples: Samples, target: int, learn: NDArray[np.bool_]) -> Held:
     )
 
 
-def drawn(cycles: int, seed: int) -> list[Held]:
+def drawn(cycles: int, physics: Physics, seed: int) -> list[Held]:
     """Return how the bands of the channels of one recording did."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "drawn.toml"
         path.write_text(protocol(np.random.default_rng([seed, cycles]), cycles + JUDGED), encoding="utf-8")
-        samples = stack(record(str(path), seed=seed), TARGETS)
+        samples = stack(record(str(path), seed=seed, physics=physics), TARGETS)
     if len(samples.cycle_names) != cycles + JUDGED:
         raise SystemExit(f"seed {seed}: {len(samples.cycle_names)} cycles instead of {cycles + JUDGED}")
     return [hold(samples, k, samples.cycle < cycles) for k in range(len(TARGETS))]
@@ -136,12 +137,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--recordings", type=int, default=200)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--physics", choices=get_args(Physics), default="linear")
     options = parser.parse_args()
     reached = True
     for cycles in LEARNED:
         with ProcessPoolExecutor(options.jobs) as pool:
-            held = list(pool.map(partial(drawn, cycles), range(options.recordings)))
-        reached &= show(f"{cycles} cycles, {options.recordings} recordings", held)
+            held = list(pool.map(partial(drawn, cycles, options.physics), range(options.recordings)))
+        reached &= show(f"{cycles} cycles, {options.recordings} recordings, {options.physics}", held)
     measured(options.jobs)
     return 0 if reached else 1
 

@@ -56,27 +56,6 @@ class Moments:
         squares = ((self.gram[part] @ weights - 2 * self.cross[part]) * weights).sum(axis=-2) + self.power[part]
         return np.asarray(np.maximum(squares, 0.0) / self.rows[part])
 
-    def pooled(self, parts: Sequence[int]) -> "Moments":
-        """Return some of the parts as one; many structures are then solved without adding them up each time."""
-        gram, cross, power, rows = (
-            a[list(parts)].sum(axis=0, keepdims=True) for a in (self.gram, self.cross, self.power, self.rows)
-        )
-        return Moments(gram, cross, power, rows, self.noise)
-
-    def solve(self, structure: Structure, parts: Iterable[int]) -> FloatArray:
-        """Return the weights of a structure's features, fitted to some of the parts, (n_chosen, n_targets)."""
-        columns, chosen = structure.columns, list(parts)
-        n = self.rows[chosen].sum()
-        among = np.ix_(columns, columns)
-        gram = sum(self.gram[k][among] for k in chosen) / n
-        squares = np.diag(gram).copy()
-        gram += self.noise[among]
-        # a feature that is zero in all rows keeps the weight zero
-        gram[np.diag_indices(len(columns))] += np.where(squares > 0, structure.strengths * squares, 1.0)
-        scale = 1.0 / np.sqrt(np.diag(gram))  # powers of a speed may be of another size altogether
-        right = sum(self.cross[k][columns] for k in chosen) / n
-        return scale[:, None] * np.linalg.solve(gram * scale * scale[:, None], scale[:, None] * right)
-
 
 def average(moments: Moments, structures: Sequence[Structure]) -> tuple[FloatArray, FloatArray]:
     """Return the weights of the features, averaged over structures, and what the average errs by on what was left out.
@@ -112,9 +91,26 @@ def fit_each(moments: Moments, structures: Sequence[Structure], parts: Iterable[
     """
     chosen = list(parts)
     weights = np.full((len(structures), *moments.cross.shape[1:]), 0.0 if chosen else np.nan)
-    pooled = moments.pooled(chosen)
-    for row, structure in zip(weights if chosen else (), structures, strict=bool(chosen)):
-        row[structure.columns] = pooled.solve(structure, [0])
+    if not chosen:
+        return weights
+    n = moments.rows[chosen].sum()
+    gram, cross = moments.gram[chosen].sum(axis=0) / n, moments.cross[chosen].sum(axis=0) / n
+    of_size: dict[int, list[int]] = {}
+    for k, structure in enumerate(structures):
+        of_size.setdefault(len(structure.columns), []).append(k)
+    for size, places in of_size.items():  # as many small systems at once as there are of a size
+        columns = np.array([structures[k].columns for k in places])
+        among = columns[:, :, None], columns[:, None, :]
+        systems, every = gram[among], np.arange(size)
+        squares = systems[:, every, every]
+        systems += moments.noise[among]
+        # a feature that is zero in all rows keeps the weight zero
+        strengths = np.array([structures[k].strengths for k in places])
+        systems[:, every, every] += np.where(squares > 0, strengths * squares, 1.0)
+        scale = 1.0 / np.sqrt(systems[:, every, every])  # powers of a speed may be of another size altogether
+        systems *= scale[:, :, None] * scale[:, None, :]
+        solved = np.linalg.solve(systems, scale[:, :, None] * cross[columns])
+        weights[np.array(places)[:, None], columns] = scale[:, :, None] * solved
     return weights
 
 
