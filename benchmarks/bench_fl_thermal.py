@@ -59,28 +59,28 @@ def main() -> int:
     result = compare(samples, methods, splits.parse("0.75/0.25", samples), robustness=False, jobs=-1)
     seconds = time.perf_counter() - begin
     print(f"mean absolute error [um] on {result.assessments[0].block}; read, fit and replay took {seconds:.1f} s")
-    print(f"{'':<42}" + "".join(f"{t.removesuffix('_um'):>8}" for t in targets) + f"{'mean':>8}")
+    print(f"{'':<48}" + "".join(f"{t.removesuffix('_um'):>8}" for t in targets) + f"{'mean':>8}")
     errors = {m: [a.metric("mae") for a in result.overall() if a.model == m] for m in methods}
     none = [a.none_metric("mae") for a in result.overall() if a.model == "ols"]
     for name, values in {"none": none, **PUBLISHED, **errors}.items():
-        print(f"{name:<42}" + "".join(f"{v:>8.2f}" for v in values) + f"{np.mean(values):>8.2f}")
+        print(f"{name:<48}" + "".join(f"{v:>8.2f}" for v in values) + f"{np.mean(values):>8.2f}")
     logged = [[cell.strip() for cell in line.split("|")] for line in LOG.read_text(encoding="utf-8").splitlines()]
     judged = [
         (row[1], row[2], [float(v) for v in row[3].split()]) for row in logged if row[2:3] and "averaged" in row[2]
     ]
     for commit, model, values in judged:
-        print(f"{f'{model} ({commit})':<42}" + "".join(f"{v:>8.2f}" for v in (*values, np.mean(values))))
+        print(f"{f'{model} ({commit})':<48}" + "".join(f"{v:>8.2f}" for v in (*values, np.mean(values))))
     dynamic, (_, _, six), (_, _, every) = errors["dynamic"], *judged[-2:]
     whole = stack([recordings.read(path)], targets)
     nested, chosen = leave_out(whole.take(np.arange(len(whole)) < LEARNED), most=6)
     print(f"whole cycles left out, rows 0-{LEARNED - 1}, six sensors chosen without the judged cycle:")
-    print(f"{'averaged':<42}" + "".join(f"{v:>8.2f}" for v in (*nested, nested.mean())))
+    print(f"{'averaged':<48}" + "".join(f"{v:>8.2f}" for v in (*nested, nested.mean())))
     for names in chosen:
         print(f"    {' '.join(names)}")
     over, _ = leave_out(whole)
     print("whole cycles left out, all rows, all sensors:")
-    print(f"{'averaged':<42}" + "".join(f"{v:>8.2f}" for v in (*over, over.mean())))
-    print(f"{'dynamic, before':<42}" + "".join(f"{v:>8.2f}" for v in (*DYNAMIC, np.mean(DYNAMIC))))
+    print(f"{'averaged':<48}" + "".join(f"{v:>8.2f}" for v in (*over, over.mean())))
+    print(f"{'dynamic, before':<48}" + "".join(f"{v:>8.2f}" for v in (*DYNAMIC, np.mean(DYNAMIC))))
     goals = {
         f"dynamic: mean <= {GOAL_MEAN} um and every channel below the published best": np.mean(dynamic) <= GOAL_MEAN
         and all(d < b for d, b in zip(dynamic, BEST, strict=True)),
