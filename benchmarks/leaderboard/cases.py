@@ -16,6 +16,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.splits import Judging, Split, by_rows, leave_one_cycle_out, leave_one_file_out
 from thermocomp.recording.stacking import stack
+from thermocomp.simulation.protocol import Physics
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("THERMOCOMP_DATA", ROOT.parent / "shared" / "data"))
@@ -98,6 +99,45 @@ class Case:
         return "" if here else f"{self.needs} is not here; set THERMOCOMP_DATA to the folder of the measured data"
 
 
+def on_virtual(physics: Physics) -> tuple[Case, ...]:
+    """Return the tests on one of the two virtual machines."""
+    own = "" if physics == "linear" else f"-{physics}"
+    return (
+        Case(
+            f"demo{own}",
+            "five of six cycles, each at a speed of its own, in a changing room, a row every 3 min",
+            "the sixth, each in turn",
+            partial(virtual, "demo", leave_one_cycle_out, every=9, physics=physics),
+        ),
+        Case(
+            f"chen1996{own}",
+            "four of five speeds, 16 h each, from cold",
+            "the fifth speed, each in turn",
+            partial(virtual, "chen1996", leave_one_file_out, physics=physics),
+            stress=True,
+        ),
+        Case(
+            f"random{own}",
+            f"all of chen1996{own}: five constant speeds",
+            "12 h of short jobs at random speeds",
+            partial(from_to, "chen1996", "random", physics=physics),
+        ),
+        Case(
+            f"hwang{own}",
+            "37 rows: stop, low and high speed in random order, axes moving",
+            "the same in another order on another day",
+            partial(from_to, "hwang", "hwang", seed=1, physics=physics),
+        ),
+        Case(
+            f"stepwise2017{own}",
+            "one day of four cycles, X moving much",
+            "another day at other speeds and stops",
+            partial(from_to, "stepwise2017", "stepwise2017-online", physics=physics),
+            stress=True,
+        ),
+    )
+
+
 CASES = {
     c.name: c
     for c in (
@@ -115,37 +155,7 @@ CASES = {
             voron_cooling,
             needs=VORON,
         ),
-        Case(
-            "demo",
-            "five of six cycles, each at a speed of its own, in a changing room, a row every 3 min",
-            "the sixth, each in turn",
-            partial(virtual, "demo", leave_one_cycle_out, every=9),
-        ),
-        Case(
-            "chen1996",
-            "four of five speeds, 16 h each, from cold",
-            "the fifth speed, each in turn",
-            partial(virtual, "chen1996", leave_one_file_out),
-            stress=True,
-        ),
-        Case(
-            "random",
-            "all of chen1996: five constant speeds",
-            "12 h of short jobs at random speeds",
-            partial(from_to, "chen1996", "random"),
-        ),
-        Case(
-            "hwang",
-            "37 rows: stop, low and high speed in random order, axes moving",
-            "the same in another order on another day",
-            partial(from_to, "hwang", "hwang", seed=1),
-        ),
-        Case(
-            "stepwise2017",
-            "one day of four cycles, X moving much",
-            "another day at other speeds and stops",
-            partial(from_to, "stepwise2017", "stepwise2017-online"),
-            stress=True,
-        ),
+        *on_virtual("linear"),
+        *on_virtual("nonlinear"),
     )
 }
