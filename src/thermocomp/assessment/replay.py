@@ -15,8 +15,9 @@ from thermocomp.runtime import batch
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets the test's reference too
-Disturb = Callable[[FloatArray, FloatArray], FloatArray]
+#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets its row and the test's
+#: reference too
+Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +147,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
         window = _window(model, samples, own[usable[own]])
 
         def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
-            return values[k] if disturb is None else disturb(values[k], zero)
+            return values[k] if disturb is None else disturb(k, values[k], zero)
 
         state, head = _begun(model, samples, mine[usable[mine]], _reference(samples, columns, test), read)
         last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
