@@ -1,14 +1,14 @@
 """Paced models: states of the spindle speed that are faster while it turns, and the spread beside the deviation."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from thermocomp.core.band import Band
 from thermocomp.core.exceptions import SettingError
-from thermocomp.core.inputs import Input
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.files import modelfile
 
@@ -68,6 +68,26 @@ def test_the_band_is_the_spread_of_the_parts() -> None:
     assert MODEL.half_width(state, reading) == pytest.approx(2.0 * np.hypot(1.0, spread), rel=1e-12)
 
 
+@pytest.mark.parametrize("policy", ["hold", "fade"])
+def test_the_band_is_wider_by_what_a_policy_keeps_back(policy: Literal["hold", "fade"]) -> None:
+    plain, kept = (replace(MODEL, support=Support(p, margin=0.0)) for p in ("clip", policy))
+    one, other = plain.init(), kept.init()
+    for n in (0.0, 6000.0, 8000.0):  # the last is beyond the training
+        reading = np.array([25.0, n])
+        one, said = plain.step(one, reading, 600.0)
+        other, passed = kept.step(other, reading, 600.0)
+        assert kept.half_width(other, reading) == pytest.approx(plain.half_width(one, reading) + abs(said - passed))
+    assert abs(said - passed) > 1.0
+
+
+def test_a_band_without_spread_is_as_wide_as_its_floor() -> None:
+    bare = replace(MODEL, spread=())
+    state, reading = bare.init(), np.array([25.0, 6000.0])
+    for _ in range(3):
+        state, _ = bare.step(state, reading, 600.0)
+    assert bare.half_width(state, reading) == pytest.approx(2.0)
+
+
 def test_without_a_band_nothing_is_known() -> None:
     bare = replace(MODEL, band=None)
     state, _ = bare.step(bare.init(), np.array([20.0, 0.0]), 0.0)
@@ -107,7 +127,22 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], says: str) 
         replace(MODEL, **change)
 
 
-@pytest.mark.parametrize("change", [{"level": 1.5}, {"cycles": 1}, {"floor": -1.0}, {"running": float("nan")}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"level": 1.5},
+        {"level": 0.0},
+        {"cycles": 1},
+        {"basis": "conformal", "cycles": 8},
+        {"floor": -1.0},
+        {"floor": 0.0},
+        {"running": float("nan")},
+        {"running": 0.0},
+        {"stopped": 1e12},
+        {"speeds": (1, 1)},
+        {"speeds": (-1,)},
+    ],
+)
 def test_a_band_of_nonsense_is_refused(change: dict[str, Any]) -> None:
     with pytest.raises(SettingError, match="band: "):
         replace(MODEL.band, **change)  # type: ignore[type-var]

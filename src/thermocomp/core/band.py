@@ -6,11 +6,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.bounds import COEFFICIENT, check_between
+from thermocomp.core.bounds import COEFFICIENT, LEAST, check_between
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.zero import STANDS
 
 FloatArray = NDArray[np.float64]
+
+#: cycles from which on a band is distribution-free: with fewer, the quantile of so many cycles is beyond all of them
+CONFORMAL = 9
+#: half-width where the structures agree [unit]
+WIDEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -52,11 +57,14 @@ class Band:
     speeds: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        check_between("band", 0.0, 1.0, level=self.level)
-        check_between("band", 0.0, COEFFICIENT, floor=self.floor, running=self.running, stopped=self.stopped)
-        check_between("band", 2, COEFFICIENT, cycles=self.cycles)
+        check_between("band", 0.5, 1.0 - LEAST, level=self.level)
+        check_between("band", LEAST**2, COEFFICIENT, floor=self.floor, running=self.running, stopped=self.stopped)
+        check_between("band", 0.0, WIDEST, **{"half-width": self.floor * max(self.running, self.stopped)})
+        check_between("band", CONFORMAL if self.basis == "conformal" else 2, COEFFICIENT, cycles=self.cycles)
         if min(self.speeds, default=0) < 0:
             raise SettingError("band: there is no input before the first")
+        if len(set(self.speeds)) < len(self.speeds):
+            raise SettingError("band: a speed stands twice in it")
 
     @property
     def words(self) -> str:

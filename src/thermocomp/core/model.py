@@ -258,12 +258,16 @@ class ErrorModel(ABC):
         Returns
         -------
         ndarray of shape (...,)
-            [unit]; nan without a band.
+            [unit]; nan without a band. Where ``hold`` or ``fade`` let less pass than the model says, it is wider by
+            what they keep back.
         """
         if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
         change = self.change(state, inputs)
-        return self.band.half_width(change, self._spread(state.memory, change))
+        kept: FloatArray | float = 0.0
+        if self.support.policy != "clip":
+            kept = np.abs(self._advance(state.memory, change, 0.0)[1] - state.deviation)
+        return self.band.half_width(change, self._spread(state.memory, change)) + kept
 
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return what the model makes of a reading: inputs minus their reference, within the trained range."""

@@ -184,11 +184,11 @@ class PacedDynamic(ErrorModel):
     def spread_out(self) -> tuple[FloatArray, FloatArray]:
         """Read-outs of the spread: of the inputs, (n_inputs, n_spread), and of the states, (n_memory, n_spread)."""
         count = len(self.temperatures)
-        table = np.array(self.spread, dtype=np.float64).reshape(len(self.spread), -1).T
+        table = np.array(self.spread, dtype=np.float64).reshape(len(self.spread), count + len(self.bank.rates)).T
         direct = np.zeros((len(self.inputs), len(self.spread)))
-        for k, t in enumerate(self.temperatures if self.spread else ()):
+        for k, t in enumerate(self.temperatures):
             direct[t.input] += table[k]
-        return direct, table[count:] if self.spread else np.zeros((len(self.bank.rates), 0))
+        return direct, table[count:]
 
     def _expression(self, change: Sequence[Node]) -> Node:
         weights: list[float] = []

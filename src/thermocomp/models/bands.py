@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from thermocomp.core.band import Band
+from thermocomp.core.band import CONFORMAL, Band
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -15,8 +15,6 @@ IntArray = NDArray[np.intp]
 
 #: share of the rows of unseen cycles that a band is to hold
 LEVEL = 0.9
-#: cycles from which on a band is distribution-free: with fewer, the quantile of so many cycles is beyond all of them
-CONFORMAL = 9
 #: least spread that is counted with, in units of its root mean square on the cycles left out
 FLOOR = 0.5
 _LEAST = 1e-6  # [unit], and of a size in units of that: nothing is divided by less
@@ -77,7 +75,8 @@ def find_band(
         factor = float(scores[order][min(place, len(order) - 1)])
     else:
         factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt(1 + 1 / n))
-    return Band(level, basis, n, floor, factor * running, factor * stopped, tuple(speeds))
+    running, stopped = (max(factor * size, _LEAST) for size in (running, stopped))
+    return Band(level, basis, n, floor, running, stopped, tuple(speeds))
 
 
 def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:
