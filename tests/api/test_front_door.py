@@ -275,6 +275,17 @@ def test_trouble_is_told(recording: Recording) -> None:
     assert "Trouble: table: t2_C" in repr(found)
 
 
+def test_of_two_spindle_speeds_the_first_is_taken_and_the_other_named(recording: Recording) -> None:
+    table = recording.to_frame().assign(second_rpm=lambda t: t["spindle_rpm"] / 2)
+    found = tc.fit(table, "z_um", "ols")
+    assert "second_rpm" not in found.model.sensors
+    said = "table: second_rpm left out: of several spindle speeds the first, spindle_rpm, is an input; name the inputs"
+    assert any(line.startswith(said) for line in found.trouble)
+    named = tc.fit(table, "z_um", "ols", inputs=["t1_C", "second_rpm"])
+    assert not any("second_rpm" in line for line in named.trouble)
+    assert not any("spindle speeds" in line for line in tc.fit(recording, "z_um", "ols").trouble)
+
+
 def test_simulate() -> None:
     (found,) = tc.simulate("demo", seed=3)
     assert len(found.cycles) > 1

@@ -123,10 +123,19 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     recordings.write(small_machine((2200.0, 1200.0), seed=3), other)
     assert run(["assess", str(model), str(other), "--json"]) == 0
     results = printed(capsys)["results"]
+    assert run(["assess", str(model), str(other)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "% of the judged rows, with a mean half-width" in said
+    assert "in-sample" not in said
     assert [r["block"] for r in results] == ["cycle 1 (2200 1/min)", "cycle 2 (1200 1/min)", "all cycles"]
     assert set(results[-1]["robustness"]["noise_rms_um"]) == {"uniform", "normal"}
     assert run(["assess", str(model), str(drift)]) == 1
-    assert "no honest test: fitted to drift" in capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no honest test: fitted to drift" in said
+    assert "│ averaged, │" in said
+    assert "│ in-sample │" in said
+    assert "in-sample: on the rows it has learned from" in said
+    assert "% of the judged rows, which the model has learned from, with a mean half-width" in said
     copy = drift.with_name("copy.csv")
     copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file

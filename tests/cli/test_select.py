@@ -150,6 +150,23 @@ def test_no_number_is_cut_off_on_a_narrow_terminal(
         assert "…" not in capsys.readouterr().out
 
 
+def test_sensors_that_do_not_help_are_not_recommended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Noise is not compensated by any temperature: judged bad, for people and programs, and on the page."""
+    plain = crowded_machine()
+    noise = np.random.default_rng(1).normal(size=len(plain))
+    path, page = tmp_path / "noise.csv", tmp_path / "noise.html"
+    recordings.write(replace(plain, table=plain.table.assign(x_um=noise)), path)
+    line = ["select", str(path), "--target", "x_um", "--max-sensors", "2", "--jobs", "1", "--quiet"]
+    assert run([*line, "-o", str(page)]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "x_um: no sensor: no set of temperatures is clearly better than no compensation" in said
+    assert "no set of temperatures is clearly better" in page.read_text(encoding="utf-8")
+    assert run([*line, "--json"]) == 1
+    (choice,) = json.loads(capsys.readouterr().out)["choices"]
+    assert choice["sensors"] == []
+    assert choice["reason"].startswith("no set of temperatures is clearly better than no compensation")
+
+
 def test_a_target_that_does_not_move(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plain = crowded_machine()
     path = tmp_path / "still.csv"

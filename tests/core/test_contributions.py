@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from thermocomp.core.band import Band
 from thermocomp.core.contributions import contributions, gains
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
+from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 
 MODEL = PacedDynamic(
@@ -89,6 +91,26 @@ def test_the_bound_is_reached() -> None:
     assert last == pytest.approx(bound)
     # lags of opposite sign can add up on the way: -1 still follows what was, 0.5 + 2 what is
     assert by_name["T1"].bound == pytest.approx(2.5 * 27.5 + 1.0 * 17.5)
+
+
+def test_only_paced_models_have_parts_and_a_step_is_positive() -> None:
+    other = LinearDynamic(
+        target="z_um",
+        unit="um",
+        inputs=MODEL.inputs,
+        signals=((0,),),
+        direct=(2.0,),
+        lag_signals=(),
+        time_constants=(),
+        lagged=(),
+    )
+    for asked in (lambda: contributions(other, table()), lambda: gains(other, 60.0)):
+        with pytest.raises(InputError, match=r"z_um has a model of the family linear-dynamic.* averaged makes"):
+            asked()
+    for step in (0.0, -5.0, np.nan):
+        with pytest.raises(InputError, match=f"^step {step}: want the time between two rows"):
+            gains(MODEL, step)
+    assert gains(MODEL, np.inf)[0].settled == gains(MODEL, np.inf)[0].instantaneous
 
 
 def test_the_largest_comes_first() -> None:

@@ -196,10 +196,25 @@ def test_a_spindle_that_turned_before_and_stands_now(samples: Samples) -> None:
     assert np.sqrt(np.mean(residual**2)) < 0.1 * np.abs(samples.deviations[:, 0]).max()
 
 
-@pytest.mark.parametrize("settings", [{"structures": 0}, {"noise": -1.0}, {"noise": float("nan")}])
-def test_settings_of_nonsense_are_refused(settings: dict[str, Any], samples: Samples) -> None:
-    with pytest.raises(InputError, match="structures"):
-        fitted(samples, **settings)
+@pytest.mark.parametrize("bad", [0, 2.5, float("nan")])
+def test_structures_of_nonsense_are_refused(bad: float, samples: Samples) -> None:
+    with pytest.raises(InputError, match=f"^structures {bad}: want a whole number, at least 1"):
+        fitted(samples, structures=bad)
+
+
+@pytest.mark.parametrize("bad", [-1.0, float("inf"), float("nan")])
+def test_a_noise_of_nonsense_is_refused(bad: float, samples: Samples) -> None:
+    with pytest.raises(InputError, match=f"^noise {bad}: want at least 0 degC"):
+        fitted(samples, noise=bad)
+
+
+@pytest.mark.parametrize("name", ["lags", "powers", "stopped", "running"])
+@pytest.mark.parametrize("bad", [-5.0, 0.0, float("nan"), float("inf")])
+def test_constants_of_nonsense_are_refused(name: str, bad: float, samples: Samples) -> None:
+    with pytest.raises(InputError, match=rf"^{name} \(600.0, {bad}\): want finite numbers, each more than 0"):
+        fitted(samples, **dict[str, Any]({name: (600.0, bad)}))
+    values: dict[str, Any] = {name: np.array([1.0, 2.0])}
+    assert fitted(samples, structures=np.int64(5), **values).coef_.size  # arrays and their numbers will do
 
 
 def test_its_band_comes_from_cycles_left_out(samples: Samples) -> None:

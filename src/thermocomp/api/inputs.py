@@ -197,7 +197,14 @@ def prepare(
     samples = drop_unsound(stack(tests, named, chosen, rezero=not absolute, starts=begun, **how), tests)
     wanted = judged or split is not None or leave_one is not None
     judging = judging_of(samples, split=split, leave_one=leave_one) if wanted else Judging("", ())
-    return Prepared(tuple(tests), samples, judging, trouble_of(tests))
+    trouble = trouble_of(tests)
+    if chosen is None and (others := tests[0].of_quantity("spindle_speed")[1:]):
+        left, taken = ", ".join(c.name for c in others), tests[0].of_quantity("spindle_speed")[0].name
+        trouble.append(
+            f"{tests[0].name}: {left} left out: of several spindle speeds the first, {taken}, is an input; name the "
+            "inputs to take others"
+        )
+    return Prepared(tuple(tests), samples, judging, trouble)
 
 
 def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOne | None = None) -> Judging:
@@ -289,7 +296,7 @@ def training_table(
     target : str
         Displacement channel to predict.
     inputs : str or sequence of str, optional
-        Channels to predict from; all temperatures and the spindle speed without it.
+        Channels to predict from; all temperatures and the first spindle speed without it.
     time : bool
         The first column is ``time_s``, for an estimator with ``time="column"``.
     absolute : bool

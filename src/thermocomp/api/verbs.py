@@ -103,7 +103,7 @@ def compare(
         Names of methods, ``all``, and estimators of any kind: one of thermocomp's with settings of its own, any
         regressor of scikit-learn, a Pipeline, a small class of one's own.
     inputs : str or sequence of str, optional
-        Channels to predict from; all temperatures and the spindle speed without it.
+        Channels to predict from; all temperatures and the first spindle speed without it.
     split : str, optional
         Judge by time: shares of the rows such as ``0.75/0.25``, or hours such as ``20h/8h``.
     leave_one : {'cycle', 'day', 'file'}, optional

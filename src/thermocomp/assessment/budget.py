@@ -50,8 +50,6 @@ class Budget:
     rms : ndarray of shape (n_models, n_sizes, n_targets, n_blocks)
         Of the residual, sensors and model chosen without the block [unit of the target]; nan where it could not be
         fitted.
-    rows : ndarray of int of shape (n_targets, n_blocks)
-        Judged rows.
     none : ndarray of shape (n_targets, n_blocks)
         RMS without compensation [unit of the target].
     frequency : ndarray of shape (n_sizes, n_candidates)
@@ -72,7 +70,6 @@ class Budget:
     models: tuple[str, ...]
     blocks: tuple[str, ...]
     rms: FloatArray
-    rows: NDArray[np.intp]
     none: FloatArray
     frequency: FloatArray
     condition: FloatArray
@@ -83,21 +80,25 @@ class Budget:
         """Return the RMS on each unseen block, mean over the targets, (n_models, n_sizes, n_blocks) [`unit`]."""
         return np.asarray((self.rms / self.scales[:, None]).mean(axis=2))
 
+    def none_of_blocks(self) -> FloatArray:
+        """Return the RMS on each unseen block without compensation, mean over the targets, (n_blocks,) [`unit`]."""
+        return np.asarray((self.none / self.scales[:, None]).mean(axis=0))
+
     def of_targets(self) -> FloatArray:
-        """Return the RMS over all unseen blocks together, (n_models, n_sizes, n_targets) [unit of the target]."""
-        return np.asarray(np.sqrt((self.rms**2 * self.rows).sum(axis=3) / self.rows.sum(axis=1)))
+        """Return the mean RMS over the unseen blocks, (n_models, n_sizes, n_targets) [unit of the target]."""
+        return np.asarray(self.rms.mean(axis=3))
 
     def none_of_targets(self) -> FloatArray:
-        """Return the RMS over all unseen blocks without compensation, (n_targets,) [unit of the target]."""
-        return np.asarray(np.sqrt((self.none**2 * self.rows).sum(axis=1) / self.rows.sum(axis=1)))
+        """Return the same without compensation, (n_targets,) [unit of the target]."""
+        return np.asarray(self.none.mean(axis=1))
 
-    def pooled(self) -> FloatArray:
-        """Return the RMS over all unseen blocks together, mean over the targets, (n_models, n_sizes) [`unit`]."""
-        return np.asarray((self.of_targets() / self.scales).mean(axis=2))
+    def mean(self) -> FloatArray:
+        """Return what sets and models are compared by: mean over blocks and targets, (n_models, n_sizes) [`unit`]."""
+        return np.asarray(self.of_blocks().mean(axis=2))
 
-    def none_pooled(self) -> float:
-        """Return the RMS over all unseen blocks without compensation, mean over the targets [`unit`]."""
-        return float((self.none_of_targets() / self.scales).mean())
+    def none_mean(self) -> float:
+        """Return the same without compensation [`unit`]."""
+        return float(self.none_of_blocks().mean())
 
     def gains(self, model: str) -> tuple[FloatArray, FloatArray]:
         """Return what the next sensor gains after each number but the last [`unit`].
@@ -105,12 +106,12 @@ class Budget:
         Returns
         -------
         gain : ndarray of shape (n_sizes - 1,)
-            Over all unseen blocks together.
+            Mean over the unseen blocks.
         of_blocks : ndarray of shape (n_sizes - 1, n_blocks)
             On each.
         """
-        m = self.models.index(model)
-        return -np.diff(self.pooled()[m]), -np.diff(self.of_blocks()[m], axis=0)
+        found = -np.diff(self.of_blocks()[self.models.index(model)], axis=0)
+        return np.asarray(found.mean(axis=1)), found
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -120,13 +121,23 @@ class Budget:
     def enough(self, model: str) -> int | None:
         """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest one.
 
-        None if the model could not be fitted in one of the blocks.
+        None if the model could not be fitted in one of the blocks, or no number is better than no compensation.
         """
         found = self._fewest([self.models.index(model)])
         return None if found is None else self.sizes[found[1]]
 
     def recommended(self) -> tuple[str, int] | None:
-        """Return the model, and the place in `sensors`, with the fewest sensors that are enough among all models."""
+        """Return the model, and the place in `sensors`, with the fewest sensors that are enough among all models.
+
+        What is not better than no compensation is not enough: in its mean over the blocks it gains less than a sensor
+        has to gain to be worth it, or no more than one standard error of that gain between the blocks.
+
+        Returns
+        -------
+        model : str
+        place : int
+            None if no model could be fitted in all blocks, or no set is better than no compensation.
+        """
         found = self._fewest(range(len(self.models)))
         return None if found is None else (self.models[found[0]], found[1])
 
@@ -149,9 +160,8 @@ class Budget:
 
     def _margin(self, models: Sequence[int]) -> tuple[float, float, float]:
         errors = self.of_blocks()[models].reshape(-1, len(self.blocks))
-        best = errors[int(np.argmin(errors.mean(axis=1)))]
-        error = float(best.std(ddof=1) / np.sqrt(len(best))) if len(best) > 1 else 0.0
-        share = SHARE * float((self.none / self.scales[:, None]).mean())
+        error = float(_standard_error(errors[int(np.argmin(errors.mean(axis=1)))]))
+        share = SHARE * self.none_mean()
         least = share if self.unit == PERCENT else min(WORTH, share)
         return max(error, least), error, least
 
@@ -159,11 +169,18 @@ class Budget:
         fitted = self._fitted(models)
         if not fitted:
             return None
-        mean = self.of_blocks()[fitted].mean(axis=2)
-        limit = mean.min() + self._margin(fitted)[0]
-        near = [(self.sizes[k], mean[m, k], m, k) for m, k in np.argwhere(mean <= limit).tolist()]
-        _, _, m, k = min(near)
-        return fitted[m], k
+        mean, (margin, _, least) = self.mean()[fitted], self._margin(fitted)
+        gain = self.none_of_blocks() - self.of_blocks()[fitted]
+        better = gain.mean(axis=2) >= np.maximum(_standard_error(gain), least)
+        near = np.argwhere(better & (mean <= mean.min() + margin)).tolist()
+        _, _, m, k = min(((self.sizes[k], mean[m, k], m, k) for m, k in near), default=(0, 0.0, -1, -1))
+        return (fitted[m], k) if near else None
+
+
+def _standard_error(of_blocks: FloatArray) -> FloatArray:
+    """Return the standard error of the mean over the last axis; 0 with one block, of which none is known."""
+    n = of_blocks.shape[-1]
+    return np.asarray(of_blocks.std(axis=-1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(of_blocks.shape[:-1]))
 
 
 def budget(
@@ -238,7 +255,12 @@ def budget(
             failures.setdefault(piece[2], value)
     unseen = np.reshape(found, (len(splits), len(names), len(sensors[0]), len(targets)))
     judged = [[split.judge & np.isfinite(samples.deviations[:, t]) for split in splits] for t in range(len(targets))]
+    none = np.array(
+        [[rms(samples.deviations[r, t], np.zeros(r.sum())) for r in blocks] for t, blocks in enumerate(judged)]
+    )
     unit, scales = weigh_targets(samples, np.any([split.judge for split in splits], axis=0))
+    if unit == PERCENT:  # of what is compared: the mean over the blocks
+        scales = np.where(none.any(axis=1), none.mean(axis=1) / 100, 1.0)
     return Budget(
         targets=tuple(c.name for c in targets),
         unit=unit,
@@ -248,10 +270,7 @@ def budget(
         models=tuple(names),
         blocks=tuple(split.block for split in splits),
         rms=np.moveaxis(unseen, 0, -1),
-        rows=np.array([[rows.sum() for rows in blocks] for blocks in judged]),
-        none=np.array(
-            [[rms(samples.deviations[r, t], np.zeros(r.sum())) for r in blocks] for t, blocks in enumerate(judged)]
-        ),
+        none=none,
         frequency=np.mean([[[n in s for n in temperatures] for s in subsets] for subsets in sensors[1:]], axis=0),
         condition=_conditions(samples, sensors[0]),
         answer=chosen[0].answer,

@@ -38,48 +38,56 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     ------
     FitError
         None of the models could be judged in every block.
+
+    Notes
+    -----
+    Where no set is better than no compensation it is a choice without sensors, with `Choice.failure`.
     """
     candidates = [Candidates.of(samples, t) for t in range(len(samples.targets))]
     most = settings.most("pareto")
     found = budget(samples, judging, settings.models, max_sensors=most, jobs=jobs, progress=progress)
     targets = ", ".join(found.targets)
-    recommended = found.recommended()
-    if recommended is None:
+    if found.margin() is None:
         raise FitError(f"{targets}: none of the models could be judged in every block: {_failed(found)}")
-    model, place = recommended
-    sensors = found.sensors[place]
-    notes = [
-        _rule(found),
-        next_to_buy(found, model, place),
-        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
-        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
-        "shown, so they flatter it a little.",
-    ]
+    notes = [_rule(found)]
     if found.failures:
         notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
     if len(found.blocks) < len(judging.splits):
         several = "one of the targets" if len(found.targets) > 1 else "the target"
         notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a number of {several} were left out.")
-    error = float(found.pooled()[found.models.index(model), place])
-    tables = [
-        _errors(found, judging, model, place),
+    recommended = found.recommended()
+    m, best = np.unravel_index(int(np.nanargmin(found.mean())), found.mean().shape)
+    model, place = recommended or (found.models[int(m)], int(best))
+    sensors, error = found.sensors[place], float(found.mean()[found.models.index(model), place])
+    told = f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
+    told += f"unseen cycles{_mean(found)}, instead of {found.none_mean():.2f} {found.unit}"
+    errors = [
+        _errors(found, judging, model, place if recommended else None),
         *([_by_target(found, model, place)] if len(found.targets) > 1 else []),
+    ]
+    if recommended is None:
+        why = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
+        return Choice("pareto", targets, (), why, tuple(errors), tuple(notes), found, failure=why)
+    notes[1:1] = [
+        next_to_buy(found, model, place),
+        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
+        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
+        "shown, so they flatter it a little.",
+    ]
+    left = found.of_targets()[found.models.index(model), place]
+    if idle := [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]:
+        notes.insert(
+            1, f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
+        )
+    tables = [
+        *errors,
         *([_next(found, model, place)] if len(found.sensors) > 1 else []),
         _frequency(found, place),
         *([_stand_ins(found, place)] if len(found.candidates) > 1 else []),
         _repeats(candidates, sensors),
     ]
-    return Choice(
-        "pareto",
-        targets,
-        sensors,
-        f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
-        f"unseen cycles{_mean(found)}, instead of {found.none_pooled():.2f} {found.unit}; "
-        f"{trade_off(found, model, place)}",
-        tuple(tables),
-        tuple(notes),
-        found,
-    )
+    reason = f"{told}; {trade_off(found, model, place)}"
+    return Choice("pareto", targets, sensors, reason, tuple(tables), tuple(notes), found)
 
 
 def _failed(found: Budget) -> str:
@@ -87,28 +95,31 @@ def _failed(found: Budget) -> str:
 
 
 def _rms(found: Budget) -> str:
-    return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
+    """Name what is compared: a block's RMS, mean over the blocks."""
+    if len(found.blocks) == 1:
+        return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
+    return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"
 
 
 def _mean(found: Budget) -> str:
     return f" (mean of {len(found.targets)} displacements)" if len(found.targets) > 1 else ""
 
 
-def _errors(found: Budget, judging: Judging, model: str, place: int) -> Table:
-    pooled, gains = found.pooled(), [*found.gains(model)[0].tolist(), None]
+def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> Table:
+    mean, gains = found.mean(), [*found.gains(model)[0].tolist(), None]
     rows = tuple(
-        (size, *(float(v) for v in pooled[:, k]), gains[k], float(found.condition[k]), " ".join(found.sensors[k]))
+        (size, *(float(v) for v in mean[:, k]), gains[k], float(found.condition[k]), " ".join(found.sensors[k]))
         for k, size in enumerate(found.sizes)
     )
-    headings = [f"{m} RMS [{found.unit}]" for m in found.models]
+    headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
     return Table(
         f"Error on unseen blocks: {judging.name}",
         ("sensors", *headings, f"next gains [{found.unit}]", "condition", "chosen in all rows"),
         rows,
         place,
-        f"Without compensation {found.none_pooled():.2f} {found.unit}{_mean(found)}. Next gains: what {model} gains by "
-        "the sensors of the next row. Enough, each model by itself: "
-        + ", ".join(f"{found.enough(m) or 'not judged'} for {m}" for m in found.models)
+        f"RMS on each unseen block, mean over the blocks{_mean(found)}; without compensation {found.none_mean():.2f} "
+        f"{found.unit}. Next gains: what {model} gains by the sensors of the next row. Enough, each model by itself: "
+        + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
     )
 
@@ -123,7 +134,7 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
     worst = int(np.argmax(more))
     return Table(
         f"Error on unseen blocks for each displacement: {model}",
-        ("sensors", *(f"{t} RMS" for t in found.targets)),
+        ("sensors", *(f"{t} mean RMS" for t in found.targets)),
         rows,
         1 + place,
         "In the unit of each; 0 sensors: without compensation."
@@ -178,14 +189,24 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
     if place == len(found.sensors) - 1:
         return "Next to buy: all temperatures are in use, of others nothing is known."
     gains, blocks = found.gains(model)
-    gain, own, unit = float(gains[place]), blocks[place], found.unit
+    own, unit = blocks[place], found.unit
     spread = f" ({own.min():.2f} to {own.max():.2f} {unit} from block to block)" if len(own) > 1 else ""
-    would = f"{_joins(found, place)} would gain {gain:.2f} {unit}{spread}"
-    if gain <= least:
-        return f"Next to buy: none is worth it. {would}; {least:.2f} {unit} is what a further sensor has to gain."
-    if gain <= margin:
-        return f"Next to buy: {would}, which is less than the blocks differ by: more thermal cycles would tell."
-    return f"Next to buy: {would}."
+    would = f"{_joins(found, place)} would gain {gains[place]:.2f} {unit}{spread}"
+    none = f"{would}; {least:.2f} {unit} is what a further sensor has to gain."
+    # what one does not bring, several may
+    for k, gain in enumerate(np.cumsum(gains[place:]).tolist(), start=place + 1):
+        new = [s for s in found.sensors[k] if s not in found.sensors[place]]
+        if gain > len(new) * least:
+            surely = (
+                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would tell."
+            )
+            if k == place + 1:
+                return f"Next to buy: {would}{surely}"
+            both = " and ".join(new) if len(new) == 2 else f"{len(new)} ({', '.join(new)})"
+            return (
+                f"Next to buy: no single one is worth it. {none} {both} together would gain {gain:.2f} {unit}{surely}"
+            )
+    return f"Next to buy: none is worth it. {none}"
 
 
 def _frequency(found: Budget, place: int) -> Table:
@@ -264,21 +285,20 @@ def trade_off(found: Budget, model: str, place: int) -> str:
     -------
     str
     """
-    pooled = found.pooled()
+    mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
-    best = np.unravel_index(int(np.nanargmin(pooled)), pooled.shape)
+    best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)
     others = {(int(best[0]), int(best[1])): ", the best of the table"}
     others.setdefault((m, len(found.sizes) - 1), "")
     said = []
     for (k, j), what in others.items():
-        cost = float(pooled[m, place] - pooled[k, j])
+        cost = float(mean[m, place] - mean[k, j])
         if (k, j) != (m, place):
             by = f" by {found.models[k]}" if k != m else ""
-            said.append(
-                f"{abs(cost):.2g} {found.unit} {'more' if cost >= 0 else 'less'} than {found.sizes[j]}{by}{what}"
-            )
+            other = f"{found.sizes[j]}{by}" if j != place else f"as many{by}"
+            said.append(f"{abs(cost):.2g} {found.unit} {'more' if cost >= 0 else 'less'} than {other}{what}")
     if not said:
-        return "fewer cost more than the rule allows"
+        return "fewer cost more than the rule allows" if n > 1 else "there is no other set to choose from"
     return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)}"
 
 
@@ -292,7 +312,8 @@ def _rule(found: Budget) -> str:
         what = f"{100 * SHARE:g} % of what there is without compensation, {what}"
     unit = found.unit
     return (
-        f"Rule: the fewest sensors whose mean RMS over the unseen blocks is within {margin:.2f} {unit} of the "
-        f"smallest: the larger of one standard error between the blocks (Breiman 1984), {error:.2f} {unit}, and of "
+        "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks, that "
+        f"of the table, is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
+        f"blocks (Breiman 1984), {error:.2f} {unit}, and of "
         f"{least:.2f} {unit}, {what}."
     )

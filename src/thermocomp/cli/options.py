@@ -41,7 +41,7 @@ class StudyOptions:
     target : list of str
         Displacement channels to predict; left out, the command lists them.
     inputs : list of str
-        Channels to predict from; all temperatures and the spindle speed if not given.
+        Channels to predict from; all temperatures and the first spindle speed if not given.
     mapping : Path
         TOML file that says what the columns are.
     split : str

@@ -53,7 +53,8 @@ def select(
     Returns
     -------
     int
-        0 done, 1 nothing could be chosen for one of several targets, 2 unusable input.
+        0 done, 1 no set is better than no compensation (pareto), or nothing could be chosen for one of several targets,
+        2 unusable input.
     """
     settings.check(method)
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")

@@ -23,8 +23,7 @@ class Band:
     """Half-width of the band about a model's answer, fixed when the model was fitted.
 
     It is ``factor * sqrt(floor^2 + spread^2)``. The spread is that of the structures a model is the average of: what
-    the training has not settled they answer differently. It is the distance to what was covered, in the unit of the
-    answer.
+    the training has not settled they answer differently. Inputs are clipped, so it does not grow beyond their range.
 
     Parameters
     ----------

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.columns import Columns
-from thermocomp.core.model import FloatArray
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel, FloatArray
 from thermocomp.core.paceddynamic import PacedDynamic
 
 
@@ -22,7 +23,7 @@ class Gain(NamedTuple):
 
 
 def contributions(
-    model: PacedDynamic, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    model: ErrorModel, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
 ) -> dict[str, FloatArray]:
     """Return what each input, with its lags or states, adds to the deviation.
 
@@ -31,6 +32,7 @@ def contributions(
     Parameters
     ----------
     model : PacedDynamic
+        Of the method `averaged`; of no other family it is known.
     table, time, reference
         See `thermocomp.core.model.ErrorModel.predict`.
 
@@ -42,8 +44,9 @@ def contributions(
     Raises
     ------
     InputError
-        See `thermocomp.core.model.ErrorModel.predict`.
+        A model of another family; see also `thermocomp.core.model.ErrorModel.predict`.
     """
+    model = _paced(model)
     direct, weights = model.read_out
     of = np.zeros((len(weights), len(model.inputs)))
     of[np.arange(len(weights)), _owners(model)] = weights
@@ -57,19 +60,28 @@ def contributions(
     return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
 
 
-def gains(model: PacedDynamic, step: float) -> list[Gain]:
+def gains(model: ErrorModel, step: float) -> list[Gain]:
     """Return how much each input counts, the largest bound first.
 
     Parameters
     ----------
     model : PacedDynamic
+        Of the method `averaged`; of no other family it is known.
     step : float
         Time between two rows [s].
 
     Returns
     -------
     list of Gain
+
+    Raises
+    ------
+    InputError
+        A model of another family, or a step that is not positive.
     """
+    model = _paced(model)
+    if not step > 0:
+        raise InputError(f"step {step}: want the time between two rows, more than 0 s")
     direct, weights = model.read_out
     owners, bank = _owners(model), model.bank
     rates = bank.rates.copy()
@@ -90,6 +102,15 @@ def gains(model: PacedDynamic, step: float) -> list[Gain]:
         now = float(direct[k] + followed[own].sum())
         found.append(Gain(i.name, i.quantity, now, float(parts.sum()), bound))
     return sorted(found, key=lambda g: -g.bound)
+
+
+def _paced(model: ErrorModel) -> PacedDynamic:
+    if isinstance(model, PacedDynamic):
+        return model
+    raise InputError(
+        f"{model.target} has a model of the family {model.family}: what each input adds is known of the family "
+        f"{PacedDynamic.family} alone, which the method averaged makes"
+    )
 
 
 def _owners(model: PacedDynamic) -> NDArray[np.intp]:

@@ -132,8 +132,7 @@ class AveragedDynamic(TimedRegressor):
         self.time = time
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
-        if self.structures < 1 or not 0 <= self.noise < np.inf:
-            raise InputError(f"structures {self.structures}, noise {self.noise}: want at least 1, and at least 0 degC")
+        self._check()
         speeds = [self._place(s, "speed column") for s in self.speed]
         self._features, parts, self.chosen_by_ = self.lay_out(rows, step, folds, speeds)
         moments = self._features.moments(rows, deviation[:, None], step, parts, self.noise)
@@ -149,6 +148,16 @@ class AveragedDynamic(TimedRegressor):
         self.lags_, self.top_speed_ = self._features.lags, self._features.top_speed
         self.gain_ = np.zeros(rows.shape[1])
         self.gain_[list(self._features.temperatures)] = np.abs(self._features.shares(step) @ self._copies())
+
+    def _check(self) -> None:
+        if not hasattr(self.structures, "__index__") or self.structures < 1:
+            raise InputError(f"structures {self.structures}: want a whole number, at least 1")
+        if not 0 <= self.noise < np.inf:
+            raise InputError(f"noise {self.noise}: want at least 0 degC")
+        for name, unit in (("lags", " s"), ("powers", ""), ("stopped", " s"), ("running", " s")):
+            values = getattr(self, name)
+            if not all(0 < v < np.inf for v in values):
+                raise InputError(f"{name} {tuple(values)}: want finite numbers, each more than 0{unit}")
 
     def lay_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, speeds: Sequence[int]

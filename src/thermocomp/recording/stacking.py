@@ -45,7 +45,7 @@ def stack(
     targets : sequence of str
         Displacement channels to predict.
     inputs : sequence of str, optional
-        Channels models may use; all temperatures and the spindle speed if not given.
+        Channels models may use; all temperatures and the first spindle speed if not given.
     rezero : bool
         True: temperatures are counted from the start of each test (ISO 230-3); False: they are absolute.
     zeroing : Zeroing, optional

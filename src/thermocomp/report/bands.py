@@ -30,7 +30,8 @@ def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessmen
 
 def describe_coverage(a: Assessment) -> str:
     """Return what share of the judged rows the band held, and how wide it was there."""
+    seen = ", which the model has learned from" if a.caveat else ""
     return (
-        f"The band held {100 * a.coverage:.0f} % of the judged rows, with a mean half-width of {a.half_width:.2f} um"
-        f" ({a.band})"
+        f"The band held {100 * a.coverage:.0f} % of the judged rows{seen}, with a mean half-width of "
+        f"{a.half_width:.2f} um ({a.band})"
     )

@@ -9,14 +9,16 @@ import io
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import LogLocator
 
 from thermocomp.core.shown import shorten
 
@@ -109,6 +111,27 @@ def name_ticks(axis: Axis, names: Sequence[str], longest: int = _NAME, **how: An
         Of the labels, such as ``fontsize``.
     """
     axis.set_ticks(range(len(names)), [shorten(name, longest) for name in names], **how)
+
+
+def log_ticks(ax: Axes, which: Literal["x", "y"], dense: float = 0.7) -> None:
+    """Make an axis logarithmic, with plain numbers at its ticks that do not run into each other.
+
+    Call it when all is drawn.
+
+    Parameters
+    ----------
+    ax : Axes
+    which : {'x', 'y'}
+    dense : float
+        Decades across up to which each digit finds room; up to three times as many 1, 2 and 5 do.
+    """
+    ax.set(**{f"{which}scale": "log"})
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    low, high = np.log10(ax.get_xlim() if which == "x" else ax.get_ylim())
+    axis.set_minor_locator(LogLocator(subs=(2, 5) if high - low > dense else range(2, 10)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("{x:g}" if high - low <= 3 * dense else "")
+    axis.set_tick_params(which="minor", labelsize=7)
 
 
 def svg(figure: Figure) -> Drawn:

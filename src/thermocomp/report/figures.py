@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.core.shown import shorten
 from thermocomp.recording.recording import Recording
-from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
+from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 
 FloatArray = NDArray[np.float64]
 
@@ -23,10 +23,12 @@ SHADE = "#f1f1ee"
 BAND = "#d6e8f5"
 #: characters of a name along an axis
 LONGEST = 28
+#: of the smallest writing, that find room across a page beside a legend
+LETTERS = 95
 POINTS = 1200  # of a curve across the page: enough for the eye, light enough for a file
 
 
-def measured(recording: Recording) -> str:
+def measured(recording: Recording) -> Drawn:
     """Show what was measured in one test: speed, temperatures, displacements; thermal cycles shaded."""
     hours = recording.time / 3600
     speed = recording.speed
@@ -42,15 +44,13 @@ def measured(recording: Recording) -> str:
             ax.plot(*thin_points(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
             ax.set_ylabel("1/min")
             ax.set_title("spindle speed", pad=14)
+            room = float(hours[-1] - hours[0]) / LETTERS
+            free = -np.inf
             for cycle in recording.cycles:
-                ax.text(
-                    hours[cycle.start],
-                    1.03,
-                    f" {cycle.name}",
-                    transform=ax.get_xaxis_transform(),
-                    fontsize=7,
-                    color="#666",
-                )
+                start, name = float(hours[cycle.start]), f" {shorten(cycle.name, LONGEST)}"
+                if start >= free:  # names that would run into the one before are left out
+                    ax.text(start, 1.03, name, transform=ax.get_xaxis_transform(), fontsize=7, color="#666")
+                    free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
             (rest[0], recording.temperatures, "degC", "temperatures"),
             (rest[1], recording.displacements, "um", "displacements: what a part would be wrong by"),
@@ -94,15 +94,13 @@ def overview(comparison: Comparison) -> Drawn:
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
             name_ticks(ax.yaxis, models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
-            ax.set_ylabel(shorten(target, LONGEST), fontweight="bold")
-            ax.set_xscale("log")
+            ax.set_ylabel(shorten(target, LONGEST), fontweight="bold", rotation=0, ha="right", va="center")
         panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
         for word, face in FILLED.items():
             panels[0].plot([], [], "o", color=PREDICTED, mfc=face, label=word)
         add_legend(figure, loc="outside upper right", ncols=4)
-        panels[-1].xaxis.set_major_formatter("{x:g}")
-        panels[-1].xaxis.set_minor_formatter("{x:g}")
-        panels[-1].tick_params(axis="x", which="minor", labelsize=7)
+        for ax in panels:
+            log_ticks(ax, "x")
         panels[-1].set_xlabel("RMS of the residual where it was judged [um], smaller is better")
         return svg(figure)
 
@@ -168,7 +166,7 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
     ax.fill_between(hours[rows], low, high, color=BAND, lw=0, zorder=0.5, label=block.band)
 
 
-def robustness(comparison: Comparison, model: str) -> str:
+def robustness(comparison: Comparison, model: str) -> Drawn:
     """Show what noise and a lost sensor cost: RMS clean, with noise, and with each sensor cut off."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
     with drawing("robustness" + model):
@@ -192,6 +190,7 @@ def robustness(comparison: Comparison, model: str) -> str:
                     textcoords="offset points",
                     fontsize=7,
                     color=RESIDUAL,
+                    bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 0.8},
                 )
         noise = found[0].robustness.noise if found and found[0].robustness else 0.0
         ax.plot([], [], "o", color=PREDICTED, label="clean")
@@ -199,9 +198,7 @@ def robustness(comparison: Comparison, model: str) -> str:
         ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
         ax.plot([], [], "|", color=RESIDUAL, label="one sensor cut off")
         ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
-        ax.set_xscale("log")
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("")
+        log_ticks(ax, "x")
         name_ticks(ax.yaxis, [a.target for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
         ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")

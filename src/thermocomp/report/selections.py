@@ -3,7 +3,6 @@
 from typing import cast
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
@@ -12,8 +11,11 @@ from thermocomp.assessment.budget import Budget
 from thermocomp.assessment.choice import Choice, Table
 from thermocomp.core.shown import shorten
 from thermocomp.models.grouping import CorrelationGrouping
-from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
+from thermocomp.report.drawing import Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE
+
+#: characters of the displacements above a figure
+TITLE = 80
 
 #: what is drawn of the other methods: the first of these that a table has, and the words beside it
 TOLD = {
@@ -29,7 +31,7 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     found = choice.details
     if isinstance(found, Budget):
         return budget(found), (
-            "How many sensors are needed? Lines: all unseen blocks together; dots: each block. Ring: enough, for what "
+            "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: enough, for what "
             "more sensors bring is within the margin of the rule. Condition: how far the sensors repeat each other."
         )
     if isinstance(found, CorrelationGrouping):
@@ -59,10 +61,7 @@ def rows(table: Table, value: int, target: str) -> Drawn:
         for row, x in enumerate(left):
             chosen = table.marked in (None, row)
             ax.plot(x, row, "o", color=COLOURS[0], mfc=COLOURS[0] if chosen else "none", ms=7)
-        ax.set_xscale("log")
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("{x:g}")
-        ax.tick_params(axis="x", which="minor", labelsize=7)
+        log_ticks(ax, "x")
         name_ticks(ax.yaxis, words, longest=60, fontsize=8)
         ax.set_ylim(len(left) - 0.4, -0.6)
         ax.set_xlabel(f"1 - {heading}" if share else heading)
@@ -97,7 +96,7 @@ def grouping(g: CorrelationGrouping, target: str) -> Drawn:
         numbers = [len(s.columns) for s in g.curve_]
         curve.plot(numbers, [s.mse for s in g.curve_], "-o", color=COLOURS[0])
         curve.axhline(g.mse_, color=COLOURS[1], ls="--", label="best members of the groups")
-        _log(curve)
+        log_ticks(curve, "y")
         curve.set_xlabel("number of representatives")
         curve.set_ylabel("smallest MSE_p [um²]")
         curve.set_title(shorten(target, LONGEST))
@@ -123,25 +122,26 @@ def budget(b: Budget) -> Drawn:
         for k, model in enumerate(b.models):
             colour = COLOURS[k % len(COLOURS)]
             errors.plot(sizes, b.of_blocks()[k], ".", color=colour, alpha=0.35, ms=5)
-            errors.plot(sizes, b.pooled()[k], "-o", color=colour, label=f"{model}{mean}", lw=2, ms=4)
+            errors.plot(sizes, b.mean()[k], "-o", color=colour, label=f"{model}{mean}", lw=2, ms=4)
             enough = b.enough(model)
             if enough is not None:
                 place = b.sizes.index(enough)
-                errors.plot(sizes[place], b.pooled()[k][place], "o", color=colour, mfc="none", ms=12, mew=1.6)
-        errors.axhline(b.none_pooled(), color=NONE, lw=2.5, label="no compensation")
-        everything, colour = b.pooled()[shown, -1], COLOURS[shown % len(COLOURS)]
+                errors.plot(sizes[place], b.mean()[k][place], "o", color=colour, mfc="none", ms=12, mew=1.6)
+        errors.axhline(b.none_mean(), color=NONE, lw=2.5, label="no compensation")
+        everything, colour = b.mean()[shown, -1], COLOURS[shown % len(COLOURS)]
         errors.axhline(everything, color=colour, ls=":", label=f"{b.models[shown]}, all {names[-1]} temperatures")
         errors.plot([], [], ".", color="#888", label=f"one unseen block{mean}")
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
-        _log(errors)
+        log_ticks(errors, "y")
         errors.set_ylabel(f"RMS unseen [{b.unit}]")
-        title = shorten(", ".join(b.targets), LONGEST)
-        errors.set_title(f"{title}: error against the number of temperature sensors")
+        names_of = ", ".join(b.targets)
+        title = names_of if len(names_of) <= TITLE or len(b.targets) == 1 else f"{len(b.targets)} displacements"
+        title = f"{shorten(title, TITLE)}: error against the number of temperature sensors"
+        figure.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
         add_legend(errors, loc="center left", bbox_to_anchor=(1.0, 0.5))
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
-        repeats.set_yscale("log")
-        repeats.yaxis.set_major_formatter("{x:g}")
+        log_ticks(repeats, "y", dense=0.35)
         repeats.set_ylabel("condition")
         chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
         name_ticks(chosen.yaxis, b.candidates, fontsize=7)
@@ -166,10 +166,3 @@ def budget(b: Budget) -> Drawn:
 
 def _extent(b: Budget) -> tuple[float, float, float, float]:
     return 0.5, len(b.sensors) + 0.5, len(b.candidates) - 0.5, -0.5
-
-
-def _log(ax: Axes) -> None:
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter("{x:g}")
-    ax.tick_params(axis="y", which="minor", labelsize=7)
