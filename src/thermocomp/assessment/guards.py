@@ -88,7 +88,7 @@ def _go_through(
     cut: BoolArray,
     found: FloatArray,
 ) -> None:
-    """Go through a test with the sensors of each row of `cut` reading as their zero; put what is let through in place."""
+    """Go through a test, the sensors of each row of `cut` reading as their zero; put what is let through in place."""
     zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
     state = begin(watch, runs=(len(cut),))
     for row in mine.tolist():

@@ -198,7 +198,7 @@ def stress(
     Replayed
     """
     temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
-    lost = [(i.name,) for i in model.inputs if i.name in model.sensors]
+    lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
     lost += [names for names in (guard.readings if guard else ()) if len(names) > 1 and {*names} <= {*model.sensors}]
     cut = [[k for k, i in enumerate(model.inputs) if i.name in names] for names in lost]
     known = [c.name for c in samples.inputs]

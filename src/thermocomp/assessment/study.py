@@ -111,7 +111,8 @@ def fit(
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
     everything = np.ones(len(samples), dtype=np.bool_)
     written = [train(method, samples, k, everything, support=support, prints=True) for k in range(len(samples.targets))]
-    watched = list(dict.fromkeys(i.name for w in written for i in w.model.inputs))
+    speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
+    watched = list(dict.fromkeys([*(i.name for w in written for i in w.model.inputs), *speeds]))
     comparison = compare(
         samples,
         [method],
