@@ -92,17 +92,15 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     for place, k in enumerate(heat):
         off = change[:, k] - predicted[:, place]
         still, moved = _same(samples.values[:, k], predicted[:, place], samples.time, folds)
-        sensors.append(
-            Watched(
-                k,
-                tuple(float(f"{w:.6g}") for w in weights[0, :, place]),
-                off=max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
-                jump=max(JUMP, SAFETY * _jump(change[:, k], samples.time, folds, pace)),
-                moved=max(MOVED, SAFETY * moved),
-                still=max(STILL, STILL_TIMES * still),
-                unseen=float(np.sqrt(np.nanmean(off**2))),
-            )
-        )
+        limits = {
+            "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
+            "jump": max(JUMP, SAFETY * _jump(change[:, k], samples.time, folds, pace)),
+            "moved": max(MOVED, SAFETY * moved),
+            "still": max(STILL, STILL_TIMES * still),
+            "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
+        }
+        numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
+        sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
     return Watch(inputs, samples.zeroing, of.lags, of.top_speed, of.states, tuple(sensors), pace)
 
 
