@@ -24,6 +24,7 @@ from thermocomp.assessment.compare import compare
 from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.results import Comparison
 from thermocomp.assessment.sharing import shared_among
+from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, MissingExtraError
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import cross
@@ -65,7 +66,7 @@ def test_sensors_are_the_same_as_here(method: str, settings: Settings, samples: 
     judging = splits.leave_one_cycle_out(samples)
     told: list[str] = []
     with shared_among(running.address):
-        there = selecting.select(method, samples, judging, settings, progress=lambda text, steps=1: told.append(text))
+        there = selecting.select(method, samples, judging, settings, progress=lambda text, **_: told.append(text))
     here = selecting.select(method, samples, judging, settings, jobs=2)
     assert [(c.sensors, c.reason, c.tables, c.notes) for c in there] == [
         (c.sensors, c.reason, c.tables, c.notes) for c in here
@@ -104,6 +105,7 @@ class Unsendable(LeastSquares):
         raise TypeError("cannot pickle it")
 
 
+@pytest.mark.long
 def test_what_fails_costs_its_method_alone(samples: Samples, running: DaskCluster) -> None:
     judging = splits.parse("0.75/0.25", samples)
     alone = compare(samples, ["ols", "dynamic"], judging, robustness=False)
@@ -135,7 +137,7 @@ def threads_of(_: int) -> Any:
     return {lib["num_threads"] for lib in threadpool_info()}, effective_n_jobs(-1)
 
 
-def lambdas(_: int) -> Any:
+def fails(_: int) -> Any:
     raise ValueError("on purpose")
 
 
@@ -146,7 +148,7 @@ def lost(piece: int, why: str) -> Any:
 def test_a_worker_calculates_on_one_thread(running: DaskCluster) -> None:
     with shared_among(running.address):
         assert list(work_through(threads_of, range(2), lost, jobs=1)) == [({1}, 1)] * 2
-        assert list(work_through(lambdas, [0], lost, jobs=1)) == ["ValueError: on purpose"]
+        assert list(work_through(fails, [0], lost, jobs=1)) == ["ValueError: on purpose"]
         assert list(work_through(slow, [], lost, jobs=1)) == []
 
 
@@ -227,7 +229,7 @@ def test_another_python_is_named() -> None:
         clusters._check_versions(here, clusters._alike({"python": "3.12.1.final.0"}), "tcp://a:1")
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("how", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.long)])
 def test_a_lost_scheduler(how: signal.Signals, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clusters, "ASKED", 1.0)
     monkeypatch.setattr(clusters, "ANSWERS", 1.0)
@@ -243,6 +245,7 @@ def test_a_lost_scheduler(how: signal.Signals, tmp_path: Path, monkeypatch: pyte
             assert time.monotonic() - begun < 5
 
 
+@pytest.mark.long
 def test_lost_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clusters, "ASKED", 1.0)
     with dask_cluster(tmp_path, workers=0) as cluster:
@@ -253,3 +256,17 @@ def test_lost_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             cluster.nannies[0].kill()
             with pytest.raises(InputError, match=f"{cluster.address}: the scheduler has no worker"):
                 list(going)
+
+
+@pytest.mark.parametrize("command", ["compare", "select", "fit", "papers"])
+def test_the_commands_take_it(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    small_machine().table.assign(time_s=lambda t: 60.0 * t.index).to_csv("day.csv", index=False)
+    words = [] if command == "papers" else ["day.csv", "--target", "z_um", "--inputs", "t1_C"]
+    words += ["-o", "model.json"] if command == "fit" else []
+    assert run([command, *words, "--scheduler", "tcp://127.0.0.1:1"]) == 2
+    told = capsys.readouterr().err
+    assert "error: tcp://127.0.0.1:1: no Dask scheduler answers there" in told
+    assert "see that 'dask scheduler' runs" in told

@@ -66,13 +66,15 @@ class DaskCluster:
 
 
 @contextmanager
-def dask_cluster(folder: Path, *, workers: int = 2, **environment: str) -> Iterator[DaskCluster]:
+def dask_cluster(
+    folder: Path, *, workers: int = 2, memory_limit: str = "auto", **environment: str
+) -> Iterator[DaskCluster]:
     """Start a scheduler and workers of one thread each; all of them are ended."""
     cluster = DaskCluster(folder, environment)
     try:
         cluster.start_scheduler()
         for _ in range(workers):
-            cluster.start_worker("--local-directory", str(folder))
+            cluster.start_worker("--local-directory", str(folder), "--memory-limit", memory_limit)
         yield cluster
     finally:
         cluster.stop()

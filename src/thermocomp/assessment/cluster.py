@@ -218,8 +218,11 @@ def _do(shared: tuple[Any, Sequence[Any], Any], number: int, versions: Mapping[s
     with _turn, parallel_config("sequential"):
         threadpool_limits(1)  # stays so: the next piece of any user wants it, too
         found = attempt(work, pieces[number], failed)
-        why = _unsendable(found)
-        sent: bytes = cloudpickle.dumps(failed(pieces[number], why) if why else found)
+        sent: bytes
+        try:
+            sent = cloudpickle.dumps(found)
+        except Exception as e:  # noqa: BLE001 - whatever it raises on its way
+            sent = cloudpickle.dumps(failed(pieces[number], explain(e)))
     return sent
 
 
