@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,9 @@ from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.results import Comparison
 from thermocomp.assessment.sharing import shared_among
 from thermocomp.cli.app import run
-from thermocomp.core.exceptions import InputError, MissingExtraError
+from thermocomp.core.exceptions import FitError, InputError, MissingExtraError
 from thermocomp.models.ols import LeastSquares
-from thermocomp.papers import cross
+from thermocomp.papers import cross, studies
 from thermocomp.recording import splits
 from thermocomp.recording.samples import Samples
 
@@ -65,8 +66,12 @@ def test_a_comparison_is_the_same_as_here(running: DaskCluster) -> None:
 def test_sensors_are_the_same_as_here(method: str, settings: Settings, samples: Samples, running: DaskCluster) -> None:
     judging = splits.leave_one_cycle_out(samples)
     told: list[str] = []
+
+    def tell(text: str, /, steps: int = 1) -> None:
+        told.extend([text] * steps)
+
     with shared_among(running.address):
-        there = selecting.select(method, samples, judging, settings, progress=lambda text, **_: told.append(text))
+        there = selecting.select(method, samples, judging, settings, progress=tell)
     here = selecting.select(method, samples, judging, settings, jobs=2)
     assert [(c.sensors, c.reason, c.tables, c.notes) for c in there] == [
         (c.sensors, c.reason, c.tables, c.notes) for c in here
@@ -88,6 +93,20 @@ def test_methods_on_the_experiments_are_the_same_as_here(running: DaskCluster) -
         there = cross.run(0, **how)
     assert there.numbers == cross.run(0, **how).numbers
     assert len(there.numbers) == 2
+
+
+@pytest.mark.long
+def test_the_runs_of_a_study_are_the_same_as_here(running: DaskCluster) -> None:
+    told: list[tuple[float, str]] = []
+    one = studies.repeat("hwang", repeats=2)
+    two = studies.repeat("hwang", repeats=2, jobs=2)
+    with shared_among(running.address):
+        there = studies.repeat("hwang", repeats=2, progress=lambda done, text: told.append((done, text)))
+        with pytest.raises(FitError, match=r"ModuleNotFoundError: No module named 'thermocomp.papers.nonesuch'"):
+            studies.repeat("nonesuch")
+    assert one.claims == two.claims == there.claims
+    assert one.numbers == two.numbers == there.numbers
+    assert told == [(0.5, "run 1 of 2"), (1.0, "run 2 of 2")]
 
 
 class Deadly(LeastSquares):
@@ -165,8 +184,9 @@ def test_the_keyboard_takes_the_tasks_off_the_scheduler(running: DaskCluster) ->
             going = work_through(slow, range(40), lost, jobs=1)
             assert next(going) == 0
             assert known() > 30
+            Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
             with pytest.raises(KeyboardInterrupt):
-                going.throw(KeyboardInterrupt())  # type: ignore[attr-defined]
+                list(going)
             wait_until(lambda: known() == 0)
 
 
