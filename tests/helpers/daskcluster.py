@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,19 +39,17 @@ class DaskCluster:
 
     def workers(self) -> list[int]:
         """Return the processes that do the work; their nannies start new ones if they die."""
-        return [pid for nanny in self.nannies for pid in _children(nanny.pid)]
+        return [pid for nanny in self.nannies if nanny.poll() is None for pid in _children(nanny.pid)]
 
     def stop(self) -> None:
-        for processes in (self.nannies, [self.scheduler] if self.scheduler else []):
-            for process in processes:
-                process.send_signal(signal.SIGCONT)
-                process.terminate()
-            for process in processes:
-                try:
-                    process.wait(_SOON)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+        """Kill all of them: asked to end, they would first look for each other."""
+        workers = self.workers()
+        for process in (*self.nannies, *([self.scheduler] if self.scheduler else [])):
+            process.kill()
+            process.wait()
+        for pid in workers:
+            with suppress(ProcessLookupError):  # it has seen that its nanny is gone
+                os.kill(pid, signal.SIGKILL)
 
     def _start(self, *words: str, folders: tuple[Path, ...] = ()) -> "subprocess.Popen[bytes]":
         path = os.pathsep.join(map(str, (*folders, *_FOLDERS)))

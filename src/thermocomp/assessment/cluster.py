@@ -1,5 +1,6 @@
 """Work in pieces on the workers of a Dask cluster, in place of this machine's processes."""
 
+import logging
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
@@ -56,20 +57,35 @@ def connect(address: str) -> Iterator["Cluster"]:
         There is no scheduler within `ANSWERS` seconds, no worker within `WORKERLESS`, or versions differ (`ALIKE`).
     """
     host, port, speaks = _read_address(address)
+    with _unlogged():
+        try:
+            # The client would wait for ever for the first word of one that only listens.
+            with socket.create_connection((host, port), ANSWERS) as line:
+                if speaks and not line.recv(1):
+                    raise ConnectionError("it hangs up")
+            client = Client(address, timeout=ANSWERS, set_as_default=False, name="thermocomp")
+        except (OSError, ValueError) as e:
+            raise ClusterError(
+                f"{address}: no Dask scheduler answers there ({explain(e)}); see that 'dask scheduler' runs"
+            ) from e
+        try:
+            yield Cluster(client, address)
+        finally:
+            client.close(timeout=ANSWERS)
+
+
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep Dask's tracebacks of lost connections off the error stream: one line of ours tells of them."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
-        # The client would wait for ever for the first word of one that only listens.
-        with socket.create_connection((host, port), ANSWERS) as line:
-            if speaks and not line.recv(1):
-                raise ConnectionError("it hangs up")
-        client = Client(address, timeout=ANSWERS, set_as_default=False, name="thermocomp")
-    except (OSError, ValueError) as e:
-        raise ClusterError(
-            f"{address}: no Dask scheduler answers there ({explain(e)}); see that 'dask scheduler' runs"
-        ) from e
-    try:
-        yield Cluster(client, address)
+        yield
     finally:
-        client.close(timeout=ANSWERS)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _read_address(address: str) -> tuple[str, int, bool]:
@@ -168,13 +184,14 @@ class Cluster:
                 except ClusterError:
                     raise
                 except (CancelledError, OSError) as e:
-                    raise self._lost(e) from e
+                    raise self._lost() from e
                 except Exception as e:
                     raise ClusterError(f"{self._address}: a worker cannot take the work: {explain(e)}") from e
                 del futures[k]  # its worker forgets the result
                 yield k, found
         finally:
-            self._client.cancel(list(futures.values()), force=True)
+            if self._client.status == "running":  # a client that is closed has taken them with it
+                self._client.cancel(list(futures.values()), force=True)
 
     def _next(self, done: SimpleQueue[int]) -> int:
         """Return the next number that is done; in between, see to it that somebody works on it."""
@@ -195,11 +212,11 @@ class Cluster:
         try:
             return len(self._client.nthreads(callback_timeout=ASKED))
         except Exception as e:
-            raise self._lost(e) from e
+            raise self._lost() from e
 
-    def _lost(self, error: Exception) -> ClusterError:
+    def _lost(self) -> ClusterError:
         return ClusterError(
-            f"{self._address}: the scheduler was lost, and what had been done with it ({explain(error)}); "
+            f"{self._address}: the scheduler was lost, and what had been done with it; "
             "see that it runs, then start again"
         )
 
