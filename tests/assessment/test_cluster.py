@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daskcluster import DaskCluster, dask_cluster, wait_until
+from daskcluster import DaskCluster, dask_cluster, lost, slow, wait_until
 from distributed import Client
 from smallmachine import small_machine
 
@@ -144,11 +144,6 @@ def test_what_fails_costs_its_method_alone(samples: Samples, running: DaskCluste
             np.testing.assert_array_equal(mine.predicted, its.predicted)
 
 
-def slow(piece: int) -> int:
-    time.sleep(0.2)
-    return piece
-
-
 def threads_of(_: int) -> Any:
     from joblib import effective_n_jobs
     from threadpoolctl import threadpool_info
@@ -158,10 +153,6 @@ def threads_of(_: int) -> Any:
 
 def fails(_: int) -> Any:
     raise ValueError("on purpose")
-
-
-def lost(piece: int, why: str) -> Any:
-    return why
 
 
 def test_a_worker_calculates_on_one_thread(running: DaskCluster) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import thermocomp
 
@@ -61,6 +62,17 @@ class DaskCluster:
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
+
+
+def slow(piece: int) -> int:
+    """Work that takes a while; it stands here because a worker imports little for it."""
+    time.sleep(0.2)
+    return piece
+
+
+def lost(_: int, why: str) -> Any:
+    """Say why nothing came of a piece."""
+    return why
 
 
 @contextmanager
