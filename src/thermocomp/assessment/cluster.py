@@ -152,7 +152,7 @@ class Cluster:
         sent = [None if k in unsendable else piece for k, piece in enumerate(pieces)]
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1TiB"}):
             # As a task, not scattered: the scheduler keeps the bytes, so it outlives every worker.
-            shared = self._client.submit(cloudpickle.loads, cloudpickle.dumps((work, sent, failed)))
+            shared = self._client.submit(cloudpickle.loads, cloudpickle.dumps((work, sent, failed)), pure=False)
         suspects = []
         for k, found in self._run(shared, [k for k in range(len(pieces)) if k not in unsendable]):
             if isinstance(found, KilledWorker):
@@ -167,7 +167,11 @@ class Cluster:
         """Yield numbers and results, or the `KilledWorker` of a piece whose workers died; what is left is cancelled."""
         done: SimpleQueue[int] = SimpleQueue()
         name = f"thermocomp-{uuid4().hex}"
-        futures = {k: self._client.submit(_do, shared, k, self._versions, key=f"{name}-{k}") for k in numbers}
+        futures = {
+            # first things first, or progress, which is told in their order, lags behind
+            k: self._client.submit(_do, shared, k, self._versions, key=f"{name}-{k}", priority=-k)
+            for k in numbers
+        }
         for k, future in futures.items():
             future.add_done_callback(lambda _, k=k: done.put(k))
         try:
