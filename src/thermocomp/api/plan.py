@@ -132,7 +132,7 @@ def plan(
 
     Parameters
     ----------
-    recordings, targets, inputs, absolute, starts, mapping, jobs, progress
+    recordings, targets
         As for `compare`.
     top_speed : float, optional
         Of the machine [1/min]; the highest recorded one without it.
@@ -140,8 +140,12 @@ def plan(
         Length of the next test [h].
     swing : float
         How far the room's temperature may change within so long where the machine stands [degC]; 0: never.
+    inputs, absolute, starts, mapping
+        As for `compare`.
     curve : bool
         Also find out how the error on unseen cycles falls with the number of cycles learned from, which takes long.
+    jobs, progress
+        As for `compare`.
 
     Returns
     -------
@@ -176,7 +180,18 @@ def plan_from(
     jobs: int,
     progress: Callable[..., Any] = _silent,
 ) -> Planned:
-    """Do the work of `plan` with what it begins with."""
+    """Do the work of `plan` with what it begins with.
+
+    Parameters
+    ----------
+    ready : Prepared
+    top_speed, hours, swing, curve, jobs, progress
+        Of `plan`.
+
+    Returns
+    -------
+    Planned
+    """
     found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing)
     progress("tests foretold")
     judging = units_of(ready) if curve else Judging("", ())
@@ -188,7 +203,16 @@ def plan_from(
 
 
 def units_of(ready: Prepared) -> Judging:
-    """Return the blocks of a learning curve: what was asked for, or the thermal cycles; none if there is only one."""
+    """Return the blocks of a learning curve: what was asked for, or the thermal cycles; none if there is only one.
+
+    Parameters
+    ----------
+    ready : Prepared
+
+    Returns
+    -------
+    Judging
+    """
     if ready.judging.splits:
         return ready.judging
     return judging_of(ready.samples) if len(ready.samples.cycle_names) > 1 else Judging("", ())
@@ -216,6 +240,17 @@ def may_stop(
     ------
     InputError
         There is more than one recording, no such channel, or the spindle has not started.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> import thermocomp as tc
+    >>> time = np.arange(0, 9000, 60.0)  # 2.5 h of a run, a time constant of 40 min
+    >>> table = pd.DataFrame({"time_s": time, "spindle_rpm": 3000.0, "z_um": 40 * -np.expm1(-time / 2400)})
+    >>> running = tc.may_stop(table)
+    >>> running.may_stop, round(running.states[0][1].final)
+    (True, 40)
     """
     tests = recordings_of(recording, mapping)
     if len(tests) != 1:

@@ -137,7 +137,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     Raises
     ------
     InputError
-        A setting is no such number, or there is no spindle speed or no temperature.
+        A setting is no such number, there is no spindle speed or no temperature, or the spindle never turned.
     FitError
         Too few rows are complete.
     """
@@ -145,9 +145,10 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         raise InputError(f"a room that changes by {swing:g} degC: want 0 to 50")
     doubt = find_doubt(samples)
     recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
-    if not (top_speed or recorded):
-        raise InputError("the spindle never turned: name the machine's highest speed with --top-speed")
-    grid = [t for t in make_grid(top_speed or recorded, hours) if swing or t.kind != "room"]
+    if not recorded:
+        raise InputError("the spindle never turned in these recordings: record a run and a stop first, at any speed")
+    top_speed = recorded if top_speed is None else top_speed
+    grid = [t for t in make_grid(top_speed, hours) if swing or t.kind != "room"]
     ambient = [AMBIENT.search(samples.inputs[j].name) is not None for j in doubt.features.temperatures]
     tables = [_foretell(t, doubt, swing, np.array(ambient)) for t in grid]
     use = _all_that_is_done(grid, tables)
@@ -155,11 +156,11 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     gains = [float((before - doubt.after(f, t.duration).spread(use)).mean()) for t, f in zip(grid, tables, strict=True)]
     covered = _Covered.of(samples, doubt.speed)
     found = [
-        Candidate(t, float(doubt.spread(f).mean()), gain, covered.news(t, top_speed or recorded, swing))
+        Candidate(t, float(doubt.spread(f).mean()), gain, covered.news(t, top_speed, swing))
         for t, f, gain in zip(grid, tables, gains, strict=True)
     ]
     best = sorted(found, key=lambda c: -c.gain)
-    return Plan(tuple(best), float(before.mean()), top_speed or recorded, hours, swing)
+    return Plan(tuple(best), float(before.mean()), top_speed, hours, swing)
 
 
 def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:

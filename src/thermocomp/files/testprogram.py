@@ -142,11 +142,12 @@ def write_test(
 
     Parameters
     ----------
-    trial, dialect, every
-        Of `write_program`.
+    trial : Trial
     program : Path
     channels : sequence of Channel
         Of `write_sheet`.
+    dialect, every
+        Of `write_program`.
     overwrite : bool
 
     Returns

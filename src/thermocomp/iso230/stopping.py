@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.iso230.settling import Phase, find_phases
 from thermocomp.models.numerics.leastsquares import effective_sample_size
+from thermocomp.recording.cycles import SPLITS
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -166,10 +167,11 @@ def judge_running(recording: Recording, targets: Sequence[str]) -> Running:
     InputError
         The spindle has not started, nothing was recorded of it, or there is no such channel.
     """
-    phases = find_phases(recording)
+    phases = find_phases(recording, SPLITS)
     if not phases:
         raise InputError(
-            f"{recording.name}: the spindle never starts, or no speed was recorded: there is no phase to judge"
+            f"{recording.name}: the spindle has not run for {SPLITS / 60:g} min yet, or its speed was not recorded: "
+            "there is no run or stop to judge"
         )
     last = phases[-1]
     rows = slice(last.start, last.end + 1)

@@ -34,6 +34,8 @@ class Doubt:
         Root mean square error on what was left out [unit of the target].
     part : float
         Mean duration of what is left out together [s].
+    heating : tuple of PacedFeatures and ndarray of shape (n_states, n_temperatures)
+        States of the speed alone, and the temperatures' weights of them.
     """
 
     features: PacedFeatures
@@ -41,7 +43,7 @@ class Doubt:
     covariance: FloatArray
     error: FloatArray
     part: float
-    _heating: tuple[PacedFeatures, FloatArray]
+    heating: tuple[PacedFeatures, FloatArray]
 
     @property
     def speed(self) -> int:
@@ -62,7 +64,7 @@ class Doubt:
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf
-        of, weights = self._heating
+        of, weights = self.heating
         rows = np.zeros((len(speed), self.columns))
         rows[:, self.speed] = speed
         heat = np.vstack(list(of.tables(rows[:, [self.speed]], step))) @ weights
@@ -89,7 +91,7 @@ class Doubt:
             seen = table * np.sqrt(duration / self.part / len(table)) / max(error, 1e-9)
             common = covariance @ seen.T
             left.append(covariance - common @ np.linalg.solve(np.eye(len(seen)) + seen @ common, common.T))
-        return Doubt(self.features, self.columns, np.array(left), self.error, self.part, self._heating)
+        return Doubt(self.features, self.columns, np.array(left), self.error, self.part, self.heating)
 
 
 def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
