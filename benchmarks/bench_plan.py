@@ -65,11 +65,13 @@ def with_gap(gap: Gap, rng: np.random.Generator) -> str:
         speed = TOP * float(share)
         if gap == "duration":
             for _ in range(5):
-                text += segment(rng.integers(15, 31), speed) + segment(rng.integers(15, 31))
+                text += segment(int(rng.integers(15, 31)), speed) + segment(int(rng.integers(15, 31)))
         elif gap == "stop" and share > 0.45:
-            text += segment(rng.integers(90, 200), speed) + segment(rng.integers(60, 160), TOP * rng.uniform(0.2, 0.4))
+            text += segment(int(rng.integers(90, 200)), speed) + segment(
+                int(rng.integers(60, 160)), TOP * rng.uniform(0.2, 0.4)
+            )
         else:
-            text += segment(rng.integers(90, 200), speed) + segment(rng.integers(60, 160))
+            text += segment(int(rng.integers(90, 200)), speed) + segment(int(rng.integers(60, 160)))
     return text
 
 
@@ -206,9 +208,12 @@ def stop_early(seed: int) -> list[Stopped]:
     full = chen([(RUN, STOP)] * len(SPEEDS), seed)
     none = judged_on(full, full)
     found = []
-    ways = {"rule": by_rule(seed), **{f"{run} + {stop} min": [(run, stop)] * len(SPEEDS) for run, stop in CUTS}}
+    ways: dict[str, Sequence[tuple[float, float]]] = {
+        "rule": by_rule(seed),
+        **{f"{run} + {stop} min": [(run, stop)] * len(SPEEDS) for run, stop in CUTS},
+    }
     for name, lengths in ways.items():
-        share = sum(map(sum, lengths)) / (len(SPEEDS) * (RUN + STOP))
+        share = sum(run + stop for run, stop in lengths) / (len(SPEEDS) * (RUN + STOP))
         found.append(Stopped(name, share, judged_on(chen(lengths, seed), full) / none))
     return found
 

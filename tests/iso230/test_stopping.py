@@ -3,13 +3,16 @@
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.iso230.stopping import foretell, judge_running
 from thermocomp.recording.recording import Recording
 
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 
-def curve(hours: float, amplitudes: list[float], taus: list[float], noise: float = 0.15, seed: int = 0) -> tuple:
+
+def curve(hours: float, amplitudes: list[float], taus: list[float], noise: float = 0.15, seed: int = 0) -> Curve:
     t = np.arange(0.0, hours * 3600 + 1, 60.0)
     y = sum(a * -np.expm1(-t / tau) for a, tau in zip(amplitudes, taus, strict=True))
     return t, y + np.random.default_rng(seed).normal(0, noise, len(t))

@@ -95,7 +95,7 @@ class LearningCurve:
     @property
     def enough(self) -> bool:
         """A further cycle of the kind that is there is not worth its time."""
-        return self.last_gain < self.worth
+        return self.last_gain <= self.worth
 
     @property
     def words(self) -> str:
@@ -104,6 +104,8 @@ class LearningCurve:
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
         slope = f"each of the last took {self.last_gain:.2f} um off"
+        if last.rms >= self.none:
+            return f"{of}, {self.none:.2f} without compensation: the model has learned nothing that holds elsewhere"
         if self.enough:
             return (
                 f"{of}; {slope}: more cycles of the same kind are not worth their time (less than {self.worth:.2f} um)"

@@ -161,7 +161,7 @@ def write_test(
         The test cannot be written, or a file cannot be there: see `thermocomp.core.draft.drafts`.
     """
     sheet = sheet_of(program)
-    texts = {program: write_program(trial, dialect, every), sheet: write_sheet(trial, channels, every)}
+    texts = {sheet: write_sheet(trial, channels, every), program: write_program(trial, dialect, every)}
     with drafts(list(texts), overwrite=overwrite) as started:
         for target, text in texts.items():
             started[target].write_text(text, encoding="ascii" if target == program else "utf-8", newline="\n")
