@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
-from thermocomp.models.numerics.structures import Moments, Structure, average, fit_each, share_out
+from thermocomp.models.numerics.structures import average, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.recording.samples import Samples
 
@@ -19,9 +19,9 @@ FloatArray = NDArray[np.float64]
 class Doubt:
     """What an average of ridge regressions does not know, and how temperatures follow the speed.
 
-    The covariance of the weights has two parts: how far the structures are from each other, and how far the data leave
-    each of them open. In the second a part that is left out in turn (half a thermal cycle) counts as one observation
-    whose error is the one left out: neighbouring rows say the same.
+    The covariance of the weights is that of the structures: they fit the rows alike and differ where these say nothing.
+    A part that is left out in turn (half a thermal cycle) counts as one observation, whose error is the one left out:
+    neighbouring rows say the same.
 
     Parameters
     ----------
@@ -137,28 +137,10 @@ def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Dou
     error = np.sqrt(np.mean(errors**2, axis=0))
     each = fit_each(moments, structures, range(len(moments.rows)))
     apart = each - (shares[:, None] * each).sum(axis=0)
-    between = np.einsum("st,sjt,skt->tjk", shares, apart, apart)
-    within = _left_open(moments, structures, shares) * (error**2 / len(moments.rows))[:, None, None]
+    covariance = np.einsum("st,sjt,skt->tjk", shares, apart, apart)
     alone, _, _ = AveragedDynamic(lags=()).lay_out(rows[:, speeds], step, folds, [0])
     heat = alone.moments(rows[:, speeds], rows[:, list(features.temperatures)], step, parts, 0.0)
     weights, _ = average(heat, alone.draw(of.structures, of.random_state))
     seconds = np.where(np.isfinite(step) & learned, step, 0.0).sum()
     part = max(float(seconds) / len(moments.rows), 1.0)
-    return Doubt(features, rows.shape[1], between + within, error, part, (alone, weights))
-
-
-def _left_open(moments: Moments, structures: list[Structure], shares: FloatArray) -> FloatArray:
-    """Return the inverse of each structure's normal equations, averaged, (n_targets, n_features, n_features)."""
-    n = moments.rows.sum()
-    squares = np.diag(moments.gram.sum(axis=0)) / n
-    gram = moments.gram.sum(axis=0) / n + moments.noise
-    found = np.zeros((shares.shape[1], *gram.shape))
-    for structure, own in zip(structures, shares, strict=True):
-        among = np.ix_(structure.columns, structure.columns)
-        system, mine = gram[among].copy(), squares[structure.columns]
-        system[np.diag_indices(len(system))] += np.where(mine > 0, structure.strengths * mine, 1.0)
-        scale = 1.0 / np.sqrt(np.diag(system))
-        inverse = np.linalg.inv(system * np.outer(scale, scale)) * np.outer(scale, scale)
-        for target, share in enumerate(own):
-            found[target][among] += share * inverse
-    return found
+    return Doubt(features, rows.shape[1], covariance, error, part, (alone, weights))
