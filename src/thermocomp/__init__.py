@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from thermocomp.api.inputs import read, training_table
+    from thermocomp.api.plan import may_stop, plan
     from thermocomp.api.revise import revise
     from thermocomp.api.verbs import assess, compare, fit, select, simulate
     from thermocomp.core.correction import Correction, Deviation, Limits
@@ -53,6 +54,8 @@ _PUBLIC = {
     "fit": "thermocomp.api.verbs",
     "assess": "thermocomp.api.verbs",
     "revise": "thermocomp.api.revise",
+    "plan": "thermocomp.api.plan",
+    "may_stop": "thermocomp.api.plan",
     "freeze": "thermocomp.models.pipelines",
     "training_table": "thermocomp.api.inputs",
     "Recording": "thermocomp.recording.recording",
@@ -127,6 +130,8 @@ __all__ = [
     "compare",
     "fit",
     "freeze",
+    "may_stop",
+    "plan",
     "read",
     "revise",
     "select",

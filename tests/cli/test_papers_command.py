@@ -131,15 +131,34 @@ def test_cross_judges_on_measured_recordings_too(
         *,
         methods: Sequence[str],
         targets: Sequence[str] | None,
+        jobs: int,
     ) -> Study:
-        given.append((seed, [t.name for t in tests], tuple(methods), targets))
+        given.append((seed, [t.name for t in tests], tuple(methods), targets, jobs))
         return Study("cross", "All methods", (), (StudyTable("RMS", ("method", "drift"), [["ols", "1.25"]]),), (), {})
 
     monkeypatch.setattr(cross, "run", made)
     assert run(["papers", "cross"]) == 0
     assert "1.25" in capsys.readouterr().out
-    assert run(["papers", "cross", "--with", str(drift), "--target", "x_um", "--models", "ols", "mra", "--json"]) == 0
-    assert given == [(0, [], tuple(cross.FAST), None), (0, ["drift"], ("ols", "mra"), ["x_um"])]
+    assert (
+        run(
+            [
+                "papers",
+                "cross",
+                "--with",
+                str(drift),
+                "--target",
+                "x_um",
+                "--models",
+                "ols",
+                "mra",
+                "--json",
+                "--jobs",
+                "2",
+            ]
+        )
+        == 0
+    )
+    assert given == [(0, [], tuple(cross.FAST), None, 1), (0, ["drift"], ("ols", "mra"), ["x_um"], 2)]
 
 
 def test_an_unknown_name_is_told_the_names(capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,6 +22,7 @@ SLOW = (
     "assess",
     "compare",
     "fit",
+    "plan",
     "revise",
     "select",
     "simulate",

@@ -40,6 +40,7 @@ WRITING = {
     "cli/map.py",
     "files/jsonfile.py",
     "files/recordings.py",
+    "files/testprogram.py",
     "report/checks.py",
     "report/html.py",
     "report/iso230.py",

@@ -21,7 +21,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
-from thermocomp.files import modelfile, positionfile, recordings
+from thermocomp.core.trial import Trial
+from thermocomp.files import modelfile, positionfile, recordings, testprogram
 from thermocomp.report import checks, html
 from thermocomp.report import iso230 as iso230pages
 from thermocomp.report import papers as paperpages
@@ -108,6 +109,12 @@ def _mapping(folder: Path, version: int) -> None:
         raise InputError(told.getvalue())
 
 
+def _test(folder: Path, version: int) -> None:
+    speed = 1000.0 + version
+    trial = Trial("run", speed, ((0.0, 900.0), (speed, 7200.0)))
+    testprogram.write_test(trial, folder / "test.ngc", small_machine().channels, overwrite=True)
+
+
 #: by the name of the kind
 WRITERS: dict[str, Writer] = {
     "model": Writer(
@@ -133,4 +140,5 @@ WRITERS: dict[str, Writer] = {
     ),
     "program": _revise("linuxcnc"),
     "program written out": _revise("fanuc"),
+    "thermal test": Writer(_test, ("test.csv", "test.ngc"), "test.ngc"),
 }

@@ -12,6 +12,7 @@ from thermocomp.assessment import do_no_harm, selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.results import Assessment, Rules
+from thermocomp.assessment.sharing import shared_among
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
@@ -89,6 +90,7 @@ def compare(
     harm_margin: float | None = None,
     limits: Limits | None = Limits(),
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Compared:
     """Compare methods on thermal cycles they have not seen, beside no compensation.
@@ -129,6 +131,9 @@ def compare(
         Of the compensator that is judged with the models; None: the models alone.
     jobs : int
         Processes to share the work among; -1 takes all cores.
+    scheduler : str, optional
+        Dask scheduler whose workers do the work in place of these processes, such as ``tcp://192.168.1.20:8786``: see
+        :doc:`/many_recordings`.
     progress : callable
         Called with a line of text after each piece of work.
 
@@ -155,17 +160,18 @@ def compare(
     """
     tests = recordings_of(recordings, mapping)
     ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
-    found = comparing.compare(
-        ready.samples,
-        list(models) if isinstance(models, Iterable) and not _single(models) else [models],
-        ready.judging,
-        rules=Rules(harm_margin, primary),
-        support=Support(support, margin),
-        robustness=robustness,
-        limits=limits,
-        jobs=jobs,
-        progress=progress,
-    )
+    with shared_among(scheduler):
+        found = comparing.compare(
+            ready.samples,
+            list(models) if isinstance(models, Iterable) and not _single(models) else [models],
+            ready.judging,
+            rules=Rules(harm_margin, primary),
+            support=Support(support, margin),
+            robustness=robustness,
+            limits=limits,
+            jobs=jobs,
+            progress=progress,
+        )
     if not robustness:
         found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
     return Compared(found, ready.tests, tuple(ready.trouble))
@@ -198,6 +204,7 @@ def fit(
     limits: Limits = Limits(),
     accept_unproven: str | None = None,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> FittedModels:
     """Judge a method on thermal cycles it has not seen, then fit it to everything and freeze it.
@@ -215,7 +222,7 @@ def fit(
     accept_unproven : str, optional
         Who takes the models if they are unproven, and why, such as ``"M. Weber, trial on machine 7"``: they run then,
         and it is said wherever they are shown.
-    jobs, progress
+    jobs, scheduler, progress
         As for `compare`.
 
     Returns
@@ -239,17 +246,18 @@ def fit(
     """
     tests = recordings_of(recordings, mapping)
     ready = prepare(tests, targets, inputs, absolute=absolute, starts=starts, split=split, leave_one=leave_one)
-    found = studies.fit(
-        ready.samples,
-        model,
-        ready.judging,
-        rules=Rules(harm_margin),
-        support=Support(support, margin),
-        recordings=tests,
-        limits=limits,
-        jobs=jobs,
-        progress=progress,
-    )
+    with shared_among(scheduler):
+        found = studies.fit(
+            ready.samples,
+            model,
+            ready.judging,
+            rules=Rules(harm_margin),
+            support=Support(support, margin),
+            recordings=tests,
+            limits=limits,
+            jobs=jobs,
+            progress=progress,
+        )
     found = replace(found, models=tuple(m.taken(accept_unproven) for m in found.models))
     return FittedModels(found, ready.tests, tuple(ready.trouble))
 
@@ -326,6 +334,7 @@ def select(
     starts: Starts = None,
     mapping: str | Path | Mapping | None = None,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Callable[..., None] = _silent,
     **settings: Any,
 ) -> Selected:
@@ -337,7 +346,7 @@ def select(
         As for `compare`.
     method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
         How to choose; see :doc:`/methods`.
-    inputs, split, leave_one, absolute, starts, mapping, jobs, progress
+    inputs, split, leave_one, absolute, starts, mapping, jobs, scheduler, progress
         As for `compare`.
     **settings
         Of the method, see `thermocomp.assessment.choice.Settings`: ``max_sensors=5``, ``threshold=0.95``.
@@ -380,5 +389,6 @@ def select(
         leave_one=leave_one,
         judged=method == "pareto",
     )
-    found = selecting.select(method, ready.samples, ready.judging, chosen, jobs=jobs, progress=progress)
+    with shared_among(scheduler):
+        found = selecting.select(method, ready.samples, ready.judging, chosen, jobs=jobs, progress=progress)
     return Selected(found, tuple(ready.trouble))

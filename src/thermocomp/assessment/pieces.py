@@ -1,6 +1,7 @@
 """Work in pieces, shared among processes: what fails in one piece is that piece's, whatever it is."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from typing import Any, TypeVar
 
 from joblib import Parallel, delayed
@@ -10,6 +11,12 @@ from thermocomp.core.exceptions import ThermocompError
 
 _Piece = TypeVar("_Piece")
 _Found = TypeVar("_Found")
+
+#: why nothing came of a piece whose process died
+DIED = "its process died: it crashed, or was killed, as the system does if the memory is full"
+
+#: what does the work in place of this machine's processes, if anything: takes what `work_through` takes, but for `jobs`
+elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None] = ContextVar("elsewhere", default=None)
 
 
 def work_through(
@@ -32,20 +39,24 @@ def work_through(
     failed : callable
         Takes a piece and why nothing came of it; gives what stands for that.
     jobs : int
-        Processes to share the work among; 1 is this one, -1 takes all cores.
+        Processes to share the work among; 1 is this one, -1 takes all cores. Within
+        `thermocomp.assessment.cluster.shared_among` it is of no account.
 
     Yields
     ------
     object
         From `work`, or from `failed` where anything was raised or the process died.
     """
+    if (share := elsewhere.get()) is not None:
+        yield from share(work, pieces, failed)
+        return
     done, alone = 0, False
     while done < len(pieces):
         tried = pieces[done : done + 1] if alone else pieces[done:]
         # with two there is another process than this one
         parallel = Parallel(n_jobs=2 if alone else jobs, return_as="generator")
         try:
-            for found in parallel(delayed(_attempt)(work, piece, failed) for piece in tried):
+            for found in parallel(delayed(attempt)(work, piece, failed) for piece in tried):
                 yield found
                 done += 1
         except Exception as e:  # noqa: BLE001 - a dead process, or what cannot be sent to one
@@ -55,7 +66,8 @@ def work_through(
             alone = not alone
 
 
-def _attempt(work: Callable[[Any], _Found], piece: Any, failed: Callable[[Any, str], _Found]) -> _Found:
+def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_Piece, str], _Found]) -> _Found:
+    """Return what comes of one piece of work; of `failed` if anything is raised."""
     try:
         return work(piece)
     except (Exception, SystemExit) as e:  # noqa: BLE001 - whatever a method raises, the others have their results
@@ -67,7 +79,7 @@ def explain(error: BaseException) -> str:
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):
-        return "its process died: it crashed, or was killed, as the system does if the memory is full"
+        return DIED
     if isinstance(error, MemoryError):
         return f"the memory is full ({str(error) or type(error).__name__})"
     return f"{type(error).__name__}: {error}"

@@ -1,9 +1,10 @@
 """Selection of sensors by each method, brought to one form: the sensors, why, and the tables behind it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from joblib import effective_n_jobs
@@ -13,8 +14,8 @@ from thermocomp.assessment import budget, pareto
 from thermocomp.assessment.candidates import Candidates
 from thermocomp.assessment.choice import Choice, Progress, Settings, Table
 from thermocomp.assessment.leaks import refuse_leaks
-from thermocomp.assessment.pieces import explain
-from thermocomp.core.exceptions import FitError
+from thermocomp.assessment.pieces import elsewhere, explain, work_through
+from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.models.grouping import CorrelationGrouping
 from thermocomp.models.numerics.leastsquares import join_columns, triangle
 from thermocomp.models.numerics.stepwise import Step
@@ -38,6 +39,9 @@ HALF_WINDOW = 10
 
 #: Psi from which on more sensors are not worth having (W-12)
 ENOUGH_PSI = 0.99
+
+#: methods whose work the workers of a cluster can share
+SHARED = ("pareto", "ace")
 
 
 def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings) -> int:
@@ -96,9 +100,14 @@ def select(
     ------
     InputError
         Rows stand in the samples twice and would be learned from and judged on at once (``pareto``).
+        A cluster shall do the work of another method than ``pareto`` and ``ace``.
     Exception
         What the method fails with, if it does for all targets.
     """
+    if elsewhere.get() is not None and method not in SHARED:
+        raise InputError(
+            f"{method} is one search, on this machine: a scheduler is for {' and '.join(SHARED)}; leave it out"
+        )
     if method == "pareto":
         refuse_leaks(samples, judging)
     if method == "ace":
@@ -294,7 +303,8 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
     if not temperatures or not sets:
         raise FitError(f"maximal correlation: no thermal cycle has more than {2 * HALF_WINDOW} complete rows")
     subsets = subsets_up_to(len(names), settings.most("ace"))
-    psi = maximal_correlations(sets, subsets, half_window=HALF_WINDOW, jobs=jobs, progress=progress)
+    share = None if elsewhere.get() is None else _share
+    psi = maximal_correlations(sets, subsets, half_window=HALF_WINDOW, jobs=jobs, share=share, progress=progress)
     done = np.isfinite(psi.psi).all(axis=(0, 1))
     if not done.any():
         raise FitError("stopped before the first thermal cycle was done")
@@ -324,6 +334,17 @@ def _by_maximal_correlation(samples: Samples, settings: Settings, *, jobs: int, 
         tuple(notes),
         same,
     )
+
+
+def _share(work: Callable[[Any], FloatArray], pieces: Sequence[Any]) -> Iterator[FloatArray]:
+    for found in work_through(work, pieces, _why, jobs=1):
+        if isinstance(found, str):
+            raise FitError(found)
+        yield found
+
+
+def _why(_: Any, why: str) -> FloatArray | str:
+    return why
 
 
 def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str], targets: Sequence[str]) -> Table:

@@ -36,6 +36,7 @@ COMMANDS = {
     "fit": "Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.",
     "assess": "Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.",
     "compare": "Compare methods on thermal cycles they have not seen, beside no compensation.",
+    "plan": "Say how much test is enough, and write the test that would teach most next as an NC program.",
     "position": "Fit position-dependent errors: cold profiles and thermal slopes, judged on what they have not seen.",
     "iso230": "Evaluate thermal tests after ISO 230-3 and positioning tests after ISO 230-2, and the time constants of "
     "channels.",

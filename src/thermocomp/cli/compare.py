@@ -61,10 +61,14 @@ def compare(
     """
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html")
     from thermocomp.assessment import compare as comparing
+    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
 
     samples, judging, rules, limits = ready.samples, ready.judging, study.rules(primary), compensator.limits()
-    with show_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress:
+    with (
+        shared_among(study.scheduler),
+        show_steps(comparing.n_pieces(samples, models, judging, rules), hidden=json) as progress,
+    ):
         comparison = comparing.compare(
             samples, models, judging, rules=rules, limits=limits, jobs=study.jobs, progress=progress
         )

@@ -76,12 +76,16 @@ def fit(
     ready = study.prepare(recordings, beginning, [output], overwrite, ".json", tilt=tilt)
     from thermocomp.assessment import study as studies
     from thermocomp.assessment.compare import n_pieces
+    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
     from thermocomp.core.inputs import Support
     from thermocomp.files import modelfile
 
     samples, judging = ready.samples, ready.judging
-    with show_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress:
+    with (
+        shared_among(study.scheduler),
+        show_steps(n_pieces(samples, [model], judging) + len(samples.targets), hidden=quiet or json) as progress,
+    ):
         result = studies.fit(
             samples,
             model,

@@ -61,6 +61,8 @@ class StudyOptions:
         Average that start over so long, while the spindle stands [s]; 0: it is the first row.
     jobs : int
         Processes to share the work among; -1 takes all cores.
+    scheduler : str
+        Dask scheduler whose workers do the work in place of these processes, such as tcp://192.168.1.20:8786.
     """
 
     target: list[str] | None = None
@@ -74,6 +76,7 @@ class StudyOptions:
     harm_margin: float | None = None
     zero_over: float = Zeroing.at_rest
     jobs: int = -1
+    scheduler: str | None = None
 
     def prepare(
         self,

@@ -50,6 +50,8 @@ def papers(
     physics: Literal["linear", "nonlinear"] | None = None,
     seed: int = 0,
     repeats: int = 3,
+    jobs: int = 1,
+    scheduler: str | None = None,
     output: OptionalOutput = None,
     overwrite: bool = False,
     json: bool = False,
@@ -78,6 +80,10 @@ def papers(
     repeats : int
         Runs of each paper's study, with seeds 100 apart: what holds in one weather only is told. Numbers and figures
         are those of the first.
+    jobs : int
+        Processes to share the runs, or the methods of cross, among; -1 takes all cores.
+    scheduler : str
+        Dask scheduler whose workers do the work in place of these processes, such as tcp://192.168.1.20:8786.
     output : Path
         Page with claims, figures and tables to write (.html).
     overwrite : bool
@@ -90,10 +96,8 @@ def papers(
     int
         0 the studies ran, whatever holds; 1 one of them failed; 2 unusable input.
     """
-    if seed < 0:
-        raise InputError(f"--seed {seed}: must not be negative")
-    if repeats < 1:
-        raise InputError(f"--repeats {repeats}: must be at least 1")
+    _check_numbers(seed, repeats, jobs)
+    from thermocomp.assessment.sharing import shared_among
     from thermocomp.papers.studies import PHYSICS, STUDIES
 
     chosen: list[str] = list(dict.fromkeys(names)) or list(STUDIES)
@@ -112,18 +116,19 @@ def papers(
     tests = read_recordings(measured, mapping) if measured else []
     tell_trouble(tests)
     done: list[tuple[Study, float]] = []
-    for number, name in enumerate(chosen, start=1):
-        begin = time.perf_counter()
-        with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
-            run = (
-                partial(_cross, seed, tests=tests, models=models, targets=target)
-                if name == CROSS
-                else partial(_run, name, seed, repeats, physics)
-            )
-            study = _tried(name, run, progress)
-        done.append((study, time.perf_counter() - begin))
-        if not json:
-            _show(*done[-1])
+    with shared_among(scheduler):
+        for number, name in enumerate(chosen, start=1):
+            begin = time.perf_counter()
+            with show_share(f"{number}/{len(chosen)} {name}", hidden=json) as progress:
+                run = (
+                    partial(_cross, seed, tests=tests, models=models, targets=target, jobs=jobs)
+                    if name == CROSS
+                    else partial(_run, name, seed, repeats, physics, jobs)
+                )
+                study = _tried(name, run, progress)
+            done.append((study, time.perf_counter() - begin))
+            if not json:
+                _show(*done[-1])
     if output is not None:
         from thermocomp.report import papers as pages
 
@@ -133,6 +138,15 @@ def papers(
     if json:
         print_json({"seed": seed, "repeats": repeats, "studies": [_content(*d) for d in done]})
     return 1 if any(not study.ran for study, _ in done) else 0
+
+
+def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
+    if seed < 0:
+        raise InputError(f"--seed {seed}: must not be negative")
+    if repeats < 1:
+        raise InputError(f"--repeats {repeats}: must be at least 1")
+    if jobs == 0:
+        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
 
 
 def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Study":
@@ -148,18 +162,23 @@ def _tried(name: str, run: "Callable[[Told], Study]", progress: "Told") -> "Stud
         return not_redone(name, explain(e))
 
 
-def _run(name: str, seed: int, repeats: int, physics: "Physics | None", progress: "Told") -> "Study":
+def _run(name: str, seed: int, repeats: int, physics: "Physics | None", jobs: int, progress: "Told") -> "Study":
     from thermocomp.papers import studies
 
-    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress, physics=physics)
+    return studies.repeat(name, seed=seed, repeats=repeats, progress=progress, physics=physics, jobs=jobs)
 
 
 def _cross(
-    seed: int, progress: "Told", tests: "list[Recording]", models: list[str] | None, targets: list[str] | None
+    seed: int,
+    progress: "Told",
+    tests: "list[Recording]",
+    models: list[str] | None,
+    targets: list[str] | None,
+    jobs: int,
 ) -> "Study":
     from thermocomp.papers import cross
 
-    return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets)
+    return cross.run(seed, progress, tests, methods=models or cross.FAST, targets=targets, jobs=jobs)
 
 
 def _show(study: "Study", seconds: float) -> None:

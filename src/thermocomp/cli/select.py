@@ -59,10 +59,14 @@ def select(
     settings.check(method)
     ready = study.prepare(recordings, beginning, [output], overwrite, ".html", judged=method == "pareto")
     from thermocomp.assessment import selecting
+    from thermocomp.assessment.sharing import shared_among
     from thermocomp.cli import output as out
 
     samples, judging = ready.samples, ready.judging
-    with show_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress:
+    with (
+        shared_among(study.scheduler),
+        show_steps(selecting.n_pieces(method, samples, judging, settings), hidden=json) as progress,
+    ):
         choices = selecting.select(method, samples, judging, settings, jobs=study.jobs, progress=progress)
     if output is not None:
         from thermocomp.report import html

@@ -162,7 +162,7 @@ def take_task(recordings: Sequence[Recording], target: str) -> Task:
     return Task(name, samples, leave_one_cycle_out(samples))
 
 
-def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody) -> list[Row]:
+def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody, *, jobs: int = 1) -> list[Row]:
     """Judge methods on a task, none first.
 
     Parameters
@@ -172,6 +172,8 @@ def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody) 
         ``all`` stands for all of them.
     progress : callable
         Told the share done after each piece of work.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
 
     Returns
     -------
@@ -184,7 +186,7 @@ def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody) 
         done += 1
         progress(done / pieces, f"{task.name}: {what}")
 
-    found = compare(task.samples, methods, task.judging, limits=None, progress=tell)
+    found = compare(task.samples, methods, task.judging, limits=None, jobs=jobs, progress=tell)
     rows = [_none(task, found.overall()[0])]
     for overall in found.overall():
         rows.append(_row(task, overall, [a for a in found.assessments if a.model == overall.model]))
@@ -199,6 +201,7 @@ def run(
     methods: Sequence[str] = FAST,
     experiments: Sequence[CrossExperiment] = EXPERIMENTS,
     targets: Sequence[str] | None = None,
+    jobs: int = 1,
 ) -> Study:
     """Judge the methods on all experiments, and on measured recordings.
 
@@ -214,6 +217,8 @@ def run(
     experiments : sequence of CrossExperiment
     targets : sequence of str, optional
         Displacements of the measured machine; all of them if not given.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
 
     Returns
     -------
@@ -236,9 +241,9 @@ def run(
 
     for experiment in experiments:
         tell(0.0, f"{experiment.name}: recording")
-        rows.append(judge(simulate_task(experiment, seed), names, tell))
+        rows.append(judge(simulate_task(experiment, seed), names, tell, jobs=jobs))
     for task in real:
-        rows.append(judge(task, names, tell))
+        rows.append(judge(task, names, tell, jobs=jobs))
     progress(1.0, "done")
     return Study(
         name="cross",

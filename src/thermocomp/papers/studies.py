@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 
+from thermocomp.assessment.pieces import elsewhere, work_through
+from thermocomp.core.exceptions import FitError
 from thermocomp.papers.study import Claim, Progress, Study, tell_nobody
 from thermocomp.simulation.protocol import Physics
 
@@ -45,6 +48,7 @@ def repeat(
     repeats: int = 3,
     progress: Progress = tell_nobody,
     physics: Physics | None = None,
+    jobs: int = 1,
 ) -> Study:
     """Redo a study several times, each with a weather, a noise and lots of its own.
 
@@ -60,12 +64,17 @@ def repeat(
         Told the share done and what comes next.
     physics : {'linear', 'nonlinear'}, optional
         See `run`.
+    jobs : int
+        Processes to share the runs among; -1 takes all cores. With several, or on a cluster, progress is told after
+        each run.
 
     Returns
     -------
     Study
         That of the first run; its claims know whether they hold in the others.
     """
+    if jobs != 1 or elsewhere.get() is not None:
+        return _joined(_together(name, [seed + APART * k for k in range(repeats)], progress, physics, jobs), seed)
     found = []
     for k in range(repeats):
         word = f"run {k + 1} of {repeats}, " if repeats > 1 else ""
@@ -77,6 +86,30 @@ def repeat(
                 physics=physics,
             )
         )
+    return _joined(found, seed)
+
+
+def _together(name: str, seeds: Sequence[int], progress: Progress, physics: Physics | None, jobs: int) -> list[Study]:
+    """Return the runs of a study, done side by side."""
+    found: list[Study] = []
+    for study in work_through(partial(_run, name, physics), seeds, _why, jobs=jobs):
+        if isinstance(study, str):
+            raise FitError(study)
+        found.append(study)
+        progress(len(found) / len(seeds), f"run {len(found)} of {len(seeds)}")
+    return found
+
+
+def _run(name: str, physics: Physics | None, seed: int) -> Study | str:
+    return run(name, seed=seed, physics=physics)
+
+
+def _why(_: int, why: str) -> Study | str:
+    return why
+
+
+def _joined(found: Sequence[Study], seed: int) -> Study:
+    """Return the first run, with claims that know whether they hold in the others."""
     return replace(found[0], claims=tuple(_known(c, [s.claims for s in found[1:]], seed) for c in found[0].claims))
 
 

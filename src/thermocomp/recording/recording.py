@@ -19,7 +19,7 @@ from thermocomp.recording.frames import parts_of
 
 FloatArray = NDArray[np.float64]
 
-_AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
+AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ class Recording:
     @property
     def ambient(self) -> Channel | None:
         """The first temperature whose name says air, ambient, room, workshop or environment; None if none does."""
-        return next((c for c in self.temperatures if _AMBIENT.search(c.name)), None)
+        return next((c for c in self.temperatures if AMBIENT.search(c.name)), None)
 
     @property
     def speed(self) -> Channel | None:

@@ -1,8 +1,9 @@
 """Maximal correlation of every small set of temperatures with every displacement of every test."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -11,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.exceptions import FitError, InputError
 
 FloatArray = NDArray[np.float64]
+#: does work elsewhere: takes a function and what it is called with in turn, gives what comes of each
+Share = Callable[[Callable[[Any], FloatArray], Sequence[Any]], Iterable[FloatArray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ def maximal_correlations(
     tolerance: float | None = None,
     max_sweeps: int = 2000,
     jobs: int = 1,
+    share: Share | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> MaximalCorrelations:
     """Compute the maximal correlation of every subset, for every test and displacement (W-10, W-12).
@@ -100,6 +104,8 @@ def maximal_correlations(
     max_sweeps : int
     jobs : int
         Threads; -1 takes all cores.
+    share : callable, optional
+        Does the work in place of them.
     progress : callable
         Called with a line of text after each displacement of each test.
 
@@ -134,13 +140,12 @@ def maximal_correlations(
         tolerance = 1e-3 if converged else 0.0
     psi = np.full((n_displacements, len(chosen), len(tests)), np.nan)
     pieces = [(k, d) for k in range(len(tests)) for d in range(n_displacements)]
-    work = (
-        delayed(_psi)(tables[k][0], tables[k][1][:, d], members[order], half_window, tolerance, max_sweeps, converged)
-        for k, d in pieces
-    )
+    how = (members[order], half_window, tolerance, max_sweeps, converged)
+    work = [(tables[k][0], tables[k][1][:, d], *how) for k, d in pieces]
     complete = True
     try:
-        found = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")(work)
+        threads = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
+        found = threads(delayed(_psi)(piece) for piece in work) if share is None else share(_psi, work)
         for (k, d), values in zip(pieces, found, strict=True):
             psi[d, order, k] = values
             progress(f"{tests[k].name} displacement {d + 1} of {n_displacements}: {len(chosen)} subsets")
@@ -177,16 +182,11 @@ def _membership(subsets: Sequence[tuple[int, ...]], n_temperatures: int) -> NDAr
 
 
 def _psi(
-    T: FloatArray,
-    S: FloatArray,
-    members: NDArray[np.bool_],
-    half_window: int,
-    tolerance: float,
-    max_sweeps: int,
-    converged: bool,
+    piece: tuple[FloatArray, FloatArray, NDArray[np.bool_], int, float, int, bool],
 ) -> FloatArray:
     from thermocomp.models.kernels import ace_subsets, ranks  # numba takes its time
 
+    T, S, members, half_window, tolerance, max_sweeps, converged = piece
     ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
     found: FloatArray = ace_subsets.correlations(*ranked, half_window, tolerance, max_sweeps, converged, members)[0]
     return found

@@ -1,0 +1,146 @@
+"""What `averaged` does not know: the covariance of its weights, and what a further test would take from it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.models.averaged import AveragedDynamic
+from thermocomp.models.numerics.folds import number_folds
+from thermocomp.models.numerics.structures import average, fit_each, share_out
+from thermocomp.models.pacedfeatures import PacedFeatures
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """What an average of ridge regressions does not know, and how temperatures follow the speed.
+
+    The covariance of the weights is that of the structures: they fit the rows alike and differ where these say nothing.
+    A part that is left out in turn (half a thermal cycle) counts as one observation, whose error is the one left out:
+    neighbouring rows say the same.
+
+    Parameters
+    ----------
+    features : PacedFeatures
+    columns : int
+        Inputs of the recordings.
+    covariance : ndarray of shape (n_targets, n_features, n_features)
+        Of the weights.
+    error : ndarray of shape (n_targets,)
+        Root mean square error on what was left out [unit of the target].
+    part : float
+        Mean duration of what is left out together [s].
+    heating : tuple of PacedFeatures and ndarray of shape (n_states, n_temperatures)
+        States of the speed alone, and the temperatures' weights of them.
+    """
+
+    features: PacedFeatures
+    columns: int
+    covariance: FloatArray
+    error: FloatArray
+    part: float
+    heating: tuple[PacedFeatures, FloatArray]
+
+    @property
+    def speed(self) -> int:
+        """Column of the spindle speed."""
+        return self.features.states[0][0]
+
+    def table(self, speed: FloatArray, dt: float, room: FloatArray | None = None) -> FloatArray:
+        """Return the features in a test that was not run, (n_rows, n_features).
+
+        Parameters
+        ----------
+        speed : ndarray of shape (n_rows,)
+            [1/min]
+        dt : float
+            Between two rows [s].
+        room : ndarray of shape (n_rows, n_temperatures), optional
+            What the room does to each temperature [degC]. The rest is foretold from the speed.
+        """
+        step = np.full(len(speed), dt)
+        step[0] = np.inf
+        of, weights = self.heating
+        rows = np.zeros((len(speed), self.columns))
+        rows[:, self.speed] = speed
+        heat = np.vstack(list(of.tables(rows[:, [self.speed]], step))) @ weights
+        rows[:, list(self.features.temperatures)] = heat if room is None else heat + room
+        return np.vstack(list(self.features.tables(rows, step)))
+
+    def spread(self, table: FloatArray) -> FloatArray:
+        """Return what is expected to be wrong in some rows, root mean square, (n_targets,) [unit of the target]."""
+        squares = (self.covariance * (table.T @ table / len(table))).sum(axis=(1, 2))
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def after(self, table: FloatArray, duration: float) -> "Doubt":
+        """Return what would not be known after a test.
+
+        Parameters
+        ----------
+        table : ndarray of shape (n_rows, n_features)
+            Its features; a few dozen rows are enough.
+        duration : float
+            [s]
+        """
+        left = []
+        for covariance, error in zip(self.covariance, self.error, strict=True):
+            seen = table * np.sqrt(duration / self.part / len(table)) / max(error, 1e-9)
+            common = covariance @ seen.T
+            left.append(covariance - common @ np.linalg.solve(np.eye(len(seen)) + seen @ common, common.T))
+        return Doubt(self.features, self.columns, np.array(left), self.error, self.part, self.heating)
+
+
+def find_doubt(samples: Samples, settings: AveragedDynamic | None = None) -> Doubt:
+    """Return what `averaged` does not know after some recordings.
+
+    Parameters
+    ----------
+    samples : Samples
+        With a spindle speed and at least one temperature.
+    settings : AveragedDynamic, optional
+        Of the method; its own if not given.
+
+    Returns
+    -------
+    Doubt
+
+    Raises
+    ------
+    InputError
+        There is no spindle speed, more than one, or no temperature.
+    FitError
+        Too few rows are complete.
+    """
+    of = settings if settings is not None else AveragedDynamic()
+    complete = samples.take(samples.valid)
+    speeds = [j for j, c in enumerate(complete.inputs) if c.quantity == "spindle_speed"]
+    if len(speeds) != 1 or len(speeds) == len(complete.inputs):
+        names = ", ".join(c.name for c in complete.inputs)
+        raise InputError(
+            f"the inputs {names}: a test is planned from one spindle speed and at least one temperature; name them "
+            "with --inputs, or say in a mapping which column is the speed"
+        )
+    learned = np.isfinite(complete.deviations).all(axis=1) & (complete.cycle >= 0)
+    if learned.sum() < 20:
+        raise FitError(f"{int(learned.sum())} rows with all inputs and targets: at least 20 are needed to plan from")
+    rows, step = complete.change(), complete.dt()
+    folds, _ = number_folds(np.where(learned, complete.cycle, -1), len(complete))
+    features, parts, _ = of.lay_out(rows, step, folds, speeds)
+    deviations = np.where(learned[:, None], complete.deviations, 0.0)
+    moments = features.moments(rows, deviations, step, parts, of.noise)
+    structures = features.draw(of.structures, of.random_state)
+    shares, errors = share_out(moments, structures)
+    error = np.sqrt(np.mean(errors**2, axis=0))
+    each = fit_each(moments, structures, range(len(moments.rows)))
+    apart = each - (shares[:, None] * each).sum(axis=0)
+    covariance = np.einsum("st,sjt,skt->tjk", shares, apart, apart)
+    alone, _, _ = AveragedDynamic(lags=()).lay_out(rows[:, speeds], step, folds, [0])
+    heat = alone.moments(rows[:, speeds], rows[:, list(features.temperatures)], step, parts, 0.0)
+    weights, _ = average(heat, alone.draw(of.structures, of.random_state))
+    seconds = np.where(np.isfinite(step) & learned, step, 0.0).sum()
+    part = max(float(seconds) / len(moments.rows), 1.0)
+    return Doubt(features, rows.shape[1], covariance, error, part, (alone, weights))

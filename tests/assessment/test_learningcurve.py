@@ -1,0 +1,97 @@
+"""How much test is enough: whole cycles are unseen, and the curve says when more of the same is not worth it."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from smallmachine import small_machine
+
+from thermocomp.assessment import learningcurve
+from thermocomp.assessment.learningcurve import LearningCurve, Point, learning_curve, n_pieces
+from thermocomp.core.exceptions import FitError
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split, leave_one_cycle_out
+from thermocomp.recording.stacking import stack
+
+
+def small(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0)) -> Samples:
+    return stack([small_machine(speeds)], ["z_um"])
+
+
+def curve_of(errors: dict[int, float], none: float = 40.0) -> LearningCurve:
+    points = [Point(n, n, block, rms) for n, rms in errors.items() for block in (0, 1)]
+    return LearningCurve("averaged", tuple(points), none)
+
+
+def test_more_cycles_leave_less_on_an_unseen_one() -> None:
+    samples = small()
+    judging = leave_one_cycle_out(samples)
+    told: list[str] = []
+
+    def note(text: str, /, steps: int = 1) -> None:
+        told.extend([text] * steps)
+
+    found = learning_curve(samples, judging, progress=note)
+    levels = found.by_cycles()
+    assert [x.learned for x in levels] == [1, 2, 3]
+    assert levels[-1].rms < 0.6 * levels[0].rms
+    assert levels[0].rms < found.none
+    assert {p.unseen for p in found.points} == {0, 1, 2, 3}
+    assert len(told) == len(found.points) <= n_pieces(judging)
+    assert learning_curve(samples, judging).points == found.points  # the draw is the same
+
+
+def test_what_is_learned_from_never_holds_the_unseen_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = small()
+    learned: list[np.ndarray] = []
+    pairs: list[tuple[set[int], set[int]]] = []
+
+    def train(name: str, given: Samples, target: int, learn: np.ndarray, **how: bool) -> SimpleNamespace:
+        learned.append(learn)
+        return SimpleNamespace(model=None)
+
+    def replay(model: None, given: Samples, rows: np.ndarray) -> SimpleNamespace:
+        pairs.append((set(given.cycle[learned[-1]].tolist()), set(given.cycle[rows].tolist())))
+        return SimpleNamespace(compensated=np.zeros(int(rows.sum())))
+
+    monkeypatch.setattr(learningcurve, "train", train)
+    monkeypatch.setattr(learningcurve, "replay_compensated", replay)
+    found = learning_curve(samples, leave_one_cycle_out(samples))
+    assert len(pairs) == len(found.points)
+    assert all(len(judged) == 1 and judged.isdisjoint(own) for own, judged in pairs)
+    assert [len(own) for own, _ in pairs] == [p.learned for p in found.points]
+
+
+def test_the_same_speed_again_is_one_speed() -> None:
+    found = learning_curve(small((1500.0, 1500.0, 2500.0)), leave_one_cycle_out(small((1500.0, 1500.0, 2500.0))), "ols")
+    assert {(p.learned, p.speeds) for p in found.points} == {(1, 1), (2, 1), (2, 2)}
+    assert [x.learned for x in found.by_speeds()] == [1, 2]
+
+
+def test_a_curve_that_is_flat_is_enough_and_one_that_falls_is_not() -> None:
+    assert curve_of({1: 8.0, 2: 3.0, 3: 2.9, 4: 2.85}).enough
+    falling = curve_of({1: 12.0, 2: 9.0, 3: 6.0, 4: 3.0})
+    assert not falling.enough
+    assert falling.last_gain == pytest.approx(3.0)
+    assert "it still falls" in falling.words
+    assert "learned nothing" in curve_of({1: 8.0, 2: 7.9}, none=5.0).words
+    assert curve_of({1: 0.0, 2: 0.0}, none=0.0).enough
+    assert curve_of({1: 3.0, 2: 2.9}, none=0.5).worth == pytest.approx(0.025)
+
+
+def test_two_cycles_have_no_curve() -> None:
+    samples = small((1000.0, 2000.0))
+    with pytest.raises(FitError, match="at least three thermal cycles or files; there are 2"):
+        learning_curve(samples, leave_one_cycle_out(samples))
+
+
+def test_a_part_that_cannot_be_learned_from_is_left_out() -> None:
+    samples = small()
+    splits = leave_one_cycle_out(samples).splits
+    tiny = np.zeros(len(samples), dtype=np.bool_)
+    tiny[:2] = True
+    judging = Judging("cycles", (*splits[1:], Split("cycle tiny", ~tiny, tiny)))
+    found = learning_curve(samples, judging)
+    assert any(np.isnan(p.rms) for p in found.points)
+    assert all(np.isfinite(x.rms) for x in found.by_cycles())
