@@ -1,6 +1,5 @@
 """`Watch`: what each temperature reads by the others and the spindle speed, and how far off it may be."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +27,8 @@ FloatArray = NDArray[np.float64]
 
 #: how long a jump or a difference has to last before it is a failure [s]
 LASTING = 300.0
+#: error that is reckoned with at least where differences are weighed [degC]
+LEAST_UNSEEN = 0.05
 
 
 @dataclass(frozen=True)
@@ -160,13 +161,15 @@ class Watch:
         return np.stack([np.eye(n) - direct, np.eye(n) - direct - lagged])
 
     def limits(self, what: str) -> FloatArray:
-        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still."""
+        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or what is unseen of it."""
         return self._limits[what]
 
     @cached_property
     def _limits(self) -> dict[str, FloatArray]:
-        names: Sequence[str] = ("off", "jump", "moved", "still")
-        return {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
+        names = ("off", "jump", "moved", "still", "unseen")
+        found = {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
+        found["unseen"] = np.maximum(found["unseen"], LEAST_UNSEEN)
+        return found
 
     def ranges(self, least: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the trained range of each temperature and its width, at least `least`, (n_sensors,) each [degC]."""

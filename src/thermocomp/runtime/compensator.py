@@ -258,14 +258,12 @@ class Compensator:
         if self.watch is None or explain_untimely(reading, state.time, now, self.limits):
             return state, reading
         given = [reading.values.get(i.name) for i in self.watch.inputs]
-        heat = [i.quantity == "temperature" for i in self.watch.inputs]
-        if not all(is_number(v) for v, warm in zip(given, heat, strict=True) if not warm):
-            return state, reading  # without its speed nothing is predicted; the gate says what is missing
         values = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
         resting = self.watch.zeroing.stands(reading.values.get(self.watch.zeroing.speed))
         before = begin(self.watch) if state.watch is None else state.watch
         seen, believed = look(self.watch, before, reading.time, values, resting=resting)
-        mended = dict(zip((i.name for i in self.watch.inputs), believed.tolist(), strict=True))
+        heat = self.watch.bank.temperatures.tolist()
+        mended = {self.watch.inputs[k].name: float(believed[k]) for k in heat}
         return state._replace(watch=seen), replace(reading, values={**reading.values, **mended})
 
     def _idle(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.watch import LASTING, Watch
 from thermocomp.core.zero import Gathered, robust_mean
-from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE
+from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -98,7 +98,8 @@ def look(
     time : float
         Of the reading, later than the last [s].
     values : ndarray of shape (..., n_inputs)
-        In the order of the watch's inputs; nan where a value is missing.
+        In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
+        is passed on as it is.
     resting : bool
         The spindle is known to stand.
 
@@ -110,6 +111,8 @@ def look(
     """
     heat = watch.bank.temperatures
     believed = values.copy()
+    if not np.isfinite(np.delete(values, heat, axis=-1)).all():
+        return state, believed
     zero = state.reference[..., heat]
     if np.isnan(zero).any():
         believed[..., heat] = _made_up(watch, values[..., heat])
@@ -126,11 +129,19 @@ def look(
 
 
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
-    """Return the first readings, one that is missing as far from its training's zero as the others are on average."""
+    """Return the first readings; one that cannot be is as far from its training's zero as the others are on average.
+
+    What can be is what the gate of the compensator lets pass as a start.
+    """
     zero = np.array([watch.inputs[s.input].reference for s in watch.sensors])
+    _, _, span = watch.ranges(MIN_SPAN)
+    least, most = PLAUSIBLE["temperature"]
     with np.errstate(all="ignore"):
-        day = np.nanmedian(np.where(np.isfinite(values), values - zero, np.nan), axis=-1, keepdims=True)
-    return np.where(np.isfinite(values), values, zero + np.nan_to_num(day))
+        offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
+        middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
+        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan comes last
+        fits = np.abs(offset - day) <= span
+    return np.where(fits, values, zero + np.clip(day, -DAY, DAY))
 
 
 def _gather(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
@@ -248,19 +259,22 @@ def _off(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -
         lasting = (s.time - off >= LASTING).any(axis=-1)
     if not lasting.any():
         return s
-    limits = watch.limits("off")
-    shapes = watch.signatures / limits[:, None]  # (2, n, n_faulty)
+    weights, limits = watch.limits("unseen"), watch.limits("off")
+    scaled = np.where(calm, difference, 0.0) / weights
     best, guilty = np.full(z.shape[:-1], np.inf), np.zeros(z.shape[:-1], dtype=np.intp)
-    for shape in shapes:
-        amount = np.einsum("...i,ij->...j", z, shape) / (shape**2).sum(axis=0)
-        left = z[..., :, None] - shape * amount[..., None, :]
-        rest = np.abs(left).max(axis=-2)
+    worst = np.full(z.shape[:-1], np.inf)  # of what is left, in units of the limits
+    for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
+        amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
+        left = scaled[..., :, None] - shape * amount[..., None, :]
+        rest = (left**2).sum(axis=-2)
         rest[~calm] = np.inf
-        place = rest.argmin(axis=-1)
-        value = np.take_along_axis(rest, place[..., None], axis=-1)[..., 0]
+        place = rest.argmin(axis=-1)[..., None]
+        value = np.take_along_axis(rest, place, axis=-1)[..., 0]
+        most = np.take_along_axis(np.abs(left * (weights / limits)[:, None]).max(axis=-2), place, axis=-1)[..., 0]
         better = value < best
-        best, guilty = np.where(better, value, best), np.where(better, place, guilty)
-    sure = lasting & (best <= 1.0)  # else no single failure explains it: the machine is unlike its training
+        best, guilty = np.where(better, value, best), np.where(better, place[..., 0], guilty)
+        worst = np.where(better, most, worst)
+    sure = lasting & (worst <= 1.0)  # else no single failure explains it: the machine is unlike its training
     found = sure[..., None] & (np.arange(z.shape[-1]) == guilty[..., None])
     return _fail(watch, s, found, OFF, np.zeros(z.shape))
 
@@ -305,5 +319,5 @@ def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: Flo
         bridge=np.where(found, offset, s.bridge),
         used=np.where(found, s.predicted + offset, s.used),
         jumped=np.where(found, np.nan, s.jumped),
-        off=np.full(s.off.shape, np.nan) if fault == OFF else s.off,
+        off=np.where(found.any(axis=-1, keepdims=True) & (fault == OFF), np.nan, s.off),
     )
