@@ -85,8 +85,10 @@ def series(values: FloatArray, deviation: FloatArray) -> Samples:
 def test_rows_that_are_gone_hide_nothing(gone: set[int]) -> None:
     copy = learned().take(~np.isin(np.arange(800), list(gone)))
     found = overlap(kept(), copy, 0)
-    assert (found >= 0).all()
-    assert np.abs(found - copy.row).max() <= 2 * LENGTH
+    stretch = np.cumsum(np.diff(copy.row, prepend=copy.row[0]) > 1)
+    long = np.bincount(stretch)[stretch] > LENGTH  # what is left between two that are gone may be too short for a run
+    assert (found[long] >= 0).all()
+    assert np.abs(found - copy.row)[found >= 0].max() <= 2 * LENGTH
 
 
 @settings(max_examples=30, deadline=None)

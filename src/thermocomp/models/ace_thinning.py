@@ -2,8 +2,8 @@
 
 The transformations of the inputs become straight lines, joined, near each row's value. The inverse of theta, which
 jumps from row to row by more than is to be lost, is then a step for the new sum of each row instead of the old one: at
-every row that was fitted the prediction stays what it was, within `TOLERANCE`. Between the rows both are the noise of
-their neighbours, and as good as each other.
+every row that was fitted the prediction stays what it was, within `TOLERANCE`, but for a few of rounded inputs whose
+sums become the same. Between the rows both are the noise of their neighbours, and as good as each other.
 """
 
 from collections.abc import Sequence
