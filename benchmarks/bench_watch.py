@@ -36,7 +36,7 @@ LEARNED = 6669
 
 def cases() -> Iterator[tuple[str, Samples]]:
     for physics in ("linear", "nonlinear"):
-        whole = stack(record("demo", physics=physics), ["z_um"])  # type: ignore[arg-type]
+        whole = stack(record("demo", physics=physics), ["z_um"])
         yield f"demo, {physics}, six", whole.take(np.arange(len(whole)) % 3 == 0).only([*FEW, "spindle_rpm"])
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"

@@ -24,6 +24,7 @@ from thermocomp.core.pacedbank import Bank
 from thermocomp.core.zero import FIRST_READING, Zeroing
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 #: how long a jump or a difference has to last before it is a failure [s]
 LASTING = 300.0
@@ -171,8 +172,14 @@ class Watch:
         found["unseen"] = np.maximum(found["unseen"], LEAST_UNSEEN)
         return found
 
-    def ranges(self, least: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the trained range of each temperature and its width, at least `least`, (n_sensors,) each [degC]."""
+    @cached_property
+    def speeds(self) -> IntArray:
+        """Inputs that are spindle speeds."""
+        return np.array([k for k, i in enumerate(self.inputs) if i.quantity == "spindle_speed"], dtype=np.intp)
+
+    @cached_property
+    def ranges(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Trained range of each temperature and its width, (n_sensors,) each [degC]."""
         own = [self.inputs[s.input] for s in self.sensors]
         low, high = np.array([i.low for i in own]), np.array([i.high for i in own])
-        return low, high, np.maximum(high - low, least)
+        return low, high, high - low

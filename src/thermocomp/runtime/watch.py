@@ -111,7 +111,7 @@ def look(
     """
     heat = watch.bank.temperatures
     believed = values.copy()
-    if not np.isfinite(np.delete(values, heat, axis=-1)).all():
+    if not np.isfinite(values[..., watch.speeds]).all():
         return state, believed
     zero = state.reference[..., heat]
     if np.isnan(zero).any():
@@ -122,8 +122,7 @@ def look(
     missing = ~_plausible(watch, x, values[..., heat])
     if time - state.time >= TICK:
         state = _step(watch, state, time, np.where(missing, np.nan, x), values)
-    replaced = (state.fault != GOOD) | missing | np.isfinite(state.jumped)
-    if replaced.any():
+    if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
         believed[..., heat] = np.where(replaced, zero + state.used, values[..., heat])
     return state, believed
 
@@ -134,7 +133,7 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     What can be is what the gate of the compensator lets pass as a start.
     """
     zero = np.array([watch.inputs[s.input].reference for s in watch.sensors])
-    _, _, span = watch.ranges(MIN_SPAN)
+    span = np.maximum(watch.ranges[2], MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
     with np.errstate(all="ignore"):
         offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
@@ -162,10 +161,10 @@ def _gather(watch: Watch, state: WatchState, time: float, values: FloatArray, re
 
 def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
     """Return which temperatures are numbers that a machine can have: as the gate of the compensator sees it."""
-    low, high, span = watch.ranges(MIN_SPAN)
+    low, high, width = watch.ranges
+    span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
-    with np.errstate(invalid="ignore"):
-        within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)
+    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # nan is not
     return np.asarray(within)
 
 
@@ -281,8 +280,7 @@ def _off(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
     """Return when the spindle last turned faster than in the training: what is predicted then is not known to hold."""
-    speeds = [k for k, i in enumerate(watch.inputs) if i.quantity == "spindle_speed"]
-    faster = (np.abs(change[..., speeds]) > FASTER * watch.top_speed).any(axis=-1)
+    faster = (np.abs(change[..., watch.speeds]) > FASTER * watch.top_speed).any(axis=-1)
     return np.where(faster, s.time, s.fast)
 
 
