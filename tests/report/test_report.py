@@ -104,14 +104,14 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     told = [a.reason for a in bad.overall() if a.word == "unproven" and "worse than none (" in a.reason]
     assert told
     assert not [c for c in cautions(bad) if "worse than none" in c]  # it is said once
-    assert all("loss of t1_C" in c for c in told)
-    assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of t1_C", html.render(bad, [recording]))
+    assert all("loss of spindle_rpm" in c for c in told)
+    assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
     assert "worse than none with" in page
     show_comparison(bad, None, [], Console(width=400), as_json=False)
     assert all(c in capsys.readouterr().out for c in told[:1])
     show_comparison(bad, None, [], Console(width=400), as_json=True)
     results = [r for r in json.loads(capsys.readouterr().out)["results"] if "robustness" in r]
-    assert any("loss of t1_C" in r["robustness"]["worse_than_none"] for r in results)
+    assert any("loss of spindle_rpm" in r["robustness"]["worse_than_none"] for r in results)
 
 
 def test_harm_within_the_margin_is_a_caution(comparison: Comparison) -> None:

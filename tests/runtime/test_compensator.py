@@ -19,7 +19,7 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensated, Compensator, CompensatorState
 from thermocomp.runtime.limits import limit_offset
 
-OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9)
+OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9, hold=1e12)
 
 
 def model(target: str = "z", unit: str = "um") -> LinearDynamic:

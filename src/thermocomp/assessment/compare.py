@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm
 from thermocomp.assessment.diagnostics import Collinearity, collinearity
+from thermocomp.assessment.guards import Guard, find_guard
 from thermocomp.assessment.judge import cap_alike_units, drop_unreadable, judge, refuse_method
 from thermocomp.assessment.leaks import refuse_leaks
 from thermocomp.assessment.pieces import work_through
@@ -43,6 +44,7 @@ def compare(
     robustness: bool = True,
     refit: bool = True,
     limits: Limits | None = Limits(),
+    watched: Sequence[str] | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
@@ -66,7 +68,10 @@ def compare(
     refit : bool
         With `robustness`: also try what is accepted as it would be written, fitted to all rows.
     limits : Limits or None
-        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers.
+        Of the compensator that is judged; None: the models alone are judged, as they are compared in papers, and
+        nothing watches over their sensors.
+    watched : sequence of str, optional
+        Inputs that a watch is made of; all if not given.
     jobs : int
         Processes to share the work among; -1 takes all cores.
     progress : callable
@@ -88,7 +93,8 @@ def compare(
     by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
-    work = partial(_assess_method, samples, rules, support, robustness, limits)
+    guards = _guards(samples, by_target, watched, jobs) if robustness and limits is not None else {}
+    work = partial(_assess_method, samples, rules, support, robustness, limits, guards)
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = [_inners(names, own, rules) for own in by_target]
     try:
@@ -113,7 +119,7 @@ def compare(
         recommended += [best] if best else []
         found += _concluded(mine, verdicts, rules, best, capped)
     if robustness and refit:
-        found = refit_accepted(found, samples, support, jobs=jobs)
+        found = refit_accepted(found, samples, support, watch=limits is not None, jobs=jobs)
     return Comparison(
         judging,
         tuple(found),
@@ -122,6 +128,26 @@ def compare(
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
     )
+
+
+def _guards(
+    samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
+) -> dict[str, Guard | None]:
+    """Return what a watch lets through in each block, made of what may be learned from there."""
+    splits = {split.name: split for own in by_target for split in own.splits}
+    known = samples if watched is None else samples.only(watched)
+    found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
+    names = [c.name for c in samples.inputs]
+    place = [names.index(c.name) for c in known.inputs]
+    return {name: g and g.among(place) for name, g in zip(splits, found, strict=True)}
+
+
+def _guard(samples: Samples, split: Split) -> Guard | None:
+    return find_guard(samples, split.learn, split.judge)
+
+
+def _unwatched(_split: Split, _why: str) -> None:
+    return None
 
 
 def _complete(parts: Iterable[tuple[str, Assessment]], blocks: int) -> dict[str, list[Assessment]]:
@@ -236,6 +262,7 @@ def _assess_method(
     support: Support,
     robustness: bool,
     limits: Limits | None,
+    guards: dict[str, Guard | None],
     piece: tuple[int, str, Split],
 ) -> Assessment:
     target, name, split = piece
@@ -252,6 +279,7 @@ def _assess_method(
         fit_s=trained.seconds,
         robustness=robustness,
         limits=limits,
+        guard=guards.get(split.name),
     )
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.coverage import find_validity
+from thermocomp.assessment.guards import Guard
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Rules
 from thermocomp.assessment.robustness import stress
@@ -53,6 +54,7 @@ def judge(
     fit_s: float = 0.0,
     robustness: bool = True,
     limits: Limits | None = Limits(),
+    guard: Guard | None = None,
 ) -> Assessment:
     """Judge a frozen model on a block: what a compensator with it would have left there.
 
@@ -78,6 +80,8 @@ def judge(
         Also replay with noise and lost sensors.
     limits : Limits or None
         Of the compensator; None: the model alone is judged.
+    guard : Guard, optional
+        What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
 
     Returns
     -------
@@ -93,7 +97,7 @@ def judge(
     measured = samples.deviations[rows, target]
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
-    stressed = stress(model, samples, measured, rows) if robustness else None
+    stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
     ran = replay_compensated(model, samples, rows, limits or Limits())
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from thermocomp.assessment.guards import Guard, find_guard
 from thermocomp.assessment.pieces import work_through
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.robustness import stress, worse
@@ -19,7 +20,7 @@ from thermocomp.models.training import train
 from thermocomp.recording.samples import Samples
 
 
-def stress_written(judged: Assessment, model: ErrorModel, samples: Samples) -> Assessment:
+def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
     """Return an assessment with the robustness of the model that is written, where that is worse.
 
     Parameters
@@ -29,6 +30,8 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples) -> A
     model : ErrorModel
         Fitted to all rows.
     samples : Samples
+    guard : Guard, optional
+        What a watch, made of all rows, lets through while sensors fail.
 
     Returns
     -------
@@ -39,11 +42,13 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples) -> A
         return judged
     k = [t.name for t in samples.targets].index(model.target)
     rows = samples.valid & np.isfinite(samples.deviations[:, k])
-    own = stress(model, samples, samples.deviations[rows, k], rows).robustness
+    own = stress(model, samples, samples.deviations[rows, k], rows, guard=guard).robustness
     return replace(judged, robustness=worse(judged.robustness, own))
 
 
-def refit_accepted(judged: Sequence[Assessment], samples: Samples, support: Support, *, jobs: int) -> list[Assessment]:
+def refit_accepted(
+    judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
+) -> list[Assessment]:
     """Fit what is accepted to all rows, as `thermocomp.assessment.study.fit` does, and try that as well.
 
     Parameters
@@ -52,6 +57,8 @@ def refit_accepted(judged: Sequence[Assessment], samples: Samples, support: Supp
     samples : Samples
     support : Support
         For the models.
+    watch : bool
+        A watch is there to notice lost sensors.
     jobs : int
         Processes to share the work among; -1 takes all cores.
 
@@ -61,15 +68,17 @@ def refit_accepted(judged: Sequence[Assessment], samples: Samples, support: Supp
         The same, less sure of what noise or a lost sensor would make worse than none.
     """
     wanted = [a for a in judged if a.overall and a.accepted and deployable(a.model)]
-    found = work_through(partial(_refit, samples, support), wanted, _not_refitted, jobs=jobs)
+    everything = np.ones(len(samples), dtype=np.bool_)
+    guard = find_guard(samples, everything, everything) if watch and wanted else None
+    found = work_through(partial(_refit, samples, support, guard), wanted, _not_refitted, jobs=jobs)
     tried = {(a.target, a.model): a for a in found}
     return [tried.get((a.target, a.model), a) if a.overall else a for a in judged]
 
 
-def _refit(samples: Samples, support: Support, judged: Assessment) -> Assessment:
+def _refit(samples: Samples, support: Support, guard: Guard | None, judged: Assessment) -> Assessment:
     k = [t.name for t in samples.targets].index(judged.target)
     written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
-    return stress_written(judged, written.model, samples)
+    return stress_written(judged, written.model, samples, guard)
 
 
 def _not_refitted(judged: Assessment, why: str) -> Assessment:

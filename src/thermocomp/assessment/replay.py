@@ -8,15 +8,18 @@ from numpy.typing import NDArray
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
+from thermocomp.core.watch import Watch
 from thermocomp.core.zero import first_rows, robust_mean
 from thermocomp.recording.samples import Samples
 from thermocomp.runtime import batch
+from thermocomp.runtime.watch import begin, look
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets the test's reference too
-Disturb = Callable[[FloatArray, FloatArray], FloatArray]
+#: turns one reading (n_inputs,) into a batch of disturbed ones (n_variants, n_inputs); gets its row and the test's
+#: reference too
+Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,7 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
     Replayed
     """
     columns, within = _columns(model, samples), limits if model.unit == "um" else None
+    samples = believe(model.watch, samples, rows)
     n, why = len(samples), ""
     deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
     outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
@@ -91,6 +95,27 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
     return Replayed(deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows])
+
+
+def believe(watch: Watch | None, samples: Samples, rows: BoolArray) -> Samples:
+    """Return samples as a watch lets them through, in the tests that hold `rows`; the same without a watch.
+
+    An input of the watch that the samples have not got is missing to it. Rows without a speed are passed on unchanged.
+    """
+    names = [c.name for c in samples.inputs]
+    if watch is None or any(i.name not in names for i in watch.inputs if i.quantity != "temperature"):
+        return samples
+    values, known = samples.values.copy(), [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    for test in np.unique(samples.test[rows]).tolist():
+        mine = np.flatnonzero(samples.test == test)
+        state = begin(watch)
+        for row in mine.tolist():
+            given = np.full(len(watch.inputs), np.nan)
+            given[known] = samples.values[row, places]
+            state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+            values[row, places] = let[known]
+    return replace(samples, values=values)
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -146,7 +171,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
         window = _window(model, samples, own[usable[own]])
 
         def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
-            return values[k] if disturb is None else disturb(values[k], zero)
+            return values[k] if disturb is None else disturb(k, values[k], zero)
 
         state, head = _begun(model, samples, mine[usable[mine]], _reference(samples, columns, test), read)
         last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()

@@ -1,11 +1,12 @@
 """What noise and a lost sensor do to a model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.guards import Guard
 from thermocomp.assessment.replay import walk
 from thermocomp.core.model import ErrorModel
 from thermocomp.recording.samples import Samples
@@ -36,6 +37,8 @@ class Robustness:
         Share of rows outside the joint support: inputs together unlike all that was trained, or a speed that was not.
     unlike_rms : float
         RMS in these rows [um]; nan without any.
+    together_rms : dict of str to float
+        RMS with several sensors cut off at once (``t1_C, t2_C``), of which nothing depends but what may run then [um].
     """
 
     noise: float
@@ -46,6 +49,7 @@ class Robustness:
     none_rms: float
     unlike: float = 0.0
     unlike_rms: float = float("nan")
+    together_rms: dict[str, float] = field(default_factory=dict)
 
     @property
     def worse_than_none(self) -> tuple[str, ...]:
@@ -95,9 +99,11 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
         law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
         for law, (mean, largest) in one.noise_rms.items()
     }
-    names = dict.fromkeys((*one.lost_rms, *other.lost_rms))
-    lost = {n: max(one.lost_rms.get(n, 0.0), other.lost_rms.get(n, 0.0)) for n in names}
-    return replace(one, noise_rms=noise, lost_rms=lost)
+    lost, together = (
+        {n: max(a.get(n, 0.0), b.get(n, 0.0)) for n in dict.fromkeys((*a, *b))}
+        for a, b in ((one.lost_rms, other.lost_rms), (one.together_rms, other.together_rms))
+    )
+    return replace(one, noise_rms=noise, lost_rms=lost, together_rms=together)
 
 
 def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
@@ -113,6 +119,13 @@ def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustnes
         total = sum(weights)
         return float(np.sqrt(sum(w * v**2 for v, w in zip(values, weights, strict=True)) / total)) if total else np.nan
 
+    def by_name(parts: Sequence[tuple[dict[str, float], int]]) -> dict[str, float]:
+        names = dict.fromkeys(name for of, _ in parts for name in of)
+        return {
+            name: mean_square([of[name] for of, _ in parts if name in of], [n for of, n in parts if name in of])
+            for name in names
+        }
+
     rows = [n for _, n in known]
     first = known[0][0]
     beyond = [(r.outside_rms, r.outside * n) for r, n in known if r.outside > 0]
@@ -126,13 +139,8 @@ def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustnes
             )
             for law in first.noise_rms
         },
-        lost_rms={
-            name: mean_square(
-                [r.lost_rms[name] for r, _ in known if name in r.lost_rms],
-                [n for r, n in known if name in r.lost_rms],
-            )
-            for name in dict.fromkeys(s for r, _ in known for s in r.lost_rms)
-        },
+        lost_rms=by_name([(r.lost_rms, n) for r, n in known]),
+        together_rms=by_name([(r.together_rms, n) for r, n in known]),
         outside=sum(r.outside * n for r, n in known) / sum(rows),
         outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
         none_rms=mean_square([r.none_rms for r, _ in known], rows),
@@ -159,12 +167,14 @@ def stress(
     noise: float = 0.4,
     draws: int = 100,
     seed: int = 0,
+    guard: Guard | None = None,
 ) -> Replayed:
     """Replay a model once, clean and disturbed side by side.
 
     - Noise on every temperature, independent from row to row (C-33). The paper gives a level and no law (E-C9), so both
       are drawn: uniform within +-`noise`, and normal with `noise` as standard deviation.
-    - Each sensor cut off: its change reads zero from the start on (C-34), the worst way to fail: nothing notices.
+    - Each sensor cut off: its change reads zero from the start on (C-34), the worst way to fail. With a guard a watch
+      has to notice it; without one nothing does.
 
     Parameters
     ----------
@@ -180,22 +190,36 @@ def stress(
         Number of noise draws of each law.
     seed : int
         Of the noise.
+    guard : Guard, optional
+        What is let through while sensors fail, also several at once.
 
     Returns
     -------
     Replayed
     """
     temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
-    lost = [k for k, i in enumerate(model.inputs) if i.name in model.sensors]
+    lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
+    lost += [names for names in (guard.readings if guard else ()) if len(names) > 1 and {*names} <= {*model.sensors}]
+    cut = [[k for k, i in enumerate(model.inputs) if i.name in names] for names in lost]
+    known = [c.name for c in samples.inputs]
+    columns = {known.index(i.name): k for k, i in enumerate(model.inputs)}
+    let = [
+        {columns[c]: v for c, v in guard.readings.get(names, {}).items() if c in columns} if guard else {}
+        for names in lost
+    ]
     rng = np.random.default_rng(seed)
     n_inputs = len(model.inputs)
 
-    def disturb(reading: FloatArray, reference: FloatArray) -> FloatArray:
+    def disturb(row: int, reading: FloatArray, reference: FloatArray) -> FloatArray:
         batch = np.broadcast_to(reading, (1 + 2 * draws + len(lost), n_inputs)).copy()
         batch[1 : 1 + draws, temperatures] += rng.uniform(-noise, noise, (draws, temperatures.sum()))
         batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, noise, (draws, temperatures.sum()))
-        for variant, k in enumerate(lost, start=1 + 2 * draws):
-            batch[variant, k] = reference[k]
+        for variant, (places, through) in enumerate(zip(cut, let, strict=True), start=1 + 2 * draws):
+            if guard and lost[variant - 1 - 2 * draws] in guard.readings:
+                for k, values in through.items():
+                    batch[variant, k] = values[row]
+            else:
+                batch[variant, places] = reference[places]
         return batch
 
     # sums, not a table: a long recording times two hundred variants would not fit into memory
@@ -212,7 +236,8 @@ def stress(
     robustness = Robustness(
         noise=noise,
         noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
-        lost_rms={model.inputs[k].name: float(rms[1 + 2 * draws + i]) for i, k in enumerate(lost)},
+        lost_rms={names[0]: float(v) for names, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(names) == 1},
+        together_rms={", ".join(n): float(v) for n, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(n) > 1},
         outside=float(beyond.mean()),
         outside_rms=_rms((measured - predicted)[beyond]),
         none_rms=_rms(measured),

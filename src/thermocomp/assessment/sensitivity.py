@@ -121,16 +121,13 @@ def _squares(
     """Return the residual sum of squares without error, then with each draw of it; shape (1 + draws,)."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     temperatures = np.array([c.quantity == "temperature" for c in samples.inputs], dtype=np.bool_)
-    # walk all rows of the tests concerned, so that it is known which row a reading is; each row has its own error,
-    # whatever the model asks for
+    # each row has its own error, whatever the model asks for
     walked = np.isin(samples.test, samples.test[judged])
     order = np.argsort(samples.test[walked], kind="stable")
     row_numbers = np.flatnonzero(walked)[order]
-    readable = np.asarray(np.isfinite(samples.values[:, columns]).all(axis=1))
-    readings = iter(row_numbers[readable[row_numbers]].tolist())
 
-    def disturb(reading: FloatArray, _: FloatArray) -> FloatArray:
-        rng = np.random.default_rng((seed, next(readings)))
+    def disturb(row: int, reading: FloatArray, _: FloatArray) -> FloatArray:
+        rng = np.random.default_rng((seed, row))
         shape = (draws, len(samples.inputs))
         error = rng.uniform(-size, size, shape) if law == "uniform" else rng.normal(0.0, size, shape)
         batch = np.repeat(reading[None], 1 + draws, axis=0)

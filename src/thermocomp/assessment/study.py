@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import compare, split_by_cycle
 from thermocomp.assessment.do_no_harm import Verdict
+from thermocomp.assessment.guards import find_guard
 from thermocomp.assessment.judge import cap_alike_units, judge
 from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.pieces import explain
@@ -108,6 +109,10 @@ def fit(
     (method,) = expand([method])
     if not deployable(method):
         raise InputError(f"{method} cannot be frozen to plain numbers: judge it with 'compare', fit another method")
+    everything = np.ones(len(samples), dtype=np.bool_)
+    written = [train(method, samples, k, everything, support=support, prints=True) for k in range(len(samples.targets))]
+    speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
+    watched = list(dict.fromkeys([*(i.name for w in written for i in w.model.inputs), *speeds]))
     comparison = compare(
         samples,
         [method],
@@ -116,23 +121,30 @@ def fit(
         support=support,
         refit=False,
         limits=limits,
+        watched=watched,
         jobs=jobs,
         progress=progress,
     )
-    models, estimators, r_squared = [], [], []
-    everything = np.ones(len(samples), dtype=np.bool_)
+    known = samples.only(watched)
+    names = [c.name for c in samples.inputs]
+    guard = find_guard(known, everything, everything)
+    let = guard and guard.among([names.index(c.name) for c in known.inputs])
     covered = coverage.find_validity(samples, judging, recordings)
-    tried: dict[str, Assessment] = {}
-    for k, overall in enumerate(comparison.overall()):
-        trained = train(method, samples, k, everything, support=support, prints=True)
+    models, tried = list[ErrorModel](), dict[str, Assessment]()
+    for overall, trained in zip(comparison.overall(), written, strict=True):
         progress(f"{overall.target} {method} all rows")
-        tried[overall.target] = stress_written(overall, trained.model, samples)
+        tried[overall.target] = stress_written(overall, trained.model, samples, let)
         honest = honest_error(tried[overall.target], judging)
-        models.append(replace(trained.model, honest_error=honest, validity=covered))
-        estimators.append(trained.estimator)
-        r_squared.append(trained.r_squared)
+        models.append(
+            replace(trained.model, honest_error=honest, validity=covered, watch=guard.watch if guard else None)
+        )
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
-    return Fitted(tuple(models), tuple(estimators), tuple(r_squared), replace(comparison, assessments=judged))
+    return Fitted(
+        tuple(models),
+        tuple(w.estimator for w in written),
+        tuple(w.r_squared for w in written),
+        replace(comparison, assessments=judged),
+    )
 
 
 def honest_error(overall: Assessment, judging: Judging) -> HonestError:
@@ -163,6 +175,7 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         tried=overall.verdict.tried,
         rules=RULES,
         harm_margin=overall.verdict.stated,
+        lost={**tried.lost_rms, **tried.together_rms} if (tried := overall.robustness) else {},
     )
 
 

@@ -18,6 +18,7 @@ from thermocomp.recording.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
+from thermocomp.report.losses import describe_losses
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
 from thermocomp.simulation.protocol import Experiment
@@ -146,7 +147,11 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     for m in fitted.models:
         if m.honest_error is not None:
             console.print(f"{mark(m.honest_error.word)} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
-    for line in [*describe_running(overall), *describe_bands(fitted.models, overall)]:
+    for line in [
+        *describe_running(overall),
+        *describe_bands(fitted.models, overall),
+        *describe_losses(fitted.models),
+    ]:
         console.print(words(line))
     console.print(f"Model file: {words(path)}", soft_wrap=True)
 

@@ -109,6 +109,10 @@ class Limits:
         A new target closer than this to the correction in force changes nothing [um].
     reading_age : float
         A reading older than this is not used [s].
+    hold : float
+        So long a correction stays where it is when nothing drives it any more [s].
+    fade : float
+        Time constant with which it goes to zero after that [s].
 
     Examples
     --------
@@ -121,9 +125,11 @@ class Limits:
     rate: float = 0.1
     dead_band: float = 0.0
     reading_age: float = 60.0
+    hold: float = 1800.0
+    fade: float = 3600.0
 
     def __post_init__(self) -> None:
-        for name in ("magnitude", "rate", "reading_age"):
+        for name in ("magnitude", "rate", "reading_age", "hold", "fade"):
             value = getattr(self, name)
             if not value > 0:  # also refuses nan
                 raise InputError(f"limit {name} = {value}: must be positive")

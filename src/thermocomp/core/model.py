@@ -7,7 +7,7 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import ClassVar, NamedTuple, Self
@@ -25,6 +25,7 @@ from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.validity import Validity
+from thermocomp.core.watch import Watch
 from thermocomp.core.zero import FIRST_READING, Zeroing, find_zero
 
 FloatArray = NDArray[np.float64]
@@ -74,6 +75,8 @@ class ErrorModel(ABC):
         Over how long a compensator averages what the inputs with ``rezero`` count from, as in its training.
     band : Band or None
         How far it may be off; None: nothing is known of that.
+    watch : Watch or None
+        Over its temperatures: which of them are to be believed, and what stands in for one that is not.
 
     Examples
     --------
@@ -98,6 +101,7 @@ class ErrorModel(ABC):
     joint: JointSupport | None = None
     zeroing: Zeroing = FIRST_READING
     band: Band | None = None
+    watch: Watch | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         check_name("target", self.target)
@@ -143,6 +147,12 @@ class ErrorModel(ABC):
     @abstractmethod
     def sensors(self) -> tuple[str, ...]:
         """Names of the inputs that have an influence on the deviation."""
+
+    def may_lose(self, names: Sequence[str]) -> bool:
+        """Return whether it was judged without some of its inputs, and leaves less than no compensation then."""
+        found = self.honest_error
+        key = ", ".join(i.name for i in self.inputs if i.name in names)
+        return found is not None and key in found.lost and found.lost[key] <= found.none_rms
 
     # -- the one way in ----------------------------------------------------------------------------------------------
 

@@ -3,18 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermocomp.core import lagbank
 from thermocomp.core.bounds import DEGREE, ENTRIES, GAP, LEAST, RANGE, check_between, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Lag, Magnitude, Node, PacedLag, Power, scale_node, sum_weighted
 from thermocomp.core.model import ErrorModel, FloatArray
-
-IntArray = NDArray[np.intp]
+from thermocomp.core.pacedbank import Bank
 
 
 @dataclass(frozen=True)
@@ -57,33 +54,6 @@ class SpeedState:
     stopped: float
     running: float
     weight: float
-
-
-class Bank(NamedTuple):
-    """What the states of a `PacedDynamic` follow, and how fast."""
-
-    temperatures: IntArray  #: (n_temperatures,), inputs that are temperatures
-    taus: int  #: lags of each
-    speeds: IntArray  #: (n_states,), inputs of the speed states
-    powers: FloatArray  #: (n_states,)
-    rates: FloatArray  #: (n_lags + n_states,), at rest [1/s]
-    gain: FloatArray  #: (n_states,), what the rate grows by to top speed [1/s]
-    top: float  #: [1/min]
-
-    def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what the states follow, (..., n_memory), and the share of top speed of each speed state."""
-        share = np.abs(change[..., self.speeds]) / self.top
-        temperatures = change[..., self.temperatures]
-        return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share
-
-    def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
-        """Return the states `dt` seconds later, the inputs having changed to `change`."""
-        signals, share = self.signals(change)
-        lags = len(self.rates) - len(self.gain)
-        rates = np.empty(signals.shape)
-        rates[..., :lags] = self.rates[:lags]
-        rates[..., lags:] = self.rates[lags:] + share * self.gain
-        return lagbank.follow(memory, signals, dt * rates)
 
 
 @dataclass(frozen=True, kw_only=True)

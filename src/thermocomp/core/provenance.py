@@ -83,6 +83,9 @@ class HonestError:
         Who takes an unproven model all the same, and why; empty without that.
     harm_margin : float or None
         Harm in a single cycle that was let pass, as it was stated before judging; None: by rule.
+    lost : dict of str to float
+        RMS of the residual with a sensor, or with several of them (``t1_C, t2_C``, in the order of the inputs), read
+        as their zero from the start on, the watch being there to find it [unit of the model].
 
     Raises
     ------
@@ -104,6 +107,7 @@ class HonestError:
     rules: int = 0
     taken: str = ""
     harm_margin: float | None = None
+    lost: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_between(
@@ -120,6 +124,7 @@ class HonestError:
             tried=self.tried,
             rules=self.rules,
             harm_margin=self.harm_margin or 0.0,
+            lost=list(self.lost.values()),
         )
 
     @property

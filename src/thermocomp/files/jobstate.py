@@ -63,7 +63,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     ModelFileError
         Not JSON, not a state file, of a newer version, altered or incomplete.
     """
-    jobs: list[SavedJob] = jsonfile.unpack(KIND, _reader(), text, source)
+    jobs: list[SavedJob] = jsonfile.unpack(KIND, _reader(), text, source).models
     if len(jobs) > 1:
         raise ModelFileError(f"{source}: holds the states of {len(jobs)} jobs: want one")
     saved = jobs[0]

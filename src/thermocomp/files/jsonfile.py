@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -48,18 +48,28 @@ class Format:
 MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit")
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+_HEAD = ("format", "version", "sha256", "models")
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
-def pack(kind: Format, body: list[Any]) -> str:
+def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) -> str:
     """Return the text of a file; floats are written so that reading gives the same bits.
+
+    Parameters
+    ----------
+    kind : Format
+    body : list
+        The models.
+    shared : dict, optional
+        What stands once in the file, for all of them.
 
     Raises
     ------
     ValueError
         A number is not finite.
     """
-    content = {"format": kind.name, "version": kind.version, "sha256": digest(body), "models": body}
+    shared = shared or {}
+    content = {"format": kind.name, "version": kind.version, "sha256": digest(body, shared), "models": body, **shared}
     text = _lay_out(content) + "\n"
     if len(text) > MOST:
         raise InputError(f"{kind.words}: {len(text):,} characters, more than the {MOST:,} that can be read again")
@@ -79,8 +89,8 @@ def _lay_out(value: Any, depth: int = 1) -> str:
     return f"{first}{line}{f',{line}'.join(parts)}{line[:-1]}{last}"
 
 
-def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> list[Any]:
-    """Return the models in the text of a file.
+def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> Any:
+    """Return what is in the text of a file: its ``models``, and what stands once for all of them.
 
     Parameters
     ----------
@@ -103,29 +113,30 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> lis
     if not isinstance(body, list) or not body:
         raise ModelFileError(f"{source}: holds no model")
     try:
-        canonical = _canonical(body)
+        found_digest = digest(body, {k: v for k, v in content.items() if k not in _HEAD})
     except (ValueError, RecursionError) as e:  # 1e999, half a character, a hundred brackets
         raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
-    if content.get("sha256") != hashlib.sha256(canonical).hexdigest():
+    if content.get("sha256") != found_digest:
         raise ModelFileError(
             f"{source}: its numbers do not match its checksum: the file was altered or damaged; write it anew with "
             f"'{kind.command}'"
         )
     try:
-        found: list[Any] = reader.validate_json(text).models  # the text: keys in the order of the file
+        return reader.validate_json(text)  # the text: keys in the order of the file
     except ValidationError as e:
         errors = [_tell(error, content) for error in e.errors(include_url=False)]
         raise ModelFileError(list_errors(source, errors)) from e
-    return found
 
 
-def reader_of(entry: Any) -> SchemaValidator:
-    """Return what reads the models of a file, each of the type `entry`.
+def reader_of(entry: Any, **shared: Any) -> SchemaValidator:
+    """Return what reads the models of a file, each of the type `entry`, and what may stand once for all of them.
 
     Strict: a number in quotes, a missing or an unknown key is damage, not something to guess at. Of a list of numbers
     the first wrong one is enough: the errors of a million would take a gigabyte.
     """
-    whole = make_dataclass("whole", [("format", str), ("version", int), ("sha256", str), ("models", list[entry])])
+    head = [("format", str), ("version", int), ("sha256", str), ("models", list[entry])]
+    rest = [(name, kind | None, field(default=None)) for name, kind in shared.items()]
+    whole = make_dataclass("whole", [*head, *rest])
     schema = TypeAdapter(with_config(_STRICT)(whole)).core_schema
     _stop_at_first(schema)
     return SchemaValidator(schema)
@@ -165,13 +176,11 @@ def read(kind: Format, path: str | Path) -> tuple[str, str]:
     return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
 
-def digest(body: list[Any]) -> str:
-    """Return the SHA-256 of models as they stand in a file."""
-    return hashlib.sha256(_canonical(body)).hexdigest()
-
-
-def _canonical(body: list[Any]) -> bytes:
-    return json.dumps(body, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()
+def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
+    """Return the SHA-256 of models as they stand in a file, with what stands once for all of them."""
+    whole = [body, shared] if shared else body
+    text = json.dumps(whole, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 # -- JSON --------------------------------------------------------------------------------------------------------------

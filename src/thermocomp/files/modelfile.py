@@ -1,7 +1,7 @@
 """Models as JSON: versioned, bit-exact, damaged or unknown files refused."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -17,6 +17,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Network
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
 
 #: as it stands in the file
@@ -30,7 +31,7 @@ FAMILIES: dict[str, type[ErrorModel]] = {f.family: f for f in get_args(Family)}
 
 @cache
 def _reader() -> SchemaValidator:
-    return jsonfile.reader_of(Entry)
+    return jsonfile.reader_of(Entry, watch=Watch)
 
 
 def dumps(models: Sequence[ErrorModel]) -> str:
@@ -41,10 +42,17 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     Raises
     ------
     ModelFileError
-        A model is of a family that no file holds: not plain numbers, such as a Gaussian process.
+        A model is of a family that no file holds: not plain numbers, such as a Gaussian process; or two are watched
+        over in different ways.
     """
     _check_judged(models, "model file")
-    return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models])
+    watch = next((m.watch for m in models if m.watch is not None), None)
+    if any(m.watch != watch for m in models):
+        raise ModelFileError(
+            "model file: its models are watched over in different ways; write them to files of their own"
+        )
+    shared = None if watch is None else {"watch": asdict(watch)}
+    return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models], shared)
 
 
 def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
@@ -65,9 +73,12 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     ModelFileError
         Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all places.
     """
-    models: list[ErrorModel] = jsonfile.unpack(jsonfile.MODELS, _reader(), text, source)
+    found = jsonfile.unpack(jsonfile.MODELS, _reader(), text, source)
+    if any(m.watch is not None for m in found.models):
+        raise ModelFileError(f"{source}: a watch stands in a model: it stands once in the file, beside its models")
+    models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
     _check_judged(models, source)
-    return tuple(models)
+    return models
 
 
 def write(models: Sequence[ErrorModel], path: str | Path, *, overwrite: bool = False) -> None:
@@ -105,7 +116,9 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
             f"model of {model.target}: the family {model.family!r} cannot be written, it is not plain numbers; "
             f"a file may hold {', '.join(FAMILIES)}"
         )
-    return asdict(model)
+    entry = asdict(replace(model, watch=None))
+    del entry["watch"]  # it stands once in the file
+    return entry
 
 
 def _check_judged(models: Sequence[ErrorModel], source: str) -> None:

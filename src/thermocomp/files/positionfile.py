@@ -68,7 +68,7 @@ def loads(text: str, source: str = "position model") -> tuple[PositionModel, ...
     ModelFileError
         Not JSON, no position model, of a newer version, altered or incomplete; the message lists all places.
     """
-    entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _reader(), text, source)
+    entries = jsonfile.unpack(jsonfile.POSITION_MODELS, _reader(), text, source).models
     return tuple(PositionModel(**{f.name: getattr(e, f.name) for f in fields(e)}) for e in entries)
 
 

@@ -1,15 +1,17 @@
 """The compensator: one reading in, one correction per axis or target out. State in, state out.
 
-The way of a reading: gate (complete? finite? plausible? fresh? later than the last?) -> minus the zero and
-`ErrorModel.step` per model -> offset and slope per axis -> minus sign -> limits -> `Correction`. What the gate turns
-away changes nothing: every correction stays where it was. The first readings after a start are averaged: they are what
-temperatures count from, and the corrections stay zero until it is known, as long as the spindle stands
-(`ErrorModel.zeroing`).
+The way of a reading: in time? -> watch (which temperatures are to be believed; what stands in for the others) -> gate
+(complete? finite? plausible?) -> minus the zero and `ErrorModel.step` per model -> offset and slope per axis -> minus
+sign -> limits -> `Correction`. What the gate turns away changes nothing: every correction stays where it was, for
+`Limits.hold`, and fades after that; so does one whose model was never judged without the sensors that failed. The first
+readings after a start are averaged: they are what temperatures count from, and the corrections stay zero until it is
+known, as long as the spindle stands (`ErrorModel.zeroing`).
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +23,11 @@ from thermocomp.core.machine import Machine
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
+from thermocomp.core.watch import Watch
 from thermocomp.core.zero import Gathered, robust_mean
-from thermocomp.runtime.gate import explain_implausible, explain_untimely
-from thermocomp.runtime.limits import limit_line
+from thermocomp.runtime.gate import explain_implausible, explain_untimely, is_number
+from thermocomp.runtime.limits import fade_share, limit_line
+from thermocomp.runtime.watch import WORDS, WatchState, begin, look
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import best_line, best_lines
 
@@ -39,6 +43,8 @@ class CompensatorState(NamedTuple):
     time: float | None  #: of the last reading that passed the gate [s]
     clock: float | None  #: the latest at which a step was taken, whatever the gate said [s]
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
+    watch: WatchState | None  #: over the temperatures; None if nothing watches
+    driven: dict[str, float]  #: when a model last drove each target or axis, on the clock [s]
 
 
 class Compensated(NamedTuple):
@@ -47,6 +53,8 @@ class Compensated(NamedTuple):
     corrections: dict[str, Correction]  #: in force after this reading, by target or axis
     rejected: str  #: why the gate turned the reading away; empty if it passed
     outside: tuple[str, ...]  #: inputs outside the trained range of a model
+    failed: dict[str, str]  #: sensors that are not believed, and what they are: see `thermocomp.runtime.watch`
+    held: dict[str, str]  #: targets or axes that no model drives, and why: held, then fading
 
 
 class DeviationLine(NamedTuple):
@@ -80,6 +88,12 @@ class Compensator:
     models: tuple[ErrorModel, ...]
     lines: dict[str, DeviationLine]
     limits: Limits = Limits()
+
+    @cached_property
+    def watch(self) -> Watch | None:
+        """Over the temperatures of the models."""
+        found = [m.watch for m in self.models if m.watch is not None]
+        return found[0] if found and all(w == found[0] for w in found) else None
 
     def __post_init__(self) -> None:
         for m in self.models:
@@ -153,7 +167,7 @@ class Compensator:
         """Return the state of a compensator that has seen no reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
         return CompensatorState(
-            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models)
+            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), None, {}
         )
 
     def gate(self, state: CompensatorState, reading: Reading, now: float) -> str:
@@ -202,9 +216,11 @@ class Compensator:
         state : CompensatorState
         said : Compensated
         """
+        state, reading = self._believe(state, reading, now)
+        failed = _failed(self.watch, state.watch)
         if rejected := self.gate(state, reading, now):
-            waiting = state._replace(clock=_later(state.clock, now)) if math.isfinite(now) else state
-            return waiting, Compensated(state.corrections, rejected, ())
+            state, held = self._idle(state, now, dict.fromkeys(self.lines, rejected))
+            return state, Compensated(state.corrections, rejected, (), failed, held)
         dt = 0.0 if state.time is None else reading.time - state.time
         # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
         travel = 0.0 if state.clock is None else min(now - state.clock, self.limits.reading_age)
@@ -222,14 +238,51 @@ class Compensator:
                 said[k] = float(deviation)
                 outside += _beyond(model, memory, values)
             states[k] = memory
-        corrections = dict(state.corrections)
+        corrections, driven, held = dict(state.corrections), dict(state.driven), dict[str, str]()
         for target, line in self.lines.items():
             told = said[line.models]
-            if all(map(math.isfinite, told)):
+            if failed and (why := _unjudged(self.models[line.models], failed)):
+                held[target] = why
+            elif all(map(math.isfinite, told)):
                 wanted = Correction.opposing(line.deviation(told))
                 corrections[target] = limit_line(wanted, corrections[target], line.travel, travel, self.limits)
-        new = CompensatorState(tuple(states), corrections, reading.time, _later(state.clock, now), tuple(begins))
-        return new, Compensated(corrections, "", tuple(dict.fromkeys(outside)))
+                driven[target] = _later(state.clock, now)
+        new = state._replace(models=tuple(states), corrections=corrections, gathered=tuple(begins), driven=driven)
+        new, held = self._idle(new, now, held)
+        return new._replace(time=reading.time), Compensated(
+            new.corrections, "", tuple(dict.fromkeys(outside)), failed, held
+        )
+
+    def _believe(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Reading]:
+        """Return the reading with what stands in for temperatures that are not believed."""
+        if self.watch is None or explain_untimely(reading, state.time, now, self.limits):
+            return state, reading
+        given = [reading.values.get(i.name) for i in self.watch.inputs]
+        values = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
+        resting = self.watch.zeroing.stands(reading.values.get(self.watch.zeroing.speed))
+        before = begin(self.watch) if state.watch is None else state.watch
+        seen, believed = look(self.watch, before, reading.time, values, resting=resting)
+        heat = self.watch.bank.temperatures.tolist()
+        mended = {self.watch.inputs[k].name: float(believed[k]) for k in heat}
+        return state._replace(watch=seen), replace(reading, values={**reading.values, **mended})
+
+    def _idle(
+        self, state: CompensatorState, now: float, held: dict[str, str]
+    ) -> tuple[CompensatorState, dict[str, str]]:
+        """Let corrections that nothing drives fade once they were held for long; say how long they have been."""
+        if not math.isfinite(now):
+            return state, held
+        clock = _later(state.clock, now)
+        travel = 0.0 if state.clock is None else min(clock - state.clock, self.limits.reading_age)
+        corrections, said = dict(state.corrections), dict[str, str]()
+        for target, why in held.items():
+            idle = clock - state.driven.get(target, clock)
+            share, old = fade_share(idle, travel, self.limits), corrections[target]
+            if share < 1.0:
+                aim = Correction(share * old.offset, share * old.slope, old.reference_position)
+                corrections[target] = limit_line(aim, old, self.lines[target].travel, travel, self.limits)
+            said[target] = f"{'fading' if share < 1.0 else 'held'}, not driven for {idle:.0f} s: {why}"
+        return state._replace(corrections=corrections, clock=clock), said
 
 
 def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
@@ -237,6 +290,22 @@ def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
     if after.outside.any():
         return [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
     return [] if model.distance(after, values) <= 1.0 else [TOGETHER]
+
+
+def _failed(watch: Watch | None, state: WatchState | None) -> dict[str, str]:
+    """Return the sensors that are not believed, and what they are."""
+    if watch is None or state is None or not state.fault.any():
+        return {}
+    return {n: WORDS[k] for n, k in zip(watch.names, state.fault.tolist(), strict=True) if k}
+
+
+def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
+    """Say why models must not drive a correction without the sensors that failed; the empty string if they may."""
+    for model in models:
+        lost = [n for n in failed if n in model.sensors]
+        if lost and not model.may_lose(lost):
+            return f"{model.target} does harm without {' and '.join(lost)}, or was not judged without"
+    return ""
 
 
 def _constant(said: Sequence[float]) -> Deviation:

@@ -55,7 +55,7 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
             return f"{channel.name} is missing"
         low, high = find_plausible_range(channel, zero)
         # a plain float needs no further look: a nan fails every comparison, an infinity those with finite bounds
-        if not ((type(value) is float or _is_number(value)) and low <= value <= high):  # type: ignore[operator]
+        if not ((type(value) is float or is_number(value)) and low <= value <= high):  # type: ignore[operator]
             return f"{channel.name} = {value} {channel.unit} is not plausible"
         if math.isnan(zero) and channel.quantity == "temperature":
             undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
@@ -90,7 +90,7 @@ def explain_untimely(reading: Reading, last: float | None, now: float, limits: L
     -------
     str
     """
-    if not (_is_number(reading.time) and _is_number(now)):
+    if not (is_number(reading.time) and is_number(now)):
         return f"time {reading.time} or clock {now} is not a number"
     if reading.time > now + CLOCK_SKEW:
         return f"reading is {reading.time - now:.1f} s ahead of the clock"
@@ -117,5 +117,6 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
     return low, high
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number, and no truth value."""
     return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)

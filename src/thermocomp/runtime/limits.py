@@ -35,6 +35,25 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
     return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))
 
 
+def fade_share(idle: float, dt: float, limits: Limits) -> float:
+    """Return what is left of a correction that nothing drives, after one more step.
+
+    Parameters
+    ----------
+    idle : float
+        Since when nothing drives it [s].
+    dt : float
+        Time that counts in this step [s].
+    limits : Limits
+
+    Returns
+    -------
+    float
+        1 while it is held.
+    """
+    return math.exp(-dt / limits.fade) if idle > limits.hold and dt > 0 else 1.0
+
+
 def limit_line(
     target: Correction, current: Correction, travel: tuple[float, float], dt: float, limits: Limits
 ) -> Correction:

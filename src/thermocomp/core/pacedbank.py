@@ -1,0 +1,38 @@
+"""The states of paced models: lags of temperatures, and of powers of the speed, at a pace that the speed sets."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+class Bank(NamedTuple):
+    """What the states of a `PacedDynamic` follow, and how fast."""
+
+    temperatures: IntArray  #: (n_temperatures,), inputs that are temperatures
+    taus: int  #: lags of each
+    speeds: IntArray  #: (n_states,), inputs of the speed states
+    powers: FloatArray  #: (n_states,)
+    rates: FloatArray  #: (n_lags + n_states,), at rest [1/s]
+    gain: FloatArray  #: (n_states,), what the rate grows by to top speed [1/s]
+    top: float  #: [1/min]
+
+    def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the states follow, (..., n_memory), and the share of top speed of each speed state."""
+        share = np.abs(change[..., self.speeds]) / self.top
+        temperatures = change[..., self.temperatures]
+        return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share
+
+    def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
+        """Return the states `dt` seconds later, the inputs having changed to `change`."""
+        signals, share = self.signals(change)
+        lags = len(self.rates) - len(self.gain)
+        rates = np.empty(signals.shape)
+        rates[..., :lags] = self.rates[:lags]
+        rates[..., lags:] = self.rates[lags:] + share * self.gain
+        return lagbank.follow(memory, signals, dt * rates)

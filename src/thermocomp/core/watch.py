@@ -1,0 +1,185 @@
+"""`Watch`: what each temperature reads by the others and the spindle speed, and how far off it may be."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.bounds import (
+    DEGREE,
+    ENTRIES,
+    GAP,
+    INPUTS,
+    LEAST,
+    RANGE,
+    READING,
+    check_between,
+    check_count,
+    check_finite,
+)
+from thermocomp.core.exceptions import SettingError
+from thermocomp.core.inputs import Input
+from thermocomp.core.pacedbank import Bank
+from thermocomp.core.zero import FIRST_READING, Zeroing
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: how long a jump or a difference has to last before it is a failure [s]
+LASTING = 300.0
+#: error that is reckoned with at least where differences are weighed [degC]
+LEAST_UNSEEN = 0.05
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A temperature, as the others predict it, and what of its readings is not to be believed.
+
+    Parameters
+    ----------
+    input : int
+        Index into the inputs of the watch.
+    weights : tuple of float
+        Read-out of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC]; of itself 0.
+    off : float
+        It is off when it is further from its prediction [degC].
+    jump : float
+        It has jumped when it changes by more within `Watch.pace` [degC].
+    moved : float
+        It is stuck when its prediction moves by more while it reads the same [degC].
+    still : float
+        It is stuck when it reads the same for longer, the others changing [s].
+    unseen : float
+        Root mean square error of its prediction in cycles that were left out [degC].
+    """
+
+    input: int
+    weights: tuple[float, ...]
+    off: float
+    jump: float
+    moved: float
+    still: float
+    unseen: float
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Predictions of temperatures by each other and by states of the spindle speed, with limits: see `PacedDynamic`.
+
+    Parameters
+    ----------
+    inputs : tuple of Input
+        Temperatures and speeds, in this order.
+    zeroing : Zeroing
+        Over how long their zero is averaged.
+    time_constants : tuple of float
+        Of the lags, the same for all temperatures [s].
+    top_speed : float
+        [1/min]
+    states : tuple of (int, float, float, float)
+        Of the speed: input, power, time constants at rest and at top speed [s].
+    sensors : tuple of Watched
+        One per temperature, in the order of the inputs.
+    pace : float
+        Time over which a jump is one [s].
+
+    Raises
+    ------
+    SettingError
+        A number is not in its range, or the parts do not fit together.
+    """
+
+    inputs: tuple[Input, ...]
+    zeroing: Zeroing = FIRST_READING
+    time_constants: tuple[float, ...] = ()
+    top_speed: float = 1.0
+    states: tuple[tuple[int, float, float, float], ...] = ()
+    sensors: tuple[Watched, ...] = ()
+    pace: float = 60.0
+
+    def __post_init__(self) -> None:
+        check_count("watch", INPUTS, inputs=self.inputs)
+        names = [i.name for i in self.inputs]
+        if len(set(names)) != len(names):
+            raise SettingError(f"watch: an input is named twice in {names}")
+        heat = [k for k, i in enumerate(self.inputs) if i.quantity == "temperature"]
+        if [s.input for s in self.sensors] != heat:
+            raise SettingError("watch: want one sensor per temperature, in the order of the inputs")
+        if any(not 0 <= s[0] < len(names) or self.inputs[s[0]].quantity != "spindle_speed" for s in self.states):
+            raise SettingError("watch: a speed state is of no spindle speed")
+        parts = len(heat) * (1 + len(self.time_constants)) + len(self.states)
+        if any(len(s.weights) != parts for s in self.sensors):
+            raise SettingError(f"watch: want {parts} weights per sensor, one per part")
+        lagged = len(heat) * (1 + len(self.time_constants))
+        if any(any(s.weights[k : lagged : len(heat)]) for k, s in enumerate(self.sensors)):
+            raise SettingError("watch: a temperature is predicted by itself")
+        check_count("watch", ENTRIES, weights=[w for s in self.sensors for w in s.weights])
+        check_finite("watch", weights=[w for s in self.sensors for w in s.weights])
+        slow, fast = [s[2] for s in self.states], [s[3] for s in self.states]
+        check_between(
+            "watch", LEAST, GAP, time_constants=self.time_constants, stopped=slow, running=fast, pace=self.pace
+        )
+        check_between("watch", LEAST, DEGREE, power=[s[1] for s in self.states])
+        check_between("watch", LEAST, RANGE, top_speed=self.top_speed)
+        for name in ("off", "jump", "moved"):
+            check_between("watch", LEAST, READING, **{name: [getattr(s, name) for s in self.sensors]})
+        check_between("watch", 0.0, READING, unseen=[s.unseen for s in self.sensors])
+        check_between("watch", LEAST, GAP, still=[s.still for s in self.sensors])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the temperatures."""
+        return tuple(self.inputs[s.input].name for s in self.sensors)
+
+    @cached_property
+    def bank(self) -> Bank:
+        """What its states follow."""
+        stopped = [1 / slow for _, _, slow, _ in self.states]
+        lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
+        return Bank(
+            np.array([s.input for s in self.sensors], dtype=np.intp),
+            len(self.time_constants),
+            np.array([s[0] for s in self.states], dtype=np.intp),
+            np.array([s[1] for s in self.states], dtype=np.float64),
+            np.array(lags + stopped, dtype=np.float64),
+            np.array([1 / s[3] - k for s, k in zip(self.states, stopped, strict=True)], dtype=np.float64),
+            self.top_speed,
+        )
+
+    @cached_property
+    def read_out(self) -> tuple[FloatArray, FloatArray]:
+        """Read-outs of the temperatures, (n_sensors, n_sensors), and of the states, (n_memory, n_sensors)."""
+        table = np.array([s.weights for s in self.sensors], dtype=np.float64).reshape(len(self.sensors), -1).T
+        return table[: len(self.sensors)], table[len(self.sensors) :]
+
+    @cached_property
+    def signatures(self) -> FloatArray:
+        """What one degree in one sensor does to the differences of all, at once and in the end, (2, n, n), by row."""
+        n = len(self.sensors)
+        direct, states = self.read_out
+        lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)
+        return np.stack([np.eye(n) - direct, np.eye(n) - direct - lagged])
+
+    def limits(self, what: str) -> FloatArray:
+        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or what is unseen of it."""
+        return self._limits[what]
+
+    @cached_property
+    def _limits(self) -> dict[str, FloatArray]:
+        names = ("off", "jump", "moved", "still", "unseen")
+        found = {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
+        found["unseen"] = np.maximum(found["unseen"], LEAST_UNSEEN)
+        return found
+
+    @cached_property
+    def speeds(self) -> IntArray:
+        """Inputs that are spindle speeds."""
+        return np.array([k for k, i in enumerate(self.inputs) if i.quantity == "spindle_speed"], dtype=np.intp)
+
+    @cached_property
+    def ranges(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Trained range of each temperature and its width, (n_sensors,) each [degC]."""
+        own = [self.inputs[s.input] for s in self.sensors]
+        low, high = np.array([i.low for i in own]), np.array([i.high for i in own])
+        return low, high, high - low

@@ -1,0 +1,142 @@
+"""How a watch over the temperatures is trained: each predicted by the others, as `averaged` predicts a displacement."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from thermocomp.core.watch import LASTING, Watch, Watched
+from thermocomp.core.zero import STANDS
+from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
+from thermocomp.models.numerics.folds import halve, number_folds
+from thermocomp.models.numerics.structures import fit_each, share_out
+from thermocomp.models.pacedfeatures import PacedFeatures, usual_step
+from thermocomp.recording.samples import Samples
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+#: noise of the temperatures that predict, as `averaged` reckons with it [degC]
+NOISE = 0.2
+#: structures that a prediction is the average of
+STRUCTURES = 100
+#: limits are so many times the largest that was seen where all was well, and with few cycles more
+SAFETY = 1.5
+#: the same of jumps: an untried speed warms up faster
+FASTEST = 2.0
+#: least limits: off, within a minute, moved while stuck [degC]
+OFF, JUMP, MOVED = 1.0, 0.8, 0.5
+#: a reading that stays the same is stuck after so many times the longest that was seen, and not before [s]
+STILL_TIMES, STILL = 3.0, 1200.0
+#: time over which a jump is one, at least [s]
+PACE = 60.0
+#: how far a speed may be beyond those it was learned at
+FASTER = 1.02
+
+
+def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
+    """Return the watch over the temperatures of a recording.
+
+    Parameters
+    ----------
+    samples : Samples
+        With the inputs that will be there on the machine.
+    learn : ndarray of bool of shape (n_rows,)
+        Rows that may be learned from.
+
+    Returns
+    -------
+    Watch or None
+        None with fewer than two thermal cycles or two temperatures: nothing is known of an unseen one.
+    """
+    rows = samples.valid & np.isin(samples.test, samples.test[learn & samples.valid])
+    samples = samples.take(rows)
+    learn = learn[rows] & (samples.cycle >= 0)
+    heat = [k for k, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    speeds = [k for k, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    if len(heat) < 2 or not learn.any():
+        return None
+    samples = samples.only([samples.inputs[k].name for k in heat + speeds])
+    heat = [k for k, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    speeds = [k for k, c in enumerate(samples.inputs) if c.quantity == "spindle_speed"]
+    change, step = samples.change(), samples.dt()
+    folds, _ = number_folds(np.where(learn, samples.cycle, -1), len(samples))
+    count = int(folds.max()) + 1
+    if count < 2:
+        return None
+    of = PacedFeatures.of(change, step, folds >= 0, speeds, lags=LAGS, powers=POWERS, stopped=STOPPED, running=RUNNING)
+    turning = np.abs(change[:, speeds]).max(axis=1, initial=0.0) > STANDS
+    parts, _ = halve(folds, turning)
+    moments = of.moments(change, change[:, heat], step, parts, NOISE)
+    every = np.unique(parts[parts >= 0])
+    without = [np.setdiff1d(every, parts[folds == k]) for k in range(count)]
+    weights = np.zeros((1 + count, len(of), len(heat)))  # of all, and without each cycle
+    for k in range(len(heat)):
+        structures = of.draw(STRUCTURES, 0, [j for j in range(len(heat)) if j != k])
+        own = replace(moments, cross=moments.cross[:, :, [k]], power=moments.power[:, [k]])
+        shares, _ = share_out(own, structures)
+        for row, kept in enumerate((every, *without)):
+            weights[row, :, k] = (shares * fit_each(own, structures, kept)[..., 0]).sum(axis=0)
+    predicted = np.full((len(samples), len(heat)), np.nan)
+    known = _covered(np.abs(change[:, speeds]).max(axis=1, initial=0.0), folds, samples.test)
+    start = 0
+    for table in of.tables(change, step):
+        mine = np.where(known, folds, -1)[start : start + len(table)]
+        for k in range(count):
+            predicted[start : start + len(table)][mine == k] = table[mine == k] @ weights[1 + k]
+        start += len(table)
+    pace = max(PACE, usual_step(step)) if np.isfinite(usual_step(step)) else PACE
+    inputs = samples.model_inputs(range(len(samples.inputs)), learn)
+    wider = SAFETY * (1.0 + 1.0 / count)
+    sensors = []
+    for place, k in enumerate(heat):
+        off = change[:, k] - predicted[:, place]
+        still, moved = _same(samples.values[:, k], predicted[:, place], samples.time, folds)
+        limits = {
+            "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
+            "jump": max(JUMP, FASTEST * _jump(change[:, k], samples.time, folds, pace)),
+            "moved": max(MOVED, SAFETY * moved),
+            "still": max(STILL, STILL_TIMES * still),
+            "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
+        }
+        numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
+        sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
+    return Watch(inputs, samples.zeroing, of.lags, of.top_speed, of.states, tuple(sensors), pace)
+
+
+def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
+    """Return the rows of whose speed the other cycles know: until a test turns faster than all of them."""
+    found = np.ones(len(speed), dtype=np.bool_)
+    for k in range(int(folds.max()) + 1):
+        others = (folds >= 0) & (folds != k)
+        faster = (folds == k) & (speed > FASTER * speed[others].max(initial=0.0))
+        for t in np.unique(test[faster]):
+            own = (folds == k) & (test == t)
+            own[: np.flatnonzero(faster & own)[0]] = False
+            found &= ~own
+    return found
+
+
+def _jump(values: FloatArray, time: FloatArray, folds: IntArray, pace: float) -> float:
+    """Return the largest change within `pace` that lasts, in rows that were learned from."""
+    usual = max(float(np.median(np.diff(time)[np.diff(time) > 0])), 1e-9)
+    lasting = median_filter(values, size=1 + 2 * round(LASTING / 2 / usual), mode="nearest")
+    largest = 0.0
+    for shift in range(1, 1 + max(1, round(pace / usual))):
+        gap = time[shift:] - time[:-shift]
+        near = (gap > 0) & (gap <= 1.01 * pace) & (folds[shift:] >= 0) & (folds[:-shift] >= 0)
+        largest = max(largest, float(np.abs(lasting[shift:] - lasting[:-shift])[near].max(initial=0.0)))
+    return largest
+
+
+def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:
+    """Return how long a sensor read the same at most, and how far its prediction moved meanwhile."""
+    new = np.append(True, (np.diff(values) != 0) | (np.diff(folds) != 0) | (np.diff(time) <= 0))
+    run = np.cumsum(new) - 1
+    first = np.flatnonzero(new)
+    known = (folds >= 0) & np.isfinite(predicted)
+    longest = float((time - time[first[run]])[known].max(initial=0.0))
+    moved = float(np.abs(predicted - predicted[first[run]])[known].max(initial=0.0))
+    return longest, moved

@@ -1,0 +1,46 @@
+"""What the watch over the temperatures can do, and what a lost sensor costs, in words."""
+
+from collections.abc import Iterator, Sequence
+
+from thermocomp.core.model import ErrorModel
+
+#: a sensor that may be further off than this before it is found is named [degC]
+FAR = 3.0
+
+
+def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
+    """Yield lines about models that are watched over: what each lost sensor costs, and which are watched badly.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+        Of one file.
+
+    Yields
+    ------
+    str
+    """
+    watch = next((m.watch for m in models if m.watch is not None), None)
+    if watch is None:
+        return
+    for model in models:
+        found = model.honest_error
+        single = {} if found is None else {n: v for n, v in found.lost.items() if ", " not in n}
+        stood = {n: v for n, v in single.items() if n in watch.names and model.may_lose([n])}
+        if found is None or not single:
+            continue
+        said = []
+        if stood:
+            worst = max(stood, key=lambda n: stood[n])
+            said.append(
+                f"one temperature lost and stood in for leaves at most {stood[worst]:.2f} {model.unit} ({worst})"
+            )
+        if gone := [n for n in single if n not in stood]:
+            said.append(f"without {', '.join(gone)} its correction is held, then fades")
+        yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
+    blind = [f"{n} ({s.off:.1f} degC)" for n, s in zip(watch.names, watch.sensors, strict=True) if s.off > FAR]
+    if blind:
+        yield (
+            f"Slow drift of {', '.join(blind)} is found only from there on: the others and the speed do not predict it "
+            "better; a spare beside it would"
+        )

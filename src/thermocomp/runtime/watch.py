@@ -1,0 +1,321 @@
+"""The watch over the temperatures, reading by reading: which is believed, and what stands in for one that is not.
+
+State in, state out; leading axes are a batch of independent runs with the same clock. Only the past is used. A sensor
+that is missing is replaced at once by its prediction from the others and the speed; one that jumped, that is stuck or
+that is off, as soon as that is sure. What stands in begins where the sensor was and moves over to the prediction:
+nothing jumps. A sensor that was missing is believed again when it reads what is predicted; the others are until a
+restart, for a sensor that failed once is repaired, not believed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.watch import LASTING, Watch
+from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int8]
+
+#: what a sensor is, by `WatchState.fault`
+WORDS = ("good", "missing", "stepped", "stuck", "off")
+GOOD, MISSING, STEPPED, STUCK, OFF = range(len(WORDS))
+
+#: between two looks at the differences, at least: temperatures are slow [s]
+TICK = 10.0
+#: how far a speed may be beyond those of the training until nothing is said of differences
+FASTER = 1.02
+#: how long a sensor that was missing has to read what is predicted until it is believed again [s]
+RETURN = 600.0
+#: how fast what stands in moves over to the prediction, and how slow what is usual of the difference [s]
+FADE, USUAL = 3600.0, 1800.0
+#: after a failure, its traces in the predictions of the others have to fade before another one is found by them [s]
+REST = 3600.0
+
+
+class WatchState(NamedTuple):
+    """All that the watch remembers between two readings; arrays are (..., n_sensors) where nothing else is said."""
+
+    reference: FloatArray  #: (..., n_inputs), what counts as zero; nan until it is known
+    gathered: Gathered  #: readings that it is averaged of
+    time: float  #: of the last look; nan before the first [s]
+    memory: FloatArray  #: (..., n_memory), of the predictions
+    traces: FloatArray  #: (..., n_lags * n_sensors), lags of the differences: what a failure leaves in `memory`
+    used: FloatArray  #: what was believed, minus the reference [degC]
+    predicted: FloatArray  #: minus the reference [degC]
+    usual: FloatArray  #: difference between reading and prediction, low-passed [degC]
+    fault: IntArray  #: see `WORDS`
+    since: FloatArray  #: when the fault was found [s]
+    bridge: FloatArray  #: what stands in is that much beside the prediction, fading from `since` on [degC]
+    jumped: FloatArray  #: when it jumped; nan: it did not [s]
+    off: FloatArray  #: since when it is off; nan: it is not [s]
+    same: FloatArray  #: what it reads since `still` [degC]
+    still: FloatArray  #: since when it reads the same [s]
+    then: FloatArray  #: what was predicted then [degC]
+    moving: FloatArray  #: since when its prediction has moved too far for that; nan: it has not [s]
+    back: FloatArray  #: since when one that was missing reads what is predicted; nan: it does not [s]
+    fast: FloatArray  #: (...,), when the spindle last turned faster than in the training [s]
+
+
+def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ...] = ()) -> WatchState:
+    """Return the state of a watch that has seen no reading.
+
+    Parameters
+    ----------
+    watch : Watch
+    reference : ndarray of shape (n_inputs,), optional
+        What counts as zero; without it the first readings decide for inputs with ``rezero``.
+    runs : tuple of int
+        Shape of a batch of runs.
+    """
+    zero = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
+    zero = np.broadcast_to(zero if reference is None else reference, (*runs, len(watch.inputs))).copy()
+    n, bank = (*runs, len(watch.sensors)), watch.bank
+    nan, none = np.full(n, np.nan), np.zeros(n)
+    memory = np.zeros((*runs, len(bank.rates)))
+    traces = np.zeros((*runs, len(watch.time_constants) * len(watch.sensors)))
+    return WatchState(
+        *(zero, Gathered(), np.nan, memory, traces, none, none, none, np.zeros(n, dtype=np.int8)),
+        *(nan, none, nan, nan, nan, nan, none, nan, nan),
+        np.full(runs, -np.inf),
+    )
+
+
+def look(
+    watch: Watch, state: WatchState, time: float, values: FloatArray, *, resting: bool = False
+) -> tuple[WatchState, FloatArray]:
+    """Take a reading in and give what is to be believed of it.
+
+    Parameters
+    ----------
+    watch : Watch
+    state : WatchState
+        From `begin` or the previous `look`.
+    time : float
+        Of the reading, later than the last [s].
+    values : ndarray of shape (..., n_inputs)
+        In the order of the watch's inputs; nan where a value is missing. Without its speeds nothing is predicted: it
+        is passed on as it is.
+    resting : bool
+        The spindle is known to stand.
+
+    Returns
+    -------
+    state : WatchState
+    values : ndarray of shape (..., n_inputs)
+        With something in the place of each temperature that is not believed.
+    """
+    heat = watch.bank.temperatures
+    believed = values.copy()
+    if not np.isfinite(values[..., watch.speeds]).all():
+        return state, believed
+    zero = state.reference[..., heat]
+    if np.isnan(zero).any():
+        believed[..., heat] = _made_up(watch, values[..., heat])
+        state = _gather(watch, state, time, believed, resting)
+        return state, believed
+    x = values[..., heat] - zero
+    missing = ~_plausible(watch, x, values[..., heat])
+    if time - state.time >= TICK:
+        state = _step(watch, state, time, np.where(missing, np.nan, x), values)
+    if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
+        believed[..., heat] = np.where(replaced, zero + state.used, values[..., heat])
+    return state, believed
+
+
+def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
+    """Return the first readings; one that cannot be is as far from its training's zero as the others are on average.
+
+    What can be is what the gate of the compensator lets pass as a start.
+    """
+    zero = np.array([watch.inputs[s.input].reference for s in watch.sensors])
+    span = np.maximum(watch.ranges[2], MIN_SPAN)
+    least, most = PLAUSIBLE["temperature"]
+    with np.errstate(all="ignore"):
+        offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
+        middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
+        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan comes last
+        fits = np.abs(offset - day) <= span
+    return np.where(fits, values, zero + np.clip(day, -DAY, DAY))
+
+
+def _gather(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
+    gathered = state.gathered
+    if gathered.belongs(watch.zeroing, time, resting):
+        gathered = gathered.add(time, values, resting)
+        if not gathered.complete(watch.zeroing):
+            return state._replace(gathered=gathered)
+    zero = np.where(np.isnan(state.reference), robust_mean(gathered.values), state.reference)
+    change = values - zero
+    change[..., watch.bank.temperatures] = 0.0
+    memory = watch.bank.signals(change)[0]
+    n = state.used.shape
+    return state._replace(
+        reference=zero, gathered=Gathered(), time=time, memory=memory, still=np.full(n, time), same=np.full(n, np.nan)
+    )
+
+
+def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
+    """Return which temperatures are numbers that a machine can have: as the gate of the compensator sees it."""
+    low, high, width = watch.ranges
+    span = np.maximum(width, MIN_SPAN)
+    least, most = PLAUSIBLE["temperature"]
+    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # nan is not
+    return np.asarray(within)
+
+
+def _stand_in(state: WatchState, time: float) -> FloatArray:
+    """Return what stands in for a sensor, minus the reference."""
+    gone = np.nan_to_num(time - state.since, nan=0.0)
+    return state.predicted + state.bridge * np.exp(-gone / FADE)
+
+
+def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
+    """Look at all sensors; `x` is nan where a temperature is missing."""
+    dt, seen = time - state.time, np.isfinite(x)
+    good = state.fault == GOOD
+    s = state._replace(time=time)
+    s = _jumps(watch, s, x, dt, seen & good)
+    s = _missing(s, seen, good)
+    bridged = s.usual + s.predicted
+    waiting = np.isfinite(s.jumped) & (s.fault == GOOD)
+    used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, np.nan_to_num(x)))
+    change = values - s.reference
+    change[..., watch.bank.temperatures] = used
+    memory = watch.bank.advance(s.memory, change, dt)
+    direct, weights = watch.read_out
+    predicted = used @ direct + memory @ weights
+    used = np.where(s.fault != GOOD, _stand_in(s._replace(predicted=predicted), time), used)
+    difference = np.where(seen, x - predicted, np.nan)
+    calm = (s.fault == GOOD) & seen & ~waiting
+    inner = np.where(calm, difference, 0.0)
+    usual = np.where(calm, lagbank.follow(s.usual, inner, np.full(inner.shape, dt / USUAL)), s.usual)
+    taus = np.repeat(watch.time_constants, len(watch.sensors))
+    traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
+    s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
+    s = _stuck(watch, s, x, calm)
+    s = _off(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
+    return _returns(watch, s, difference)
+
+
+def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> WatchState:
+    """Find jumps, those that were spikes, and those that last."""
+    limit = watch.limits("jump") * max(1.0, dt / watch.pace)
+    waiting = np.isfinite(s.jumped)
+    with np.errstate(invalid="ignore"):
+        before = np.where(waiting, s.predicted + s.usual, s.used)
+        far = able & (np.abs(x - before) > limit)
+    fresh = far & ~waiting
+    lasts = far & waiting & (s.time - s.jumped >= LASTING)
+    jumped = np.where(far, np.where(fresh, s.time, s.jumped), np.where(able, np.nan, s.jumped))
+    s = s._replace(jumped=jumped)
+    return _fail(watch, s, lasts, STEPPED, s.usual)
+
+
+def _missing(s: WatchState, seen: BoolArray, good: BoolArray) -> WatchState:
+    lost = ~seen & good & (s.fault == GOOD)
+    return s._replace(
+        fault=np.where(lost, MISSING, s.fault).astype(np.int8),
+        since=np.where(lost, s.time, s.since),
+        bridge=np.where(lost, s.usual, s.bridge),
+        back=np.where(lost, np.nan, s.back),
+        jumped=np.where(lost, np.nan, s.jumped),
+    )
+
+
+def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> WatchState:
+    """Find what reads the same though its prediction moves, or though all others have changed for long."""
+    same = x == s.same
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(s.predicted - s.then)
+    fresh = ~same
+    s = s._replace(
+        same=np.where(fresh, x, s.same),
+        still=np.where(fresh, s.time, s.still),
+        then=np.where(fresh, s.predicted, s.then),
+    )
+    moves = same & calm & (apart > watch.limits("moved"))
+    moving = np.where(moves, np.where(np.isfinite(s.moving), s.moving, s.time), np.nan)
+    s = s._replace(moving=moving)
+    lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all stand still: not the logger
+    long = same & calm & lives & (s.time - s.still > watch.limits("still"))
+    found = (moves & (s.time - moving >= LASTING)) | long
+    return _fail(watch, s, found, STUCK, x - s.then)
+
+
+def _off(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> WatchState:
+    """Find which sensor is off where differences are too large: the one whose failure explains them all."""
+    z = np.where(calm, difference, 0.0) / watch.limits("off")
+    recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
+    beyond = (np.abs(z) > 1.0) & (s.time - recent > REST) & (s.time - s.fast[..., None] > REST)
+    off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
+    s = s._replace(off=off)
+    with np.errstate(invalid="ignore"):
+        lasting = (s.time - off >= LASTING).any(axis=-1)
+    if not lasting.any():
+        return s
+    weights, limits = watch.limits("unseen"), watch.limits("off")
+    scaled = np.where(calm, difference, 0.0) / weights
+    best, guilty = np.full(z.shape[:-1], np.inf), np.zeros(z.shape[:-1], dtype=np.intp)
+    worst = np.full(z.shape[:-1], np.inf)  # of what is left, in units of the limits
+    for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
+        amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
+        left = scaled[..., :, None] - shape * amount[..., None, :]
+        rest = (left**2).sum(axis=-2)
+        rest[~calm] = np.inf
+        place = rest.argmin(axis=-1)[..., None]
+        value = np.take_along_axis(rest, place, axis=-1)[..., 0]
+        most = np.take_along_axis(np.abs(left * (weights / limits)[:, None]).max(axis=-2), place, axis=-1)[..., 0]
+        better = value < best
+        best, guilty = np.where(better, value, best), np.where(better, place[..., 0], guilty)
+        worst = np.where(better, most, worst)
+    sure = lasting & (worst <= 1.0)  # else no single failure explains it: the machine is unlike its training
+    found = sure[..., None] & (np.arange(z.shape[-1]) == guilty[..., None])
+    return _fail(watch, s, found, OFF, np.zeros(z.shape))
+
+
+def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
+    """Return when the spindle last turned faster than in the training: what is predicted then is not known to hold."""
+    faster = (np.abs(change[..., watch.speeds]) > FASTER * watch.top_speed).any(axis=-1)
+    return np.where(faster, s.time, s.fast)
+
+
+def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
+    """Believe a sensor again that was missing and reads what is predicted."""
+    with np.errstate(invalid="ignore"):
+        fits = (s.fault == MISSING) & (np.abs(difference) <= watch.limits("off"))
+        back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
+        again = fits & (s.time - back >= RETURN)
+    return s._replace(
+        fault=np.where(again, GOOD, s.fault).astype(np.int8),
+        since=np.where(again, np.nan, s.since),
+        usual=np.where(again, difference, s.usual),
+        used=np.where(again, s.predicted + difference, s.used),
+        same=np.where(again, np.nan, s.same),
+        back=np.where(again, np.nan, back),
+    )
+
+
+def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: FloatArray) -> WatchState:
+    """Take sensors out of use; what their last readings did to the predictions is taken back."""
+    if not found.any():
+        return s
+    n, lags = len(watch.sensors), len(watch.time_constants)
+    traces = np.where(np.tile(found, lags), s.traces, 0.0) if lags else s.traces
+    memory = s.memory.copy()
+    memory[..., : n * lags] -= traces
+    offset = np.where(np.isfinite(bridge), bridge, 0.0)
+    return s._replace(
+        memory=memory,
+        traces=s.traces - traces,
+        fault=np.where(found, fault, s.fault).astype(np.int8),
+        since=np.where(found, s.time, s.since),
+        bridge=np.where(found, offset, s.bridge),
+        used=np.where(found, s.predicted + offset, s.used),
+        jumped=np.where(found, np.nan, s.jumped),
+        off=np.where(found.any(axis=-1, keepdims=True) & (fault == OFF), np.nan, s.off),
+    )

@@ -1,0 +1,257 @@
+"""The watch over the temperatures: found in time, nothing accused that is sound, and nothing jumps."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from smallmachine import small_machine
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import ModelFileError, SettingError
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import RULES, HonestError
+from thermocomp.core.reading import Reading
+from thermocomp.core.watch import Watch
+from thermocomp.datasets import virtual
+from thermocomp.files import modelfile
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.watch import GOOD, MISSING, OFF, STEPPED, STUCK, WORDS, WatchState, begin, look
+
+FloatArray = NDArray[np.float64]
+SIX = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")
+
+
+@pytest.fixture(scope="module")
+def samples() -> Samples:
+    """The virtual machine, a row a minute; the fourth cycle is not learned from."""
+    whole = stack(virtual.record("demo"), ["z_um", "y1_um"])
+    return whole.take(np.arange(len(whole)) % 3 == 0).only([*SIX, "spindle_rpm"])
+
+
+@pytest.fixture(scope="module")
+def watch(samples: Samples) -> Watch:
+    found = find_watch(samples, samples.cycle != 3)
+    assert found is not None
+    return found
+
+
+def run(watch: Watch, samples: Samples, values: FloatArray) -> tuple[WatchState, FloatArray, FloatArray, FloatArray]:
+    """Return the last state, what was found first and when per run and sensor, and what was let through."""
+    runs = values.shape[1]
+    state, through = begin(watch, runs=(runs,)), np.empty_like(values)
+    first, when = np.zeros((runs, len(watch.sensors))), np.full((runs, len(watch.sensors)), np.nan)
+    for k, time in enumerate(samples.time.tolist()):
+        state, through[k] = look(watch, state, time, values[k], resting=bool(samples.stands[k]))
+        new = (state.fault != GOOD) & (first == GOOD)
+        first[new], when[new] = state.fault[new], time
+    return state, first, when, through
+
+
+def disturbed(samples: Samples, row: int) -> FloatArray:
+    """Return one sound run, and one per sensor and kind of failure from a row on, (n_rows, n_runs, n_inputs)."""
+    n, count = len(SIX), 1 + 4 * len(SIX)
+    values = np.repeat(samples.values[:, None], count, axis=1)
+    hours = (samples.time[row:] - samples.time[row]) / 3600.0
+    for k in range(n):
+        values[row:, 1 + k, k] = np.nan
+        values[row:, 1 + n + k, k] += 3.0
+        values[row:, 1 + 2 * n + k, k] = values[row, 0, k]
+        values[row:, 1 + 3 * n + k, k] += hours
+    return values
+
+
+@pytest.mark.parametrize("row", [950, 1030, 1100])
+def test_failures_are_found_in_time_and_the_sound_are_not_accused(watch: Watch, samples: Samples, row: int) -> None:
+    """In a cycle that was not learned from: dead at once, 3 degC in 10 min, stuck in 30 min, 1 degC/h before 3 degC."""
+    assert samples.cycle[row] == 3
+    n = len(SIX)
+    _, found, when, _ = run(watch, samples, disturbed(samples, row))
+    assert not found[0].any()
+    delay = when - samples.time[row]
+    for k in range(n):
+        for place, (fault, most) in enumerate([(MISSING, 0.0), (STEPPED, 600.0), (STUCK, 1800.0), (OFF, 3 * 3600.0)]):
+            mine = found[1 + place * n + k]
+            assert WORDS[int(mine[k])] == WORDS[fault]
+            assert delay[1 + place * n + k, k] <= most
+            assert not np.delete(mine, k).any()
+
+
+def test_a_faster_spindle_than_in_the_training_is_no_failure(samples: Samples) -> None:
+    unknown = find_watch(samples, samples.cycle != 4)  # 3200 1/min, the others up to 2800
+    assert unknown is not None
+    _, found, _, _ = run(unknown, samples, samples.values[:, None])
+    assert not found.any()
+
+
+def test_what_stands_in_does_not_jump_and_stays_near(watch: Watch, samples: Samples) -> None:
+    row = 1000
+    values = disturbed(samples, row)
+    _, _, _, through = run(watch, samples, values)
+    for k in range(len(SIX)):
+        stands_in, true = through[row:, 1 + k, k], samples.values[row:, k]
+        assert abs(stands_in[0] - true[0]) < 0.5
+        assert np.abs(np.diff(stands_in)).max() < 0.3 + np.abs(np.diff(true)).max()
+        assert np.sqrt(np.mean((stands_in - true) ** 2)) < 1.0
+    others = [j for j in range(samples.values.shape[1]) if j != 0]
+    assert np.array_equal(through[:, 1][:, others], values[:, 1][:, others])
+
+
+def test_many_runs_at_once_are_what_each_is_alone(watch: Watch, samples: Samples) -> None:
+    values = disturbed(samples, 900)[:1300]
+    part = samples.take(np.arange(1300))
+    _, found, when, through = run(watch, part, values)
+    for k in (0, 1, 9, 15, 22):
+        _, own, at, let = run(watch, part, values[:, k : k + 1])
+        assert np.array_equal(own[0], found[k])
+        assert np.array_equal(at[0], when[k], equal_nan=True)
+        assert np.allclose(let[:, 0], through[:, k], rtol=0, atol=1e-9)
+
+
+def test_a_sensor_that_comes_back_is_believed_again_and_one_that_failed_is_not(watch: Watch, samples: Samples) -> None:
+    values = disturbed(samples, 800)[:, [1, 1 + len(SIX)]]  # the first is missing, or 3 degC off
+    values[860:] = samples.values[860:, None]
+    state, _, _, through = run(watch, samples, values)
+    assert state.fault[:, 0].tolist() == [GOOD, STEPPED]
+    assert np.array_equal(through[-1, 0], samples.values[-1])
+
+
+def test_a_spike_is_no_failure(watch: Watch, samples: Samples) -> None:
+    values = np.repeat(samples.values[:, None], 1, axis=1)
+    values[900:903, 0, 1] += 6.0
+    state, found, _, through = run(watch, samples, values)
+    assert not found.any()
+    assert np.isnan(state.jumped).all()
+    assert np.abs(through[900:903, 0, 1] - samples.values[900:903, 1]).max() < 1.0
+
+
+def test_a_machine_that_is_unlike_its_training_accuses_nobody(watch: Watch, samples: Samples) -> None:
+    """Everything reads 4 degC more within an hour: no single sensor explains it."""
+    values = np.repeat(samples.values[:, None], 1, axis=1)
+    values[700:, 0, :-1] += np.minimum(np.arange(len(samples) - 700) / 15.0, 4.0)[:, None] * np.arange(1, 7) / 3
+    _, found, _, _ = run(watch, samples, values)
+    assert (found[0] == OFF).sum() <= 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_whatever_is_read_what_is_let_through_is_finite(watch: Watch, data: st.DataObject) -> None:
+    state, time = begin(watch), 0.0
+    zero = [i.reference for i in watch.inputs]
+    for _ in range(40):
+        time += data.draw(st.sampled_from([1e-6, 1.0, 15.0, 60.0, 1e5, 1e9]))
+        bad = st.sampled_from([math.nan, math.inf, -math.inf, 1e300, -273.0, 0.0])
+        values = np.array(
+            [data.draw(bad | st.floats(z - 30, z + 30)) for z in zero[:-1]] + [data.draw(st.floats(0, 5000))]
+        )
+        state, through = look(watch, state, time, values)
+        assert np.isfinite(through).all()
+        assert (through[:-1] < 1e4).all()
+
+
+def test_a_single_test_is_watched_by_stretches_and_one_temperature_by_nothing() -> None:
+    whole = stack([small_machine()], ["z_um"])
+    assert find_watch(whole.only(["t1_C", "spindle_rpm"]), whole.cycle >= 0) is None
+    assert find_watch(whole, np.zeros(len(whole), dtype=np.bool_)) is None
+    found = find_watch(whole, whole.cycle == 0)
+    assert found is not None
+    assert found.names == ("t1_C", "t2_C", "t3_C")
+
+
+# -- in a compensator --------------------------------------------------------------------------------------------------
+
+
+def judged(model: ErrorModel, watch: Watch, lost: dict[str, float]) -> ErrorModel:
+    honest = HonestError(
+        "cycles", 1.0, 1.0, 3.0, 5.0, 6.0, {"a": 1.0, "b": 1.0, "c": 1.0}, "accepted", "", 3, rules=RULES, lost=lost
+    )
+    return replace(model, watch=watch, honest_error=honest)
+
+
+def test_a_dead_sensor_does_not_freeze_the_correction(watch: Watch, samples: Samples) -> None:
+    learn = samples.cycle != 3
+    lost = dict.fromkeys(SIX, 1.5)
+    model = judged(train("averaged", samples, 0, learn).model, watch, lost)
+    machine = Compensator.of([model], Limits(rate=1.0, reading_age=120.0))
+    names = [c.name for c in samples.inputs]
+    state, left, held = machine.start(), [], []
+    for k in range(1250):
+        values = dict(zip(names, samples.values[k].tolist(), strict=True))
+        if k >= 900:
+            values["t_motor_C"] = math.nan
+        if k >= 1200:
+            del values["t_table_C"]
+        time = float(samples.time[k])
+        state, said = machine.step(state, Reading(time, values), time)
+        left.append(samples.deviations[k, 0] + said.corrections["z_um"].offset)
+        held.append(said.held.get("z_um", ""))
+        assert not said.rejected
+    assert said.failed == {"t_motor_C": "missing", "t_table_C": "missing"}
+    rms = np.sqrt(np.mean(np.square(left[900:1200])))
+    assert rms < 0.3 * np.sqrt(np.mean(samples.deviations[900:1200, 0] ** 2))
+    assert not any(held[:1200])
+    assert "was not judged without" in held[1210]  # two of them
+
+
+def test_what_nothing_drives_is_held_and_then_fades(watch: Watch, samples: Samples) -> None:
+    model = judged(train("averaged", samples, 0, samples.cycle != 3).model, watch, {})
+    limits = Limits(rate=10.0, reading_age=60.0, hold=600.0, fade=1200.0)
+    machine = Compensator.of([model], limits)
+    names = [c.name for c in samples.inputs]
+    state, found, words = machine.start(), [], []
+    for k in range(500):
+        values = dict(zip(names, samples.values[min(k, 300)].tolist(), strict=True))
+        if k > 300:
+            values["t_motor_C"] = math.nan
+        time = float(samples.time[k])
+        state, said = machine.step(state, Reading(time, values), time)
+        found.append(said.corrections["z_um"].offset)
+        words.append(said.held.get("z_um", ""))
+    assert abs(found[300]) > 5.0
+    assert found[301:310] == [found[300]] * 9
+    assert words[305].startswith("held")
+    assert words[400].startswith("fading, not driven for ")
+    assert abs(found[-1]) < 0.02 * abs(found[300])
+    assert np.abs(np.diff(found[300:])).max() < 0.06 * abs(found[300])
+
+
+def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Samples) -> None:
+    models = [judged(train("ols", samples, k, samples.cycle != 3).model, watch, {SIX[0]: 2.0}) for k in (0, 1)]
+    text = modelfile.dumps(models)
+    assert text.count('"sensors"') == 1
+    assert modelfile.loads(text) == tuple(models)
+    with pytest.raises(ModelFileError, match="in different ways"):
+        modelfile.dumps([models[0], replace(models[1], watch=None)])
+    with pytest.raises(ModelFileError, match="checksum"):
+        modelfile.loads(text.replace('"off": 1.0', '"off": 9.0', 1))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"off": math.nan}, "off"),
+        ({"jump": 0.0}, "jump"),
+        ({"still": -1.0}, "still"),
+        ({"weights": (1.0,)}, "weights per sensor"),
+        ({"input": 3}, "one sensor per temperature"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused(watch: Watch, change: dict[str, Any], says: str) -> None:
+    with pytest.raises(SettingError, match=says):
+        replace(watch, sensors=(replace(watch.sensors[0], **change), *watch.sensors[1:]))
+
+
+def test_no_temperature_is_predicted_by_itself(watch: Watch) -> None:
+    first = watch.sensors[0]
+    for place in (0, len(SIX)):
+        own = tuple(0.1 if k == place else w for k, w in enumerate(first.weights))
+        with pytest.raises(SettingError, match="by itself"):
+            replace(watch, sensors=(replace(first, weights=own), *watch.sensors[1:]))
