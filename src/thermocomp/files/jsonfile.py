@@ -37,18 +37,20 @@ class Format:
         What to call it.
     command : str
         What writes it.
+    shared : tuple of str
+        What may stand once for all of its models.
     """
 
     name: str
     version: int
     words: str
     command: str
+    shared: tuple[str, ...] = ()
 
 
-MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit")
+MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit", ("watch",))
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
 _STRICT = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
-_HEAD = ("format", "version", "sha256", "models")
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 
 
@@ -113,7 +115,7 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> Any
     if not isinstance(body, list) or not body:
         raise ModelFileError(f"{source}: holds no model")
     try:
-        found_digest = digest(body, {k: v for k, v in content.items() if k not in _HEAD})
+        found_digest = digest(body, {k: content[k] for k in kind.shared if k in content})
     except (ValueError, RecursionError) as e:  # 1e999, half a character, a hundred brackets
         raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
     if content.get("sha256") != found_digest:
