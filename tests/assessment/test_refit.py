@@ -95,4 +95,4 @@ def test_the_demo_is_unproven_for_the_model_that_would_be_written() -> None:
     assert [a.word for a in compare(mine, ["dynamic"], judging, refit=False).overall()] == ["accepted"]
     (found,) = compare(mine, ["dynamic"], judging).overall()
     assert found.word == "unproven"
-    assert "with loss of t_enclosure_C" in found.reason
+    assert "with loss of spindle_rpm" in found.reason
