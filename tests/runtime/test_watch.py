@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from smallmachine import small_machine
 
-from thermocomp.core.correction import Limits
+from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import ModelFileError, SettingError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
@@ -24,6 +24,7 @@ from thermocomp.models.watching import find_watch
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.limits import fade
 from thermocomp.runtime.watch import GOOD, MISSING, OFF, STEPPED, STUCK, WORDS, WatchState, begin, look
 
 FloatArray = NDArray[np.float64]
@@ -203,7 +204,7 @@ def test_a_dead_sensor_does_not_freeze_the_correction(watch: Watch, samples: Sam
 
 def test_what_nothing_drives_is_held_and_then_fades(watch: Watch, samples: Samples) -> None:
     model = judged(train("averaged", samples, 0, samples.cycle != 3).model, watch, {})
-    limits = Limits(rate=10.0, reading_age=60.0, hold=600.0, fade=1200.0)
+    limits = Limits(rate=10.0, reading_age=60.0, hold=600.0, fade=1200.0, dead_band=2.0)
     machine = Compensator.of([model], limits)
     names = [c.name for c in samples.inputs]
     state, found, words = machine.start(), [], []
@@ -221,6 +222,46 @@ def test_what_nothing_drives_is_held_and_then_fades(watch: Watch, samples: Sampl
     assert words[400].startswith("fading, not driven for ")
     assert abs(found[-1]) < 0.02 * abs(found[300])
     assert np.abs(np.diff(found[300:])).max() < 0.06 * abs(found[300])
+
+
+def test_a_clock_that_leaps_makes_nothing_fade(watch: Watch, samples: Samples) -> None:
+    """One reading that comes with a clock years ahead counts for no more than its age may be."""
+    model = judged(train("averaged", samples, 0, samples.cycle != 3).model, watch, {})
+    machine = Compensator.of([model], Limits(rate=10.0, reading_age=120.0))
+    names, state, before = [c.name for c in samples.inputs], machine.start(), 0.0
+    for k in range(300):
+        time = float(samples.time[k])
+        values = dict(zip(names, samples.values[k].tolist(), strict=True))
+        state, said = machine.step(state, Reading(time, values), time)
+        before = said.corrections["z_um"].offset
+    state, said = machine.step(state, Reading(time + 60.0, values), 1e9)
+    assert said.rejected
+    assert said.held["z_um"].startswith("held, not driven for 120 s")
+    assert said.corrections["z_um"].offset == before != 0.0
+
+
+def test_no_fade_is_faster_than_the_rate() -> None:
+    limits, now = Limits(rate=0.001, hold=1.0, fade=1.0), Correction(40.0, slope=-30.0, reference_position=100.0)
+    after = fade(now, (0.0, 500.0), 2.0, 5.0, limits)
+    moved = [abs(after.at(p) - now.at(p)) for p in (0.0, 250.0, 500.0)]
+    assert max(moved) == pytest.approx(0.005)
+    assert fade(now, (0.0, 500.0), 1.0, 5.0, limits) == fade(now, (0.0, 500.0), 9.0, 0.0, limits) == now
+
+
+def test_a_coarse_sensor_at_rest_for_days_is_not_stuck(samples: Samples) -> None:
+    """Of 0.5 degC: it reads the same all night, and its neighbours do not."""
+    heat = [c.quantity == "temperature" for c in samples.inputs]
+    coarse = replace(samples, values=np.where(heat, np.round(2 * samples.values) / 2, samples.values))
+    found = find_watch(coarse, coarse.cycle >= 0)
+    assert found is not None
+    state, names = begin(found), set[int]()
+    rng = np.random.default_rng(0)
+    for k in range(3000):
+        rest = coarse.values[0].copy()
+        rest[:-1] += 0.5 * (rng.random(len(SIX)) < [0.3, 0, 0, 0, 0.3, 0])  # two flicker between digits
+        state, _ = look(found, state, 60.0 * k, rest, resting=True)
+        names |= set(np.flatnonzero(state.fault).tolist())
+    assert not names
 
 
 def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Samples) -> None:

@@ -49,7 +49,7 @@ class Watched:
     moved : float
         It is stuck when its prediction moves by more while it reads the same [degC].
     still : float
-        It is stuck when it reads the same for longer, the others changing [s].
+        It is stuck when it reads the same for longer, another one changing; `GAP` where time says nothing of that [s].
     unseen : float
         Root mean square error of its prediction in cycles that were left out [degC].
     """

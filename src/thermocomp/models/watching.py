@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from thermocomp.core.bounds import GAP
 from thermocomp.core.watch import LASTING, Watch, Watched
 from thermocomp.core.zero import STANDS
 from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
@@ -26,10 +27,10 @@ STRUCTURES = 100
 SAFETY = 1.5
 #: the same of jumps: an untried speed warms up faster
 FASTEST = 2.0
-#: least limits: off, within a minute, moved while stuck [degC]
+#: least limits: off, within a minute, moved while stuck, beside the resolution [degC]
 OFF, JUMP, MOVED = 1.0, 0.8, 0.5
-#: a reading that stays the same is stuck after so many times the longest that was seen, and not before [s]
-STILL_TIMES, STILL = 3.0, 1200.0
+#: a reading that stays the same for so long is stuck, if in the recording none did for a part of that [s; -]
+STILL, STILL_PART = 1200.0, 1 / 3
 #: time over which a jump is one, at least [s]
 PACE = 60.0
 #: how far a speed may be beyond those it was learned at
@@ -97,8 +98,9 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         limits = {
             "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
             "jump": max(JUMP, FASTEST * _jump(change[:, k], samples.time, folds, pace)),
-            "moved": max(MOVED, SAFETY * moved),
-            "still": max(STILL, STILL_TIMES * still),
+            "moved": max(MOVED + _resolution(samples.values[:, k]), SAFETY * moved),
+            # one that is coarse for its noise reads the same for days on a machine at rest: time says nothing of it
+            "still": STILL if still <= STILL_PART * STILL else GAP,
             "unseen": float(np.sqrt(np.nanmean(off**2))) if np.isfinite(off).any() else 0.0,
         }
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
@@ -129,6 +131,12 @@ def _jump(values: FloatArray, time: FloatArray, folds: IntArray, pace: float) ->
         near = (gap > 0) & (gap <= 1.01 * pace) & (folds[shift:] >= 0) & (folds[:-shift] >= 0)
         largest = max(largest, float(np.abs(lasting[shift:] - lasting[:-shift])[near].max(initial=0.0)))
     return largest
+
+
+def _resolution(values: FloatArray) -> float:
+    """Return the usual smallest step of a sensor: of one that is noisier than its last digit, its noise."""
+    steps = np.abs(np.diff(values))
+    return float(np.quantile(steps[steps > 0], 0.1)) if steps.any() else 0.0
 
 
 def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Gathered, find_zero, first_rows, robust_mean
 from thermocomp.runtime.gate import explain_implausible, find_plausible_range
-from thermocomp.runtime.limits import fade_share, limit_offset
+from thermocomp.runtime.limits import fade, limit_offset
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -215,13 +215,14 @@ def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: L
     """Return minus the correction in force after each reading; it stays zero until the row `known`."""
     if limits is None:
         return np.where(np.arange(len(time)) < known, 0.0, deviation)
-    found, offset, driven = np.zeros(len(time)), 0.0, math.nan
+    found, offset, idle = np.zeros(len(time)), 0.0, 0.0
     travels = np.minimum(np.diff(time, prepend=time[:1]), limits.reading_age).tolist()
     for k in range(known, len(time)):
         if passed[k] and math.isfinite(deviation[k]):
             wanted = Correction.opposing(Deviation(float(deviation[k])))
-            offset, driven = limit_offset(wanted.offset, offset, travels[k], limits), float(time[k])
-        elif (share := fade_share(float(time[k]) - driven, travels[k], limits)) < 1.0:
-            offset = limit_offset(share * offset, offset, travels[k], limits)
+            offset, idle = limit_offset(wanted.offset, offset, travels[k], limits), 0.0
+        else:
+            idle += travels[k]
+            offset = fade(Correction(offset), (0.0, 0.0), idle, travels[k], limits).offset
         found[k] = 0.0 - offset
     return found

@@ -26,7 +26,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import Gathered, robust_mean
 from thermocomp.runtime.gate import explain_implausible, explain_untimely, is_number
-from thermocomp.runtime.limits import fade_share, limit_line
+from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.watch import WORDS, WatchState, begin, look
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import best_line, best_lines
@@ -44,7 +44,7 @@ class CompensatorState(NamedTuple):
     clock: float | None  #: the latest at which a step was taken, whatever the gate said [s]
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
     watch: WatchState | None  #: over the temperatures; None if nothing watches
-    driven: dict[str, float]  #: when a model last drove each target or axis, on the clock [s]
+    idle: dict[str, float]  #: how long no model has driven each target or axis; not there: one drives it [s]
 
 
 class Compensated(NamedTuple):
@@ -238,7 +238,7 @@ class Compensator:
                 said[k] = float(deviation)
                 outside += _beyond(model, memory, values)
             states[k] = memory
-        corrections, driven, held = dict(state.corrections), dict(state.driven), dict[str, str]()
+        corrections, idle, held = dict(state.corrections), dict(state.idle), dict[str, str]()
         for target, line in self.lines.items():
             told = said[line.models]
             if failed and (why := _unjudged(self.models[line.models], failed)):
@@ -246,8 +246,8 @@ class Compensator:
             elif all(map(math.isfinite, told)):
                 wanted = Correction.opposing(line.deviation(told))
                 corrections[target] = limit_line(wanted, corrections[target], line.travel, travel, self.limits)
-                driven[target] = _later(state.clock, now)
-        new = state._replace(models=tuple(states), corrections=corrections, gathered=tuple(begins), driven=driven)
+                idle.pop(target, None)
+        new = state._replace(models=tuple(states), corrections=corrections, gathered=tuple(begins), idle=idle)
         new, held = self._idle(new, now, held)
         return new._replace(time=reading.time), Compensated(
             new.corrections, "", tuple(dict.fromkeys(outside)), failed, held
@@ -273,16 +273,16 @@ class Compensator:
         if not math.isfinite(now):
             return state, held
         clock = _later(state.clock, now)
+        # one reading counts for no more than its age may be: a clock that leaps makes nothing fade
         travel = 0.0 if state.clock is None else min(clock - state.clock, self.limits.reading_age)
-        corrections, said = dict(state.corrections), dict[str, str]()
+        corrections, idle, said = dict(state.corrections), dict(state.idle), dict[str, str]()
         for target, why in held.items():
-            idle = clock - state.driven.get(target, clock)
-            share, old = fade_share(idle, travel, self.limits), corrections[target]
-            if share < 1.0:
-                aim = Correction(share * old.offset, share * old.slope, old.reference_position)
-                corrections[target] = limit_line(aim, old, self.lines[target].travel, travel, self.limits)
-            said[target] = f"{'fading' if share < 1.0 else 'held'}, not driven for {idle:.0f} s: {why}"
-        return state._replace(corrections=corrections, clock=clock), said
+            idle[target] = idle.get(target, 0.0) + travel
+            ends = self.lines[target].travel
+            corrections[target] = fade(corrections[target], ends, idle[target], travel, self.limits)
+            word = "fading" if idle[target] > self.limits.hold else "held"
+            said[target] = f"{word}, not driven for {idle[target]:.0f} s: {why}"
+        return state._replace(corrections=corrections, clock=clock, idle=idle), said
 
 
 def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:

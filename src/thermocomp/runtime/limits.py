@@ -35,23 +35,31 @@ def limit_offset(target: float, current: float, dt: float, limits: Limits) -> fl
     return max(-limits.magnitude, min(limits.magnitude, current + math.copysign(reach, target - current)))
 
 
-def fade_share(idle: float, dt: float, limits: Limits) -> float:
-    """Return what is left of a correction that nothing drives, after one more step.
+def fade(current: Correction, travel: tuple[float, float], idle: float, dt: float, limits: Limits) -> Correction:
+    """Let a correction that nothing drives go to zero once it was held for long: no faster than the rate allows.
 
     Parameters
     ----------
+    current : Correction
+    travel : tuple of float
+        Ends of the travel [mm].
     idle : float
-        Since when nothing drives it [s].
+        So long nothing has driven it [s].
     dt : float
         Time that counts in this step [s].
     limits : Limits
 
     Returns
     -------
-    float
-        1 while it is held.
+    Correction
+        The same while it is held.
     """
-    return math.exp(-dt / limits.fade) if idle > limits.hold and dt > 0 else 1.0
+    if not (idle > limits.hold and dt > 0):
+        return current
+    share, largest = math.exp(-dt / limits.fade), max(abs(current.at(p)) for p in travel)
+    if largest * (1.0 - share) > limits.rate * dt:
+        share = 1.0 - limits.rate * dt / largest
+    return Correction(share * current.offset, share * current.slope, current.reference_position)
 
 
 def limit_line(
