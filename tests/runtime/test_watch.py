@@ -248,6 +248,26 @@ def test_no_fade_is_faster_than_the_rate() -> None:
     assert fade(now, (0.0, 500.0), 1.0, 5.0, limits) == fade(now, (0.0, 500.0), 9.0, 0.0, limits) == now
 
 
+@pytest.mark.parametrize("known", ["absolute", "stated"])
+def test_a_zero_that_is_known_is_watched_from_the_first_reading(samples: Samples, watch: Watch, known: str) -> None:
+    """Temperatures as they are, and counted from a zero that is stated."""
+    if known == "absolute":
+        found = find_watch(replace(samples, rezero=False), samples.cycle != 3)
+        assert found is not None
+        state = begin(found, runs=(2,))
+    else:
+        found, state = watch, begin(watch, samples.reference()[0], (2,))
+    first = samples.values[0].copy()
+    for k in range(1100):
+        values = np.repeat(samples.values[k][None], 2, axis=0)
+        values[1, 0] = np.nan if k >= 600 else values[1, 0]
+        state, through = look(found, state, float(samples.time[k]), values, resting=bool(samples.stands[k]))
+        assert state.time == samples.time[k]
+    assert not state.fault[0].any()
+    assert state.fault[1].tolist() == [MISSING, 0, 0, 0, 0, 0]
+    assert abs(through[1, 0] - samples.values[1099, 0]) < 1.5 < abs(through[1, 0] - first[0])
+
+
 def test_a_coarse_sensor_at_rest_for_days_is_not_stuck(samples: Samples) -> None:
     """Of 0.5 degC: it reads the same all night, and its neighbours do not."""
     heat = [c.quantity == "temperature" for c in samples.inputs]

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.replay import given_zero
 from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recording.samples import Samples
@@ -39,7 +40,7 @@ class Guard:
         return Guard(self.watch, moved)
 
 
-def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray, *, watch: Watch | None = None) -> Guard | None:
+def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | None:
     """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
 
     Parameters
@@ -49,15 +50,13 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray, *, watch: Wa
         Rows that the watch may learn from.
     rows : ndarray of bool of shape (n_rows,)
         Rows that are judged: their tests are gone through.
-    watch : Watch, optional
-        One that is there already.
 
     Returns
     -------
     Guard or None
         None if nothing can be watched; see `thermocomp.models.watching.find_watch`.
     """
-    watch = watch or find_watch(samples, learn)
+    watch = find_watch(samples, learn)
     if watch is None:
         return None
     together = combinations(watch.names, 2) if len(watch.names) <= FEW else ()
@@ -90,7 +89,7 @@ def _go_through(
 ) -> None:
     """Go through a test, the sensors of each row of `cut` reading as their zero; put what is let through in place."""
     zero = samples.reference()[samples.test[mine[0]]][columns] if mine.size else np.empty(0)
-    state = begin(watch, runs=(len(cut),))
+    state = begin(watch, given_zero(samples, columns, samples.test[mine[0]]) if mine.size else None, (len(cut),))
     for row in mine.tolist():
         values = np.where(cut, zero, samples.values[row, columns])
         state, found[:, row] = look(watch, state, float(samples.time[row]), values, resting=bool(samples.stands[row]))

@@ -86,7 +86,7 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
             within and replace(within, reading_age=max(within.reading_age, step)),
             time,
             samples.values[mine][:, columns],
-            reference=_reference(samples, columns, test),
+            reference=given_zero(samples, columns, test),
             resting=samples.stands[mine],
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
         )
@@ -109,7 +109,8 @@ def believe(watch: Watch | None, samples: Samples, rows: BoolArray) -> Samples:
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
     for test in np.unique(samples.test[rows]).tolist():
         mine = np.flatnonzero(samples.test == test)
-        state = begin(watch)
+        zero = given_zero(samples, places, test) if all(known) else None
+        state = begin(watch, zero)
         for row in mine.tolist():
             given = np.full(len(watch.inputs), np.nan)
             given[known] = samples.values[row, places]
@@ -173,7 +174,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
         def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
             return values[k] if disturb is None else disturb(k, values[k], zero)
 
-        state, head = _begun(model, samples, mine[usable[mine]], _reference(samples, columns, test), read)
+        state, head = _begun(model, samples, mine[usable[mine]], given_zero(samples, columns, test), read)
         last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
         shift: FloatArray | float | None = None if window.size else 0.0
         for k, needed in zip(
@@ -239,7 +240,7 @@ def _until(samples: Samples, rows: BoolArray, test: int, model: ErrorModel, colu
     return mine[:stop]
 
 
-def _reference(samples: Samples, columns: list[int], test: int) -> FloatArray | None:
+def given_zero(samples: Samples, columns: Sequence[int], test: int) -> FloatArray | None:
     """Return what counts as zero in a test, if that is given; without it the first readings decide."""
     given = samples.zero is not None and not np.isnan(samples.zero[test]).any()
     return samples.reference()[test, columns] if given else None

@@ -28,6 +28,8 @@ IntArray = NDArray[np.intp]
 
 #: how long a jump or a difference has to last before it is a failure [s]
 LASTING = 300.0
+#: how far a speed may be beyond those of the training until nothing is said of differences
+FASTER = 1.02
 #: error that is reckoned with at least where differences are weighed [degC]
 LEAST_UNSEEN = 0.05
 

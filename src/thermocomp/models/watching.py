@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from thermocomp.core.bounds import GAP
-from thermocomp.core.watch import LASTING, Watch, Watched
+from thermocomp.core.watch import FASTER, LASTING, Watch, Watched
 from thermocomp.core.zero import STANDS
 from thermocomp.models.averaged import LAGS, POWERS, RUNNING, STOPPED
 from thermocomp.models.numerics.folds import halve, number_folds
@@ -33,8 +33,6 @@ OFF, JUMP, MOVED = 1.0, 0.8, 0.5
 STILL, STILL_PART = 1200.0, 1 / 3
 #: time over which a jump is one, at least [s]
 PACE = 60.0
-#: how far a speed may be beyond those it was learned at
-FASTER = 1.02
 
 
 def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
-from thermocomp.core.watch import LASTING, Watch
+from thermocomp.core.watch import FASTER, LASTING, Watch
 from thermocomp.core.zero import Gathered, robust_mean
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
@@ -27,8 +27,6 @@ GOOD, MISSING, STEPPED, STUCK, OFF = range(len(WORDS))
 
 #: between two looks at the differences, at least: temperatures are slow [s]
 TICK = 10.0
-#: how far a speed may be beyond those of the training until nothing is said of differences
-FASTER = 1.02
 #: how long a sensor that was missing has to read what is predicted until it is believed again [s]
 RETURN = 600.0
 #: how fast what stands in moves over to the prediction, and how slow what is usual of the difference [s]
@@ -113,11 +111,10 @@ def look(
     believed = values.copy()
     if not np.isfinite(values[..., watch.speeds]).all():
         return state, believed
-    zero = state.reference[..., heat]
-    if np.isnan(zero).any():
+    if np.isnan(state.time):
         believed[..., heat] = _made_up(watch, values[..., heat])
-        state = _gather(watch, state, time, believed, resting)
-        return state, believed
+        return _start(watch, state, time, believed, resting), believed
+    zero = state.reference[..., heat]
     x = values[..., heat] - zero
     missing = ~_plausible(watch, x, values[..., heat])
     if time - state.time >= TICK:
@@ -132,8 +129,9 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
 
     What can be is what the gate of the compensator lets pass as a start.
     """
-    zero = np.array([watch.inputs[s.input].reference for s in watch.sensors])
-    span = np.maximum(watch.ranges[2], MIN_SPAN)
+    zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
+    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # what is absolute has none
+    span = np.maximum(width, MIN_SPAN)
     least, most = PLAUSIBLE["temperature"]
     with np.errstate(all="ignore"):
         offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
@@ -143,19 +141,32 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     return np.where(fits, values, zero + np.clip(day, -DAY, DAY))
 
 
-def _gather(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
-    gathered = state.gathered
-    if gathered.belongs(watch.zeroing, time, resting):
+def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
+    """Take a reading into the zero, if it is not known; begin where it is, at rest in it or in the first reading."""
+    gathered, heat = state.gathered, watch.bank.temperatures
+    unknown = bool(np.isnan(state.reference).any())
+    if unknown and gathered.belongs(watch.zeroing, time, resting):
         gathered = gathered.add(time, values, resting)
         if not gathered.complete(watch.zeroing):
             return state._replace(gathered=gathered)
-    zero = np.where(np.isnan(state.reference), robust_mean(gathered.values), state.reference)
+    zero = (
+        np.where(np.isnan(state.reference), robust_mean(gathered.values), state.reference)
+        if unknown
+        else state.reference
+    )
     change = values - zero
-    change[..., watch.bank.temperatures] = 0.0
-    memory = watch.bank.signals(change)[0]
-    n = state.used.shape
+    if unknown:
+        change[..., heat] = 0.0
+    memory, used = watch.bank.signals(change)[0], change[..., heat]
+    direct, weights = watch.read_out
     return state._replace(
-        reference=zero, gathered=Gathered(), time=time, memory=memory, still=np.full(n, time), same=np.full(n, np.nan)
+        reference=zero,
+        gathered=Gathered(),
+        time=time,
+        memory=memory,
+        used=used,
+        predicted=used @ direct + memory @ weights,
+        still=np.full(used.shape, time),
     )
 
 
@@ -177,10 +188,9 @@ def _stand_in(state: WatchState, time: float) -> FloatArray:
 def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
     """Look at all sensors; `x` is nan where a temperature is missing."""
     dt, seen = time - state.time, np.isfinite(x)
-    good = state.fault == GOOD
     s = state._replace(time=time)
-    s = _jumps(watch, s, x, dt, seen & good)
-    s = _missing(s, seen, good)
+    s = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
+    s = _missing(s, seen)
     bridged = s.usual + s.predicted
     waiting = np.isfinite(s.jumped) & (s.fault == GOOD)
     used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, np.nan_to_num(x)))
@@ -216,8 +226,8 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
     return _fail(watch, s, lasts, STEPPED, s.usual)
 
 
-def _missing(s: WatchState, seen: BoolArray, good: BoolArray) -> WatchState:
-    lost = ~seen & good & (s.fault == GOOD)
+def _missing(s: WatchState, seen: BoolArray) -> WatchState:
+    lost = ~seen & (s.fault == GOOD)
     return s._replace(
         fault=np.where(lost, MISSING, s.fault).astype(np.int8),
         since=np.where(lost, s.time, s.since),
