@@ -202,6 +202,26 @@ def test_a_dead_sensor_does_not_freeze_the_correction(watch: Watch, samples: Sam
     assert "was not judged without" in held[1210]  # two of them
 
 
+def test_models_of_two_files_are_watched_each_by_its_own(watch: Watch, samples: Samples) -> None:
+    other = find_watch(samples.only([*SIX[:3], "spindle_rpm"]), samples.cycle != 3)
+    assert other is not None
+    models = [
+        judged(train("ols", samples.only([*names, "spindle_rpm"]), k, samples.cycle != 3).model, w, {names[0]: 1.0})
+        for k, (w, names) in enumerate([(watch, SIX), (other, SIX[:3])])
+    ]
+    machine = Compensator.of(models, Limits(reading_age=120.0))
+    names, state = [c.name for c in samples.inputs], machine.start()
+    for k in range(700):
+        values = dict(zip(names, samples.values[k].tolist(), strict=True))
+        if k >= 600:
+            values[SIX[0]] = math.nan
+            values[SIX[5]] = math.inf  # only the first watch knows it
+        state, said = machine.step(state, Reading(float(samples.time[k]), values), float(samples.time[k]))
+        assert not said.rejected
+    assert said.failed == {SIX[0]: "missing", SIX[5]: "missing"}
+    assert list(said.held) == ["z_um"]
+
+
 def test_what_nothing_drives_is_held_and_then_fades(watch: Watch, samples: Samples) -> None:
     model = judged(train("averaged", samples, 0, samples.cycle != 3).model, watch, {})
     limits = Limits(rate=10.0, reading_age=60.0, hold=600.0, fade=1200.0, dead_band=2.0)

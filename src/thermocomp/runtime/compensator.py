@@ -43,7 +43,7 @@ class CompensatorState(NamedTuple):
     time: float | None  #: of the last reading that passed the gate [s]
     clock: float | None  #: the latest at which a step was taken, whatever the gate said [s]
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
-    watch: WatchState | None  #: over the temperatures; None if nothing watches
+    watches: tuple[WatchState, ...]  #: over the temperatures
     idle: dict[str, float]  #: how long no model has driven each target or axis; not there: one drives it [s]
 
 
@@ -90,10 +90,13 @@ class Compensator:
     limits: Limits = Limits()
 
     @cached_property
-    def watch(self) -> Watch | None:
-        """Over the temperatures of the models."""
-        found = [m.watch for m in self.models if m.watch is not None]
-        return found[0] if found and all(w == found[0] for w in found) else None
+    def watches(self) -> tuple[Watch, ...]:
+        """Over the temperatures of the models: one per model file."""
+        found: list[Watch] = []
+        for m in self.models:
+            if m.watch is not None and m.watch not in found:
+                found.append(m.watch)
+        return tuple(found)
 
     def __post_init__(self) -> None:
         for m in self.models:
@@ -166,8 +169,9 @@ class Compensator:
     def start(self) -> CompensatorState:
         """Return the state of a compensator that has seen no reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
+        watches = tuple(begin(w) for w in self.watches)
         return CompensatorState(
-            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), None, {}
+            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), watches, {}
         )
 
     def gate(self, state: CompensatorState, reading: Reading, now: float) -> str:
@@ -217,7 +221,7 @@ class Compensator:
         said : Compensated
         """
         state, reading = self._believe(state, reading, now)
-        failed = _failed(self.watch, state.watch)
+        failed = _failed(self.watches, state.watches)
         if rejected := self.gate(state, reading, now):
             state, held = self._idle(state, now, dict.fromkeys(self.lines, rejected))
             return state, Compensated(state.corrections, rejected, (), failed, held)
@@ -255,16 +259,17 @@ class Compensator:
 
     def _believe(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Reading]:
         """Return the reading with what stands in for temperatures that are not believed."""
-        if self.watch is None or explain_untimely(reading, state.time, now, self.limits):
+        if not self.watches or explain_untimely(reading, state.time, now, self.limits):
             return state, reading
-        given = [reading.values.get(i.name) for i in self.watch.inputs]
-        values = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
-        resting = self.watch.zeroing.stands(reading.values.get(self.watch.zeroing.speed))
-        before = begin(self.watch) if state.watch is None else state.watch
-        seen, believed = look(self.watch, before, reading.time, values, resting=resting)
-        heat = self.watch.bank.temperatures.tolist()
-        mended = {self.watch.inputs[k].name: float(believed[k]) for k in heat}
-        return state._replace(watch=seen), replace(reading, values={**reading.values, **mended})
+        values, states = dict(reading.values), []
+        for watch, before in zip(self.watches, state.watches, strict=True):
+            given = [values.get(i.name) for i in watch.inputs]
+            numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
+            resting = watch.zeroing.stands(values.get(watch.zeroing.speed))
+            seen, believed = look(watch, before, reading.time, numbers, resting=resting)
+            states.append(seen)
+            values |= {watch.inputs[k].name: float(believed[k]) for k in watch.bank.temperatures.tolist()}
+        return state._replace(watches=tuple(states)), replace(reading, values=values)
 
     def _idle(
         self, state: CompensatorState, now: float, held: dict[str, str]
@@ -292,11 +297,15 @@ def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
     return [] if model.distance(after, values) <= 1.0 else [TOGETHER]
 
 
-def _failed(watch: Watch | None, state: WatchState | None) -> dict[str, str]:
+def _failed(watches: Sequence[Watch], states: Sequence[WatchState]) -> dict[str, str]:
     """Return the sensors that are not believed, and what they are."""
-    if watch is None or state is None or not state.fault.any():
-        return {}
-    return {n: WORDS[k] for n, k in zip(watch.names, state.fault.tolist(), strict=True) if k}
+    return {
+        name: WORDS[fault]
+        for watch, state in zip(watches, states, strict=True)
+        if state.fault.any()
+        for name, fault in zip(watch.names, state.fault.tolist(), strict=True)
+        if fault
+    }
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
