@@ -11,6 +11,7 @@ from thermocomp.assessment import compare as comparing
 from thermocomp.assessment import do_no_harm, selecting
 from thermocomp.assessment import study as studies
 from thermocomp.assessment.choice import Settings
+from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.results import Assessment, Rules
 from thermocomp.assessment.sharing import shared_among
 from thermocomp.core.correction import Limits
@@ -270,6 +271,7 @@ def assess(
     mapping: str | Path | Mapping | None = None,
     harm_margin: float | None = None,
     limits: Limits = Limits(),
+    probing: str | Probings | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Assessed:
     """Judge frozen models on recordings: per cycle, with noise, with each sensor lost, outside their range.
@@ -286,6 +288,8 @@ def assess(
         Harm in a single unit that is let pass, stated before judging [um].
     limits : Limits
         Of the compensator that is judged with the models.
+    probing : str or Probings, optional
+        The tool point is probed while it runs, such as ``every 2 h``; what that says corrects the models from then on.
     progress : callable
         Called with a line of text per model.
 
@@ -318,7 +322,15 @@ def assess(
         models = (models,)
     tests = recordings_of(recordings, mapping)
     begun = starts_of(starts, tests)
-    judged = studies.assess(models, tests, rules=Rules(harm_margin), limits=limits, starts=begun, progress=progress)
+    judged = studies.assess(
+        models,
+        tests,
+        rules=Rules(harm_margin),
+        limits=limits,
+        starts=begun,
+        probings=Probings.parse(probing) if isinstance(probing, str) else probing,
+        progress=progress,
+    )
     return Assessed(judged, tuple(tests), tuple(trouble_of(tests)))
 
 

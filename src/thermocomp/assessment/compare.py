@@ -244,6 +244,7 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
                 alone=None if whole.alone is None else whole.alone[rows],
                 half_widths=half_widths,
                 band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",
+                probed=whole.probed and whole.probed.take(rows),
                 row=whole.row[rows],
                 test=whole.test[rows],
                 cycle=whole.cycle[rows],

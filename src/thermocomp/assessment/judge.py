@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.coverage import find_validity
 from thermocomp.assessment.guards import Guard
+from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.results import Assessment, Rules
 from thermocomp.assessment.robustness import stress
@@ -55,6 +56,7 @@ def judge(
     robustness: bool = True,
     limits: Limits | None = Limits(),
     guard: Guard | None = None,
+    probings: Probings | None = None,
 ) -> Assessment:
     """Judge a frozen model on a block: what a compensator with it would have left there.
 
@@ -82,6 +84,8 @@ def judge(
         Of the compensator; None: the model alone is judged.
     guard : Guard, optional
         What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
+    probings : Probings, optional
+        Made in the block.
 
     Returns
     -------
@@ -98,7 +102,7 @@ def judge(
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
     stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
-    ran = replay_compensated(model, samples, rows, limits or Limits())
+    ran = replay_compensated(model, samples, rows, limits or Limits(), probings)
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return refuse_method(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")
@@ -124,6 +128,7 @@ def judge(
         turned_away="" if limits is None else ran.why,
         half_widths=None if model.band is None else ran.half_width,
         band=model.band.words if model.band is not None and np.isfinite(ran.half_width).any() else "",
+        probed=ran.probed,
     )
 
 

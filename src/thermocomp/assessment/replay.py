@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.assessment.probing import Probed, Probings
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.watch import Watch
@@ -42,6 +43,8 @@ class Replayed:
         None: they were not applied, because the model does not predict micrometres.
     half_width : ndarray of shape (n_wanted,)
         Of the band about `deviation` [its unit]; nan where there is none.
+    probed : Probed or None
+        What probings did; None: there were none.
     """
 
     deviation: FloatArray
@@ -51,9 +54,16 @@ class Replayed:
     why: str
     limits: Limits | None
     half_width: FloatArray
+    probed: Probed | None = None
 
 
-def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, limits: Limits = Limits()) -> Replayed:
+def replay_compensated(
+    model: ErrorModel,
+    samples: Samples,
+    rows: BoolArray,
+    limits: Limits = Limits(),
+    probings: Probings | None = None,
+) -> Replayed:
     """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
 
     A live compensator gets its readings more often than every `Limits.reading_age`, however slowly a test was recorded:
@@ -67,6 +77,9 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
         Rows that are judged.
     limits : Limits
         Of the corrections [um]; a model of another unit runs without them, behind the gate.
+    probings : Probings, optional
+        Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
+        from the next row on.
 
     Returns
     -------
@@ -77,10 +90,17 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
     n, why = len(samples), ""
     deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
     outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
+    deviations = samples.deviations[:, [c.name for c in samples.targets].index(model.target)] if probings else None
+    at, shift, without, refused = np.zeros(n, dtype=np.bool_), np.zeros(n), np.zeros(n), list[str]()
     for test in np.unique(samples.test[rows]):
         mine = _until(samples, rows, test, model, columns)
         time, anew = samples.time[mine], samples.anew(test)
         step = float(np.median(np.diff(time))) if len(mine) > 1 else 0.0
+        probed = None
+        if probings is not None and deviations is not None:
+            made = probings.find_rows(time, rows[mine] & np.isfinite(deviations[mine]))
+            probed, at[mine[made]] = np.full(len(mine), np.nan), True
+            probed[made] = deviations[mine[made]]
         found = batch.run(
             model,
             within and replace(within, reading_age=max(within.reading_age, step)),
@@ -89,12 +109,19 @@ def replay_compensated(model: ErrorModel, samples: Samples, rows: BoolArray, lim
             reference=given_zero(samples, columns, test),
             resting=samples.stands[mine],
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
+            probed=probed,
+            repeatability=probings.repeatability if probings else 0.0,
         )
+        shift[mine], without[mine] = found.shift, found.without
+        refused += [f"{samples.test_names[test]}: {why}" for why in found.refused]
         deviation[mine], compensated[mine] = found.deviation, found.compensated
         outside[mine], rejected[mine], half_width[mine] = found.outside, found.rejected, found.half_width
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
-    return Replayed(deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows])
+    seen = Probed(probings, at[rows], shift[rows], without[rows], tuple(refused)) if probings else None
+    return Replayed(
+        deviation[rows], compensated[rows], outside[rows], rejected[rows], why, within, half_width[rows], seen
+    )
 
 
 def believe(watch: Watch | None, samples: Samples, rows: BoolArray) -> Samples:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.assessment import do_no_harm, metrics
 from thermocomp.assessment.diagnostics import Collinearity
+from thermocomp.assessment.probing import Probed
 from thermocomp.assessment.recommend import Recommendation
 from thermocomp.assessment.robustness import Robustness
 from thermocomp.core.correction import Limits
@@ -91,6 +92,8 @@ class Assessment:
         [um].
     band : str
         What the band is called; empty if no row has one.
+    probed : Probed or None
+        What probings did; None: there were none, the model ran on its readings alone.
     """
 
     model: str
@@ -118,6 +121,7 @@ class Assessment:
     turned_away: str = ""
     half_widths: FloatArray | None = None
     band: str = ""
+    probed: Probed | None = None
 
     @property
     def coverage(self) -> float:
@@ -147,6 +151,15 @@ class Assessment:
         """Return the metric of the model alone, without gate and limits."""
         alone = self.predicted if self.alone is None else self.alone
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
+
+    def unprobed_metric(self, name: str) -> float:
+        """Return the metric of what would run without probings."""
+        return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
+
+    def held_metric(self, name: str) -> float:
+        """Return the metric of probings without a model, each held until the next; without one, that of nothing."""
+        held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
+        return metrics.METRICS[name](self.measured, held)
 
     def none_metric(self, name: str) -> float:
         """Return the metric without compensation."""

@@ -15,6 +15,7 @@ from thermocomp.assessment.guards import find_guard
 from thermocomp.assessment.judge import cap_alike_units, judge
 from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.pieces import explain
+from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.refit import stress_written
 from thermocomp.assessment.replay import are_absolute
 from thermocomp.assessment.results import Assessment, Comparison, Rules
@@ -214,6 +215,7 @@ def assess(
     rules: Rules = Rules(),
     limits: Limits = Limits(),
     starts: Start | Sequence[Start] | None = None,
+    probings: Probings | None = None,
     progress: Callable[[str], None] = _silent,
 ) -> Judged:
     """Judge frozen models on recordings: per cycle, with noise, with lost sensors, outside the trained range.
@@ -232,6 +234,8 @@ def assess(
         Of the compensator that is judged with them.
     starts : Start or sequence of Start, optional
         How each recording begins, or all of them; found out if not given.
+    probings : Probings, optional
+        Made in the rows that are judged: see `thermocomp.runtime.adaptation`.
     progress : callable
         Called with a line of text per model.
 
@@ -242,11 +246,16 @@ def assess(
     Raises
     ------
     InputError
-        There is no model, a channel that all models need is not in the recordings, or it cannot be told how one of
-        these begins. A model that fails where others do not is refused.
+        There is no model, one that is to be probed was never judged, a channel that all models need is not in the
+        recordings, or it cannot be told how one of these begins. A model that fails where others do not is refused.
     """
     if not models:
         raise InputError("no model given: name a model file, or give at least one model")
+    if probings and (unknown := [m.target for m in models if m.honest_error is None]):
+        raise InputError(
+            f"model of {', '.join(unknown)} was never judged on cycles it has not seen: how much a probing says beside "
+            "it is not known; 'thermocomp fit' judges what it fits"
+        )
     found: list[Assessment] = []
     covered = None
     hashes = {h for m in models for h in _hashes(m)}
@@ -264,7 +273,7 @@ def assess(
         progress(f"{model.target} {model.family}")
         try:
             samples = _stacked(model, recordings, starts)
-            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits)
+            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits, probings)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
@@ -343,7 +352,9 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
     return model.provenance.data_sha256 if model.provenance else ()
 
 
-def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -> tuple[Assessment, Judging]:
+def _assess(
+    model: ErrorModel, samples: Samples, rules: Rules, limits: Limits, probings: Probings | None
+) -> tuple[Assessment, Judging]:
     """Judge a model on what it has not learned from; on everything if there is nothing else, and say so.
 
     Returns
@@ -365,7 +376,7 @@ def _assess(model: ErrorModel, samples: Samples, rules: Rules, limits: Limits) -
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    found = judge(_name(model), model, samples, split, rules=rules, limits=limits)
+    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings)
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging

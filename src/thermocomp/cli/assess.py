@@ -20,6 +20,7 @@ def assess(
     *,
     mapping: Path | None = None,
     harm_margin: float | None = None,
+    probing: str | None = None,
     compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     json: bool = False,
@@ -39,6 +40,9 @@ def assess(
         TOML file that says what the columns are.
     harm_margin : float
         Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+    probing : str
+        The tool point is probed while it runs, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with the probe's
+        repeatability (standard deviation; 0.5 um if not given): what it says corrects the model from then on.
     compensator : CompensatorOptions
         Its limits: what would run is judged, not the model alone.
     beginning : Beginning
@@ -54,10 +58,12 @@ def assess(
     """
     tests = read_recordings(recordings, mapping)
     from thermocomp.assessment import study as studies
+    from thermocomp.assessment.probing import Probings
     from thermocomp.assessment.results import Rules
     from thermocomp.cli import output as out
     from thermocomp.files import modelfile
 
+    probings = None if probing is None else Probings.parse(probing)
     models = modelfile.read(model)
     loudness.tell(f"read {model}: models of {', '.join(m.target for m in models)}")
     trouble = tell_trouble(tests)
@@ -68,6 +74,7 @@ def assess(
             rules=Rules(harm_margin),
             limits=compensator.limits(),
             starts=beginning.of(tests, mapping),
+            probings=probings,
             progress=progress,
         )
     out.show_assess(judged, trouble, console, as_json=json)

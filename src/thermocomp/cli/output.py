@@ -19,6 +19,7 @@ from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
+from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
 from thermocomp.simulation.protocol import Experiment
@@ -184,7 +185,11 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
             console.print(f"[yellow]but[/] {share} are outside the range {words(a.target)} was trained in")
         if a.robustness is not None and a.robustness.unlike > 0.1:
             console.print(f"[yellow]but[/] {words(a.target)}: {words(describe_unlike(a.robustness))}")
-    for line in [*describe_running(judged.overall()), *describe_bands(judged.models, judged.overall())]:
+    for line in [
+        *describe_running(judged.overall()),
+        *describe_bands(judged.models, judged.overall()),
+        *describe_probings(judged.overall()),
+    ]:
         console.print(words(line))
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     known = {name: v for name, v in fitted.items() if v is not None}

@@ -6,7 +6,7 @@ object is evaluated live, replayed in every assessment and written as JSON. Stat
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -131,9 +131,12 @@ class ErrorModel(ABC):
     def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
         """Return (memory, deviation) `dt` seconds later, the inputs having changed to `change`."""
 
-    def _spread(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002 - see `Band`
-        """Return the spread of the structures that the model is the average of, (...,) [unit]."""
-        return np.zeros(change.shape[:-1])
+    def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the main directions of what the structures differ in that the model is the average of, [unit].
+
+        (..., n_directions): the root of the sum of their squares is the structures' spread.
+        """
+        return np.zeros((*change.shape[:-1], 0))
 
     @abstractmethod
     def _expression(self, change: Sequence[Node]) -> Node:
@@ -153,6 +156,11 @@ class ErrorModel(ABC):
         found = self.honest_error
         key = ", ".join(i.name for i in self.inputs if i.name in names)
         return found is not None and key in found.lost and found.lost[key] <= found.none_rms
+
+    def widening(self, names: Collection[str]) -> float:
+        """Return how many times its error on unseen cycles grows without some of its inputs; at least 1."""
+        found, key = self.honest_error, ", ".join(i.name for i in self.inputs if i.name in names)
+        return 1.0 if found is None or not found.rms else max(1.0, found.lost.get(key, 0.0) / found.rms)
 
     # -- the one way in ----------------------------------------------------------------------------------------------
 
@@ -267,7 +275,28 @@ class ErrorModel(ABC):
         kept: FloatArray | float = 0.0
         if self.support.policy != "clip":
             kept = np.abs(self._advance(state.memory, change, 0.0)[1] - state.deviation)
-        return self.band.half_width(change, self._spread(state.memory, change)) + kept
+        spread = np.sqrt((self._directions(state.memory, change) ** 2).sum(axis=-1))
+        return self.band.half_width(change, spread) + kept
+
+    def directions(self, state: State, inputs: FloatArray) -> FloatArray:
+        """Return what the structures differ in that the model is the average of.
+
+        Parameters
+        ----------
+        state : State
+            After the step that took the reading in.
+        inputs : ndarray of shape (..., n_inputs)
+            The reading.
+
+        Returns
+        -------
+        ndarray of shape (..., n_directions)
+            [unit]; the deviation is off by a sum of these, each times a number that is 0 give or take 1. None in a
+            model that is no average.
+        """
+        change = self.change(state, inputs)
+        memory = self._begin(change) if state.memory is None else state.memory
+        return self._directions(memory, change)
 
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return what the model makes of a reading: inputs minus their reference, within the trained range."""

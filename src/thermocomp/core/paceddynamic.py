@@ -176,9 +176,9 @@ class PacedDynamic(ErrorModel):
         memory = self.bank.advance(memory, change, dt)
         return memory, change @ direct + memory @ weights + self.intercept
 
-    def _spread(self, memory: FloatArray, change: FloatArray) -> FloatArray:
+    def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:
         direct, lagged = self.spread_out
-        return np.asarray(np.sqrt(((change @ direct + memory @ lagged) ** 2).sum(axis=-1)))
+        return np.asarray(change @ direct + memory @ lagged)
 
     @cached_property
     def spread_out(self) -> tuple[FloatArray, FloatArray]:

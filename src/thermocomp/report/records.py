@@ -137,6 +137,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
         "readings_turned_away": a.rejected,
         "first_turned_away": a.turned_away,
         **_band(a),
+        **_probed(a),
     }
     if a.robustness is not None:
         r = a.robustness
@@ -151,6 +152,23 @@ def assessment(a: Assessment) -> dict[str, Any]:
             "outside_range_rms_um": r.outside_rms,
         }
     return content
+
+
+def _probed(a: Assessment) -> dict[str, Any]:
+    """Return what probings left, and what is left without them, or by them alone."""
+    if a.probed is None:
+        return {}
+    errors = {"rms": "rms_um", "mae": "mae_um"}
+    return {
+        "probings": {
+            "every_s": a.probed.plan.every,
+            "repeatability_um": a.probed.plan.repeatability,
+            "made": int(a.probed.at.sum()),
+            "refused": list(a.probed.refused),
+            "without": {key: a.unprobed_metric(name) for name, key in errors.items()},
+            "alone": {key: a.held_metric(name) for name, key in errors.items()},
+        }
+    }
 
 
 def _band(a: Assessment) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.zero import Gathered, find_zero, first_rows, robust_mean
+from thermocomp.runtime import adaptation
 from thermocomp.runtime.gate import explain_implausible, find_plausible_range
 from thermocomp.runtime.limits import fade, limit_offset
 
@@ -30,6 +31,9 @@ class ModelRun(NamedTuple):
     rejected: BoolArray  #: (n_rows,), complete readings that the gate turned away
     why: str  #: the first of them; empty if there is none
     half_width: FloatArray  #: (n_rows,), of the band about `deviation`; nan without one, and where that counts anew
+    shift: FloatArray  #: (n_rows,), what was learned from probings, and is in `compensated`
+    without: FloatArray  #: (n_rows,), `compensated` without any
+    refused: tuple[str, ...]  #: why probings were not used
 
 
 def run(
@@ -41,6 +45,8 @@ def run(
     reference: Sequence[float] | FloatArray | None = None,
     resting: BoolArray | None = None,
     anew: int | None = None,
+    probed: FloatArray | None = None,
+    repeatability: float = 0.5,
 ) -> ModelRun:
     """Run a model, and a compensator with it, through a test.
 
@@ -61,6 +67,10 @@ def run(
     anew : int, optional
         Row from which deviations count anew: from there it is the model minus what it says there, on average over the
         rows that a zero is taken of, and the correction begins at zero again.
+    probed : ndarray of shape (n_rows,), optional
+        Deviation that a probing says, nan where there was none: it counts from the next row on [um].
+    repeatability : float
+        Of the probe, standard deviation [um].
 
     Returns
     -------
@@ -70,16 +80,28 @@ def run(
     complete = np.asarray(np.isfinite(values).all(axis=1))
     gate = _gated(model, time, values, stands, model.init(reference).reference)
     zero, rested = find_test_zero(model, time, values, stands, complete, reference)
-    alone, outside, half_width = _said(model, time, rested, complete, zero, band=model.band is not None)
+    shown = _Shown(band=model.band is not None, directions=probed is not None)
+    alone = _said(model, time, rested, complete, zero, shown)
     same = np.array_equal(gate.passed, complete)
-    gated = alone if same else _said(model, time, *_of_gate(values, gate))[0]
+    gated = alone if same else _said(model, time, *_of_gate(values, gate), shown._replace(band=False))
     known = gate.known
     if anew is not None:
-        alone, _ = _counted(alone, model, time, complete, stands, anew)
-        half_width = np.full(len(time), np.nan)  # it is that of a deviation from the cold machine
-        gated, known = _counted(gated, model, time, gate.passed, stands, anew)
-    moved = _moved(gated, gate.passed, time, limits, known)
-    return ModelRun(alone, moved, outside, complete & ~gate.passed, gate.why, half_width)
+        counted, _ = _counted(alone.deviation, model, time, complete, stands, anew)
+        # the band is that of a deviation from the cold machine
+        alone = alone._replace(deviation=counted, half_width=np.full(len(time), np.nan))
+        counted, known = _counted(gated.deviation, model, time, gate.passed, stands, anew)
+        gated = gated._replace(deviation=counted)
+    turned = complete & ~gate.passed
+    moved = without = _moved(gated.deviation, gate.passed, time, limits, known)
+    shift, refused = np.zeros(len(time)), tuple[str, ...]()
+    if probed is not None:
+        later = np.arange(len(time)) >= known
+        alone, _, _ = _adapted(model, alone, time, np.where(complete & later, probed, np.nan), repeatability)
+        gated, shift, refused = _adapted(
+            model, gated, time, np.where(gate.passed & later, probed, np.nan), repeatability
+        )
+        moved = _moved(gated.deviation, gate.passed, time, limits, known)
+    return ModelRun(alone.deviation, moved, alone.outside, turned, gate.why, alone.half_width, shift, without, refused)
 
 
 def find_test_zero(
@@ -110,6 +132,18 @@ def find_test_zero(
         With the readings of the zero taken as their mean.
     """
     return find_zero(model.zeroing, model.init(reference).reference, time, values, resting, usable)
+
+
+class _Shown(NamedTuple):
+    band: bool
+    directions: bool
+
+
+class _Answers(NamedTuple):
+    deviation: FloatArray  #: (n_rows,)
+    outside: BoolArray  #: (n_rows,), an input was
+    half_width: FloatArray  #: (n_rows,), of the band; nan if it is not wanted
+    directions: FloatArray  #: (n_rows, n_directions); none if they are not wanted
 
 
 class _Gate(NamedTuple):
@@ -170,45 +204,58 @@ def _counted(
 
 
 def _said(
-    model: ErrorModel,
-    time: FloatArray,
-    values: FloatArray,
-    used: BoolArray,
-    zero: FloatArray,
-    *,
-    band: bool = False,
-) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Return deviation, whether an input was outside and the band's half-width, per row; an unused reading holds them.
-
-    Without `band` the half-width is nan.
-    """
+    model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
+) -> _Answers:
+    """Return what the model says per row; an unused reading holds it."""
     rows = np.flatnonzero(used)
-    deviation, outside, half_width = (
-        np.zeros(len(time)),
-        np.zeros(len(time), dtype=np.bool_),
-        np.full(len(time), np.nan),
-    )
+    nothing = np.full(len(time), np.nan)
+    found = _Answers(np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_), nothing, np.zeros((len(time), 0)))
     beyond: BoolArray
     if not rows.size:
-        return deviation, outside, half_width
+        return found
     state = model.init()._replace(reference=zero)
-    width = np.full(len(rows), np.nan)
+    width, directions = np.full(len(rows), np.nan), np.zeros((len(rows), 0))
     if model.remembers or model.support.policy == "hold":
         said, beyond = np.empty(len(rows)), np.empty(len(rows), dtype=np.bool_)
-        last = float(time[rows[0]])
+        last, each = float(time[rows[0]]), []
         for k, row in enumerate(rows.tolist()):
             state, said[k] = model.step(state, values[row], float(time[row]) - last)
             beyond[k], last = bool(state.outside.any()), float(time[row])
-            if band:
+            if shown.band:
                 width[k] = model.half_width(state, values[row])
+            if shown.directions:
+                each.append(model.directions(state, values[row]))
+        directions = np.array(each) if each else directions
     else:  # each reading stands alone: all in one step
-        state, each = model.step(state, values[rows], 0.0)
-        said, beyond = np.broadcast_to(each, rows.shape), np.asarray(state.outside.any(axis=-1))
-        width = model.half_width(state, values[rows])
+        state, answers = model.step(state, values[rows], 0.0)
+        said, beyond = np.broadcast_to(answers, rows.shape), np.asarray(state.outside.any(axis=-1))
+        width, directions = model.half_width(state, values[rows]), model.directions(state, values[rows])
     before = np.cumsum(used) - 1  # the last reading that was used, per row
     known = before >= 0
-    deviation[known], outside[known], half_width[known] = (x[before[known]] for x in (said, beyond, width))
-    return deviation, outside, half_width
+    directions, here = np.zeros((len(time), directions.shape[1])), directions
+    for into, what in zip((*found[:3], directions), (said, beyond, width, here), strict=True):
+        into[known] = what[before[known]]
+    return found._replace(directions=directions)
+
+
+def _adapted(
+    model: ErrorModel, answers: _Answers, time: FloatArray, probed: FloatArray, repeatability: float
+) -> tuple[_Answers, FloatArray, tuple[str, ...]]:
+    """Return answers with what is learned from probings, what that adds, and why probings were refused."""
+    size = 0.0 if model.honest_error is None else model.honest_error.rms
+    learned = adaptation.begin(size, answers.directions.shape[1])
+    shift, narrower, refused = np.zeros(len(time)), np.ones(len(time)), list[str]()
+    rows = np.flatnonzero(np.isfinite(probed)).tolist()
+    for row, following in zip(rows, [*rows[1:], len(time)], strict=True):
+        error = float(probed[row] - answers.deviation[row])
+        learned, why = adaptation.take(learned, answers.directions[row], float(time[row]), error, repeatability)
+        refused += [why] if why else []
+        later = slice(row + 1, following + 1)
+        shift[later] = learned.shift(time[later], answers.directions[later])
+        if model.band is not None:
+            narrower[later] = learned.narrowing(time[later], answers.directions[later], model.band.floor)
+    adapted = answers._replace(deviation=answers.deviation + shift, half_width=answers.half_width * narrower)
+    return adapted, shift, tuple(refused)
 
 
 def _moved(deviation: FloatArray, passed: BoolArray, time: FloatArray, limits: Limits | None, known: int) -> FloatArray:

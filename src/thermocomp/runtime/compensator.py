@@ -5,11 +5,12 @@ The way of a reading: in time? -> watch (which temperatures are to be believed; 
 sign -> limits -> `Correction`. What the gate turns away changes nothing: every correction stays where it was, for
 `Limits.hold`, and fades after that; so does one whose model was never judged without the sensors that failed. The first
 readings after a start are averaged: they are what temperatures count from, and the corrections stay zero until it is
-known, as long as the spindle stands (`ErrorModel.zeroing`).
+known, as long as the spindle stands (`ErrorModel.zeroing`). A probing comes with a reading and counts from the next one
+on: it says what the models are wrong by (`thermocomp.runtime.adaptation`).
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -25,11 +26,13 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.gate import explain_implausible, explain_untimely, is_number
 from thermocomp.runtime.limits import fade, limit_line
+from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.watch import WORDS, WatchState, begin, look
 from thermocomp.volumetric.model import VolumetricModel
-from thermocomp.volumetric.straight import best_line, best_lines
+from thermocomp.volumetric.straight import best_lines
 
 #: what is said to be outside where each input is inside its own range, but all together are unlike the training
 TOGETHER = "inputs together"
@@ -45,6 +48,7 @@ class CompensatorState(NamedTuple):
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
     watches: tuple[WatchState, ...]  #: over the temperatures
     idle: dict[str, float]  #: how long no model has driven each target or axis; not there: one drives it [s]
+    learned: dict[str, Adaptation]  #: from probings, by target or axis
 
 
 class Compensated(NamedTuple):
@@ -55,14 +59,8 @@ class Compensated(NamedTuple):
     outside: tuple[str, ...]  #: inputs outside the trained range of a model
     failed: dict[str, str]  #: sensors that are not believed, and what they are: see `thermocomp.runtime.watch`
     held: dict[str, str]  #: targets or axes that no model drives, and why: held, then fading
-
-
-class DeviationLine(NamedTuple):
-    """What some models together say of one target or axis, in the form that controllers take."""
-
-    models: slice  #: which they are, of the compensator's models
-    travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
-    deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
+    half_widths: dict[str, float]  #: of the band about the deviation, by target or axis that has one [um]
+    refused: dict[str, str]  #: targets or axes whose probing was not used, and why
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,10 +127,10 @@ class Compensator:
             begin = len(models)
             if isinstance(source, PositionModel):
                 models += source.models
-                lines[source.target] = DeviationLine(slice(begin, len(models)), source.travel, _straight(source))
+                lines[source.target] = DeviationLine(slice(begin, len(models)), source.travel, straight(source))
             else:
                 models.append(source)
-                lines[source.target] = DeviationLine(slice(begin, len(models)), (0.0, 0.0), _constant)
+                lines[source.target] = DeviationLine(slice(begin, len(models)), (0.0, 0.0), constant)
         return cls(tuple(models), lines, limits)
 
     @classmethod
@@ -171,7 +169,7 @@ class Compensator:
         none = {target: Correction(0.0) for target in self.lines}
         watches = tuple(begin(w) for w in self.watches)
         return CompensatorState(
-            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), watches, {}
+            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), watches, {}, {}
         )
 
     def gate(self, state: CompensatorState, reading: Reading, now: float) -> str:
@@ -204,7 +202,9 @@ class Compensator:
             why = explain_implausible(model, values, memory.reference.tolist())
         return why
 
-    def step(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Compensated]:
+    def step(
+        self, state: CompensatorState, reading: Reading, now: float, probings: Mapping[str, Probing] | None = None
+    ) -> tuple[CompensatorState, Compensated]:
         """Take one reading in and give the corrections that are in force after it.
 
         Parameters
@@ -214,21 +214,26 @@ class Compensator:
         reading : Reading
         now : float
             The clock of the reading's source, now [s].
+        probings : mapping of str to Probing, optional
+            By target or axis, made at the time of the reading. They count from the next reading on.
 
         Returns
         -------
         state : CompensatorState
         said : Compensated
         """
+        probings = probings or {}
         state, reading = self._believe(state, reading, now)
         failed = _failed(self.watches, state.watches)
         if rejected := self.gate(state, reading, now):
             state, held = self._idle(state, now, dict.fromkeys(self.lines, rejected))
-            return state, Compensated(state.corrections, rejected, (), failed, held)
+            refused = dict.fromkeys(probings, f"its reading is rejected: {rejected}")
+            return state, Compensated(state.corrections, rejected, (), failed, held, {}, refused)
         dt = 0.0 if state.time is None else reading.time - state.time
         # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
         travel = 0.0 if state.clock is None else min(now - state.clock, self.limits.reading_age)
         states, begins, said, outside = list(state.models), list(state.gathered), list[float](), list[str]()
+        given = list[FloatArray]()
         for k, model in enumerate(self.models):
             memory, known = state.models[k], True
             values = np.array([reading.values[i.name] for i in model.inputs])
@@ -242,19 +247,35 @@ class Compensator:
                 said[k] = float(deviation)
                 outside += _beyond(model, memory, values)
             states[k] = memory
+            given.append(values)
         corrections, idle, held = dict(state.corrections), dict(state.idle), dict[str, str]()
+        learned, widths = dict(state.learned), dict[str, float]()
+        refused = dict.fromkeys(probings, "no model drives its correction")
         for target, line in self.lines.items():
-            told = said[line.models]
-            if failed and (why := _unjudged(self.models[line.models], failed)):
+            models, told = self.models[line.models], said[line.models]
+            if failed and (why := _unjudged(models, failed)):
                 held[target] = why
             elif all(map(math.isfinite, told)):
-                wanted = Correction.opposing(line.deviation(told))
+                now_said = evaluate(
+                    *(line, models, states[line.models], given[line.models], told, reading.time),
+                    *(learned.get(target), probings.get(target), failed),
+                )
+                wanted = Correction.opposing(now_said.deviation)
                 corrections[target] = limit_line(wanted, corrections[target], line.travel, travel, self.limits)
                 idle.pop(target, None)
-        new = state._replace(models=tuple(states), corrections=corrections, gathered=tuple(begins), idle=idle)
+                if not math.isnan(now_said.half_width):
+                    widths[target] = now_said.half_width
+                if now_said.learned is not None:
+                    learned[target] = now_said.learned
+                if target in probings:
+                    refused[target] = now_said.refused
+        new = state._replace(
+            models=tuple(states), corrections=corrections, gathered=tuple(begins), idle=idle, learned=learned
+        )
         new, held = self._idle(new, now, held)
         return new._replace(time=reading.time), Compensated(
-            new.corrections, "", tuple(dict.fromkeys(outside)), failed, held
+            *(new.corrections, "", tuple(dict.fromkeys(outside)), failed, held, widths),
+            {target: why for target, why in refused.items() if why},
         )
 
     def _believe(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Reading]:
@@ -315,23 +336,6 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
         if lost and not model.may_lose(lost):
             return f"{model.target} does harm without {' and '.join(lost)}, or was not judged without"
     return ""
-
-
-def _constant(said: Sequence[float]) -> Deviation:
-    return Deviation(said[0])
-
-
-def _straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
-    """Return what makes the best straight line over the travel of the powers in a model."""
-    low, high = source.travel
-    positions, zero = np.linspace(low, high, 41), source.reference_position
-    lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
-    offsets, slopes = [line.offset for line in lines], [line.slope for line in lines]
-
-    def deviation(said: Sequence[float]) -> Deviation:
-        return Deviation(float(np.dot(offsets, said)), float(np.dot(slopes, said)), zero)
-
-    return deviation
 
 
 def _zeroed(

@@ -1,0 +1,104 @@
+"""What probings take off: a model of other thermal cycles, probed in the cycle that it has not seen.
+
+Run with ``python benchmarks/bench_probing.py [--every "every 2 h"]``. Each cycle is left out in turn; the model and all
+numbers of the filter come from the other cycles, its size from those left out of them in turn. Errors are means over
+channels and cycles of the mean absolute error [um]; `held`: probings without a model.
+"""
+
+import argparse
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from thermocomp.assessment.compare import compare
+from thermocomp.assessment.probing import Probings
+from thermocomp.assessment.replay import replay_compensated
+from thermocomp.assessment.study import honest_error
+from thermocomp.core.correction import Limits
+from thermocomp.datasets.virtual import record
+from thermocomp.files import recordings
+from thermocomp.models.training import train
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.splits import Judging, Split
+from thermocomp.recording.stacking import stack
+
+METHODS = ("averaged", "dynamic", "ols")
+#: for `averaged` on fl_thermal, probed every 2 h: share of the error without, and the error itself [um]
+GOALS = (0.8, 1.5)
+SIX = ("t4_C", "t5_C", "t7_C", "t9_C", "t11_C", "t16_C")
+
+
+def cases() -> Iterator[tuple[str, Samples]]:
+    for physics in ("linear", "nonlinear"):
+        whole = stack(record("demo", physics=physics, seed=3), ["x1_um", "y1_um", "z_um"])
+        yield f"demo, {physics}", whole.take(np.arange(len(whole)) % 3 == 0)
+    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
+    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
+    if not path.is_file():
+        print(f"skipped: {path} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        return
+    found = recordings.read(path)
+    samples = stack([found], [c.name for c in found.displacements])
+    yield "fl_thermal, all", samples
+    yield "fl_thermal, six", samples.only([*SIX, "spindle_rpm"])
+
+
+def probe(method: str, samples: Samples, target: int, cycle: int, probings: Probings) -> list[float]:
+    """Return error with and without probings, by probings alone, coverage and half-width, with and without [um]."""
+    own = replace(samples, targets=(samples.targets[target],), deviations=samples.deviations[:, [target]])
+    others = [c for c in np.unique(own.cycle).tolist() if c >= 0 and c != cycle]
+    learn = np.isin(own.cycle, others)
+    inner = [Split(str(c), learn & (own.cycle != c), own.cycle == c, whole=True) for c in others]
+    judging = Judging("cycles left out", tuple(inner))
+    (overall,) = compare(own, [method], judging, refit=False, robustness=False, limits=Limits()).overall()
+    model = replace(train(method, own, 0, learn).model, honest_error=honest_error(overall, judging))
+    rows = (own.cycle == cycle) & np.isfinite(own.deviations[:, 0])
+    measured = own.deviations[rows, 0]
+    plain, ran = replay_compensated(model, own, rows), replay_compensated(model, own, rows, probings=probings)
+    assert ran.probed is not None
+    answers = (ran.compensated, plain.compensated, ran.probed.held(measured, own.test[rows]))
+    held = [np.mean(np.abs(r.deviation - measured) <= r.half_width) for r in (ran, plain)]
+    widths = [r.half_width.mean() for r in (ran, plain)]
+    return [*(float(np.abs(a - measured).mean()) for a in answers), *map(float, held), *map(float, widths)]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--every", default="every 2 h")
+    probings = Probings.parse(parser.parse_args().every)
+    print(
+        f"{'':18}{'':10}{'probed':>8}{'without':>9}{'ratio':>7}{'worse in':>10}{'held':>7}{'band held':>16}{'+-':>15}"
+    )
+    missed = False
+    for name, samples in cases():
+        for method in METHODS:
+            found = np.array(
+                [
+                    probe(method, samples, k, cycle, probings)
+                    for k in range(len(samples.targets))
+                    for cycle in np.unique(samples.cycle[samples.cycle >= 0]).tolist()
+                ]
+            )
+            probed, without, held, *bands = found.mean(axis=0)
+            worse = f"{int((found[:, 0] > found[:, 1]).sum())} of {len(found)}"
+            ratio = probed / without
+            band = f"{100 * bands[0]:5.0f} from {100 * bands[1]:.0f} %{bands[2]:7.2f} from {bands[3]:.2f}"
+            print(
+                f"{name:18}{method:10}{probed:8.2f}{without:9.2f}{ratio:7.2f}{worse:>10}{held:7.2f}"
+                + (band if method == "averaged" else ""),
+                flush=True,
+            )
+            if name == "fl_thermal, all" and method == "averaged":
+                missed = ratio > GOALS[0] or probed > GOALS[1]
+                print(
+                    "".join(f"   {x:.2f}" for x in found[:, 0].reshape(len(samples.targets), -1).mean(axis=1)),
+                    "by channel",
+                )
+    return int(missed)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,127 @@
+"""Probings of a test: when they are made, and what came of them."""
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+_WRITTEN = re.compile(r"every (?P<n>\d*\.?\d+) ?(?P<unit>h|min)(, ?(?P<um>\d*\.?\d+) ?um)?")
+_SECONDS = {"h": 3600.0, "min": 60.0}
+
+
+@dataclass(frozen=True)
+class Probings:
+    """Probings of a running machine, one after the other.
+
+    Parameters
+    ----------
+    every : float
+        Time between two; the first is so long after the start [s].
+    repeatability : float
+        Of the probe, standard deviation [um].
+
+    Raises
+    ------
+    InputError
+        A number is not positive, or the repeatability negative.
+
+    Examples
+    --------
+    >>> from thermocomp import Probings
+    >>> Probings.parse("every 2 h, 0.3 um")
+    Probings(every=7200.0, repeatability=0.3)
+    """
+
+    every: float
+    repeatability: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.every < np.inf or not 0.0 <= self.repeatability < np.inf:
+            raise InputError(f"probings every {self.every} s, repeatability {self.repeatability} um: want finite times")
+
+    @classmethod
+    def parse(cls, text: str) -> "Probings":
+        """Understand probings as written on the command line, such as ``every 2 h`` or ``every 30 min, 0.3 um``.
+
+        Raises
+        ------
+        InputError
+            It is neither.
+        """
+        found = _WRITTEN.fullmatch(text.strip())
+        if found is None:
+            raise InputError(
+                f"probing {text!r}: write how often, and the probe's repeatability (standard deviation) if it is not "
+                f"{cls.repeatability:g} um, such as 'every 2 h' or 'every 30 min, 0.3 um'"
+            )
+        every = float(found["n"]) * _SECONDS[found["unit"]]
+        return cls(every) if found["um"] is None else cls(every, float(found["um"]))
+
+    def find_rows(self, time: FloatArray, usable: BoolArray) -> NDArray[np.intp]:
+        """Return the rows in which probings are made.
+
+        Parameters
+        ----------
+        time : ndarray of shape (n_rows,)
+            Rising [s].
+        usable : ndarray of bool of shape (n_rows,)
+            Rows in which there is something to probe; the first is the start.
+
+        Returns
+        -------
+        ndarray of int
+            The first usable row of each interval after the first.
+        """
+        rows = np.flatnonzero(usable)
+        if not rows.size:
+            return rows
+        interval = np.floor((time[rows] - time[rows[0]]) / self.every + 1e-9)
+        return rows[np.flatnonzero(np.diff(interval, prepend=0.0) > 0)]
+
+    @property
+    def words(self) -> str:
+        """What they are called wherever they are shown."""
+        often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
+        return f"a probing every {often}"
+
+
+@dataclass(frozen=True, eq=False)
+class Probed:
+    """What probings did, by judged row.
+
+    Parameters
+    ----------
+    plan : Probings
+    at : ndarray of bool of shape (n_judged,)
+        A probing was made: what it says counts from the next row on.
+    shift : ndarray of shape (n_judged,)
+        What was learned, and is in the correction [um].
+    without : ndarray of shape (n_judged,)
+        Minus the correction that would have been in force without any [um].
+    refused : tuple of str
+        Why probings were not used.
+    """
+
+    plan: Probings
+    at: BoolArray
+    shift: FloatArray
+    without: FloatArray
+    refused: tuple[str, ...] = ()
+
+    def take(self, rows: BoolArray) -> "Probed":
+        """Return what they did in some of the rows."""
+        return replace(self, at=self.at[rows], shift=self.shift[rows], without=self.without[rows])
+
+    def held(self, measured: FloatArray, test: NDArray[np.intp]) -> FloatArray:
+        """Return what probings alone would take off: the last one, held; zero before the first of a test [um]."""
+        rows = np.arange(len(measured))
+        last = np.maximum.accumulate(np.where(self.at, rows, -1))
+        before = np.concatenate([[-1], last[:-1]])[: len(rows)]  # it counts from the next row on
+        known = (before >= 0) & (test == test[before])
+        return np.where(known, measured[before], 0.0)

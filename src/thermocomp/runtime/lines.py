@@ -1,0 +1,108 @@
+"""What some models together say of one target or axis, with what probings have taught of it."""
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from thermocomp.core.correction import Deviation
+from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.position import PositionModel
+from thermocomp.runtime import adaptation
+from thermocomp.runtime.adaptation import Adaptation, Probing
+from thermocomp.volumetric.straight import best_line
+
+
+class DeviationLine(NamedTuple):
+    """What some models together say of one target or axis, in the form that controllers take."""
+
+    models: slice  #: which they are, of the compensator's models
+    travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
+    deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
+
+
+class Said(NamedTuple):
+    """What a line says of one reading."""
+
+    deviation: Deviation  #: with what was learned from probings before
+    half_width: float  #: of the band about it [um]; nan without one
+    learned: Adaptation | None  #: after the probing, if there was one
+    refused: str  #: why the probing was; empty if it was not, or there was none
+
+
+def constant(said: Sequence[float]) -> Deviation:
+    """Return the deviation that one model says, the same along the axis."""
+    return Deviation(said[0])
+
+
+def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
+    """Return what makes the best straight line over the travel of the powers in a model."""
+    low, high = source.travel
+    positions, zero = np.linspace(low, high, 41), source.reference_position
+    lines = [best_line(positions, (1e-3 * (positions - zero)) ** k, zero) for k in source.powers]
+    offsets, slopes = [line.offset for line in lines], [line.slope for line in lines]
+
+    def deviation(said: Sequence[float]) -> Deviation:
+        return Deviation(float(np.dot(offsets, said)), float(np.dot(slopes, said)), zero)
+
+    return deviation
+
+
+def evaluate(
+    line: DeviationLine,
+    models: Sequence[ErrorModel],
+    states: Sequence[State],
+    readings: Sequence[FloatArray],
+    said: Sequence[float],
+    time: float,
+    learned: Adaptation | None,
+    probing: Probing | None,
+    failed: Collection[str],
+) -> Said:
+    """Return what a line says of a reading.
+
+    Parameters
+    ----------
+    line : DeviationLine
+    models, states, readings : sequence of ErrorModel, State, ndarray of shape (n_inputs,)
+        Of the line; the states after the step that took the reading in.
+    said : sequence of float
+        What each model says.
+    time : float
+        Of the reading [s].
+    learned : Adaptation or None
+        From the probings before.
+    probing : Probing or None
+        Made at the time of the reading: it counts from the next one on.
+    failed : collection of str
+        Sensors that are not believed.
+
+    Returns
+    -------
+    Said
+    """
+    deviation, refused, single = line.deviation(said), "", len(models) == 1
+    width = float(models[0].half_width(states[0], readings[0])) if single else math.nan
+    if failed and not math.isnan(width):
+        width *= models[0].widening(failed)
+    if learned is None and probing is None:
+        return Said(deviation, width, None, "")
+    directions = models[0].directions(states[0], readings[0]) if single else np.zeros(0)
+    wanted = deviation
+    if learned is not None:
+        wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions)))
+        if (band := models[0].band) is not None and single:
+            width *= float(learned.narrowing(time, directions, band.floor))
+    if probing is not None:
+        error = probing.deviation - deviation.at(probing.position)
+        before = learned or adaptation.begin(_size(line, models), len(directions))
+        learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
+    return Said(wanted, width, learned, refused)
+
+
+def _size(line: DeviationLine, models: Sequence[ErrorModel]) -> float:
+    """Return the root mean square of what a line is wrong by on cycles that its models had not seen [um]."""
+    errors = np.diag([0.0 if m.honest_error is None else m.honest_error.rms for m in models])
+    return math.hypot(*(line.deviation(one).offset for one in errors.tolist()))

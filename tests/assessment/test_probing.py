@@ -1,0 +1,94 @@
+"""Models judged with probings: the only displacements used, each after it was made."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import thermocomp as tc
+from thermocomp.assessment.probing import Probed, Probings
+from thermocomp.assessment.replay import replay_compensated
+from thermocomp.assessment.study import assess
+from thermocomp.core.exceptions import InputError
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.stacking import stack
+from thermocomp.report.probings import describe_probings
+
+
+@pytest.mark.parametrize(
+    ("text", "every", "um"),
+    [("every 2 h", 7200.0, 0.5), ("every 30 min, 0.3 um", 1800.0, 0.3), ("every 1.5h", 5400.0, 0.5)],
+)
+def test_written(text: str, every: float, um: float) -> None:
+    assert Probings.parse(text) == Probings(every, um)
+
+
+@pytest.mark.parametrize("text", ["", "2 h", "every h", "every 2 days", "every 2 h, 0.3", "every 0 h", "every -1 h"])
+def test_written_wrongly(text: str) -> None:
+    with pytest.raises(InputError, match="every"):
+        Probings.parse(text)
+
+
+def test_when_they_are_made() -> None:
+    time, usable = np.arange(0.0, 10.0), np.ones(10, dtype=np.bool_)
+    assert Probings(3.0).find_rows(time, usable).tolist() == [3, 6, 9]
+    usable[[0, 3, 6, 7, 8]] = False  # the start is the second; between rows, the next that can be probed
+    assert Probings(3.0).find_rows(time, usable).tolist() == [4, 9]
+    assert Probings(20.0).find_rows(time, usable).size == 0
+    assert Probings(3.0).find_rows(time, np.zeros(10, dtype=np.bool_)).size == 0
+
+
+@pytest.fixture(scope="module")
+def day() -> Recording:
+    return tc.simulate("demo", seed=5)[0]
+
+
+@pytest.fixture(scope="module")
+def fitted() -> tc.ErrorModel:
+    (recording,) = tc.simulate("demo")
+    return tc.fit(recording, "z_um", "ols").model
+
+
+def test_no_displacement_between_is_looked_at(day: Recording, fitted: tc.ErrorModel) -> None:
+    samples = stack([day], ["z_um"], [i.name for i in fitted.inputs])
+    rows, plan = np.ones(len(samples), dtype=np.bool_), Probings(7200.0)
+    ran = replay_compensated(fitted, samples, rows, probings=plan)
+    assert ran.probed is not None
+    at = np.flatnonzero(ran.probed.at)
+    rng = np.random.default_rng(0)
+    other = samples.deviations + rng.normal(0.0, 100.0, samples.deviations.shape)
+    other[at] = samples.deviations[at]
+    again = replay_compensated(fitted, replace(samples, deviations=other), rows, probings=plan)
+    assert (again.compensated == ran.compensated).all()
+    cut = at[2]  # a probing changes nothing before it, and nothing at its own instant
+    other = samples.deviations.copy()
+    other[cut] += 3.0
+    later = replay_compensated(fitted, replace(samples, deviations=other), rows, probings=plan)
+    assert (later.compensated[: cut + 1] == ran.compensated[: cut + 1]).all()
+    assert (later.compensated[cut + 1 :] != ran.compensated[cut + 1 :]).any()
+    assert ran.probed.without == pytest.approx(replay_compensated(fitted, samples, rows).compensated)
+
+
+def test_they_lower_the_error_of_another_day(day: Recording, fitted: tc.ErrorModel) -> None:
+    plain, probed = tc.assess(fitted, day), tc.assess(fitted, day, probing="every 2 h")
+    (one,), (two,) = plain.judged.overall(), probed.judged.overall()
+    assert two.metric("rms") < 0.95 * one.metric("rms")
+    assert two.unprobed_metric("rms") == pytest.approx(one.metric("rms"))
+    assert two.held_metric("rms") > two.metric("rms")
+    (line,) = describe_probings(probed.judged.overall())
+    assert line.startswith("z_um, a probing every 2 h (")
+    assert f"{two.metric('rms'):.2f} and {two.metric('mae'):.2f}; {one.metric('rms'):.2f} and " in line
+    cycles = [a for a in probed.judged.assessments if not a.overall]
+    assert sum(int(a.probed.at.sum()) for a in cycles if a.probed) == int(two.probed.at.sum()) if two.probed else False
+
+
+def test_probings_alone_are_held_until_the_next() -> None:
+    at = np.array([False, True, False, True, False, False])
+    probed = Probed(Probings(1.0), at, np.zeros(6), np.zeros(6))
+    measured, test = np.arange(1.0, 7.0), np.array([0, 0, 0, 0, 0, 1])
+    assert probed.held(measured, test).tolist() == [0.0, 0.0, 2.0, 2.0, 4.0, 0.0]
+
+
+def test_a_model_that_was_never_judged_cannot_be_probed(day: Recording, fitted: tc.ErrorModel) -> None:
+    with pytest.raises(InputError, match="never judged"):
+        assess([replace(fitted, honest_error=None)], [day], probings=Probings(7200.0))

@@ -1,0 +1,185 @@
+"""What probings teach: as a Kalman filter of textbooks does, bounded, never by something absurd."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from driftmodels import ACCEPTED
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.band import Band
+from thermocomp.core.correction import Limits
+from thermocomp.core.inputs import Input
+from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
+from thermocomp.core.position import PositionModel
+from thermocomp.core.reading import Reading
+from thermocomp.runtime import adaptation, batch
+from thermocomp.runtime.adaptation import OFFSET, STRUCTURES, UNEXPLAINED, Probing
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.lines import DeviationLine, constant, evaluate
+
+HOUR = 3600.0
+MODEL = PacedDynamic(
+    target="z",
+    unit="um",
+    inputs=(
+        Input("t", "temperature", "degC", 20.0, True, -5.0, 15.0),
+        Input("n", "spindle_speed", "1/min", 0.0, False, 0.0, 6000.0),
+    ),
+    time_constants=(600.0,),
+    temperatures=(LaggedInput(0, 2.0, (0.5,)),),
+    top_speed=6000.0,
+    states=(SpeedState(1, 1.0, 1800.0, 600.0, 5.0),),
+    spread=((0.3, 0.1, 1.0), (0.0, 0.2, 3.0)),
+    band=Band(0.9, "assumption", 3, 1.0, 2.0, 3.0, (1,)),
+    honest_error=replace(ACCEPTED, rms=2.0),
+)
+
+
+def test_it_is_a_kalman_filter() -> None:
+    rng = np.random.default_rng(0)
+    kinds, prior = np.array([STRUCTURES, STRUCTURES, OFFSET]), np.diag([1.0, 1.0, 4.0])
+    mean, covariance, last = np.zeros(3), prior.copy(), 0.0
+    found = adaptation.begin(2.0, 2)
+    for time in np.cumsum(rng.uniform(0.0, 4 * HOUR, 30)).tolist():
+        fading = np.diag(np.exp(-(time - last) / kinds))
+        mean, covariance = fading @ mean, fading @ covariance @ fading + prior - fading @ prior @ fading
+        directions, error = rng.normal(0.0, 1.0, 2), float(rng.normal(0.0, 2.0))
+        h = np.append(directions, 1.0)
+        assert found.shift(time, directions) == pytest.approx(h @ mean)
+        assert found.narrowing(time, directions, 2.0) == pytest.approx(
+            math.sqrt(h @ covariance @ h / (h @ prior @ h)), rel=1e-9
+        )
+        found, why = adaptation.take(found, directions, time, error, 0.5)
+        assert not why
+        gain = covariance @ h / (h @ covariance @ h + (UNEXPLAINED * 2.0) ** 2 + 0.5**2)
+        mean, covariance, last = mean + gain * (error - h @ mean), covariance - np.outer(gain, h @ covariance), time
+
+
+def test_what_it_learned_is_forgotten() -> None:
+    found, _ = adaptation.take(adaptation.begin(2.0, 0), np.zeros(0), 0.0, 3.0, 0.0)
+    assert found.shift(1.0, np.zeros(0)) == pytest.approx(3.0, rel=0.05)
+    assert found.shift(OFFSET, np.zeros(0)) == pytest.approx(found.shift(0.0, np.zeros(0)) / math.e)
+    assert found.narrowing(0.0, np.zeros(0), 1.0) < 0.3
+    assert found.narrowing(20 * OFFSET, np.zeros(0), 1.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("error", [math.nan, math.inf, 1e300, 40.0, -40.0])
+def test_what_is_implausible_moves_nothing(error: float) -> None:
+    before = adaptation.begin(2.0, 1)
+    after, why = adaptation.take(before, np.ones(1), 60.0, error, 0.5)
+    assert why
+    assert (after.mean == before.mean).all()
+    assert after.shift(61.0, np.ones(1)) == 0.0
+
+
+def test_two_that_agree_are_taken_and_a_third_that_does_not_is_not() -> None:
+    before, why = adaptation.take(adaptation.begin(2.0, 1), np.ones(1), 0.0, 40.0, 0.5)
+    assert "+40.0 um from what is expected, where 11.6 um are plausible: measure again" in why
+    other, why = adaptation.take(before, np.ones(1), 60.0, -40.0, 0.5)
+    assert why
+    assert other.shift(61.0, np.ones(1)) == 0.0
+    after, why = adaptation.take(before, np.ones(1), 60.0, 41.0, 0.5)
+    assert not why
+    assert after.shift(61.0, np.ones(1)) == pytest.approx(41.0, rel=0.01)
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 1e6), st.floats(-1e3, 1e3), st.floats(-50.0, 50.0), st.floats(0.0, 5.0)), max_size=60
+    )
+)
+def test_whatever_comes_it_stays_a_covariance(probings: list[tuple[float, float, float, float]]) -> None:
+    found, time = adaptation.begin(2.0, 1), 0.0
+    for dt, direction, error, repeatability in probings:
+        time += dt
+        found, _ = adaptation.take(found, np.array([direction]), time, error, repeatability)
+        assert np.linalg.eigvalsh(found.covariance).min() > -1e-6 * np.trace(found.covariance)
+        assert abs(found.shift(time, np.array([direction]))) <= 1e4
+
+
+def readings(n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    time = np.cumsum(rng.uniform(5.0, 60.0, n))
+    values = np.column_stack([20.0 + 6.0 * np.sin(time / 4000.0), np.where(np.sin(time / 1500.0) > 0, 4000.0, 0.0)])
+    values[rng.random(n) < 0.05] = np.nan
+    return time, values
+
+
+def test_a_test_at_once_is_the_online_step() -> None:
+    time, values = readings(600)
+    probed = np.full(len(time), np.nan)
+    probed[::40] = 15.0 + np.cos(time[::40])
+    probed[80] = 900.0
+    found = batch.run(MODEL, Limits(), time, values, probed=probed, repeatability=0.3)
+    running, state, refused = Compensator.of([MODEL]), Compensator.of([MODEL]).start(), list[str]()
+    for k, row in enumerate(values.tolist()):
+        probings = {"z": Probing(float(probed[k]), 0.3)} if math.isfinite(probed[k]) else None
+        reading = Reading(float(time[k]), dict(zip("tn", row, strict=True)))
+        state, said = running.step(state, reading, reading.time, probings)
+        assert found.compensated[k] == pytest.approx(-said.corrections["z"].offset, rel=1e-9, abs=1e-9)
+        refused += [why for why in said.refused.values() if "rejected" not in why]
+        if "z" in said.half_widths and math.isfinite(found.half_width[k]):
+            assert found.half_width[k] == pytest.approx(said.half_widths["z"], rel=1e-9)
+    assert refused == list(found.refused)
+    assert 1 <= len(refused) < 8
+    assert np.abs(found.shift).max() > 1.0
+    plain = batch.run(MODEL, Limits(), time, values)
+    assert found.without == pytest.approx(plain.compensated)
+    assert plain.shift.max() == 0.0
+
+
+def test_a_probing_counts_from_the_next_reading_on_and_never_faster_than_the_limits() -> None:
+    running = Compensator.of([MODEL], Limits(rate=0.02))
+    state, last = running.start(), 0.0
+    for k in range(300):
+        reading = Reading(60.0 + k, {"t": 20.0, "n": 0.0})
+        state, said = running.step(state, reading, reading.time, {"z": Probing(4.0)} if k == 100 else None)
+        offset = said.corrections["z"].offset
+        assert abs(offset - last) <= 0.02 + 1e-12
+        assert (offset == 0.0) == (k <= 100)
+        last = offset
+    assert last == pytest.approx(-4.0, abs=0.5)
+
+
+def test_a_probing_without_a_usable_reading_or_model_is_refused() -> None:
+    running = Compensator.of([MODEL])
+    state, said = running.step(running.start(), Reading(0.0, {"t": math.nan, "n": 0.0}), 0.0, {"z": Probing(4.0)})
+    assert said.refused["z"].startswith("its reading is rejected: ")
+    assert not state.learned
+    state, said = running.step(state, Reading(1.0, {"t": 20.0, "n": 0.0}), 1.0, {"y": Probing(4.0)})
+    assert said.refused == {"y": "no model drives its correction"}
+
+
+def test_an_axis_of_several_models_learns_an_offset() -> None:
+    model = PositionModel(
+        target="EZZ",
+        unit="um",
+        axis="Z",
+        travel=(-200.0, 600.0),
+        reference_position=100.0,
+        offset=replace(MODEL, target="EZZ"),
+        slopes=(replace(MODEL, target="EZZ", unit="um/m", band=None),),
+    )
+    running = Compensator.of([model])
+    state = running.start()
+    for k in range(400):
+        reading = Reading(60.0 + k, {"t": 20.0, "n": 0.0})
+        state, said = running.step(state, reading, reading.time, {"EZZ": Probing(6.0, 0.5, 600.0)} if k == 0 else None)
+    assert said.corrections["EZZ"].at(0.0) == pytest.approx(-6.0, abs=1.0)
+    assert said.half_widths == {}
+
+
+def test_a_lost_sensor_widens_the_band() -> None:
+    model = replace(MODEL, honest_error=replace(ACCEPTED, rms=2.0, lost={"t": 5.0}))
+    assert model.widening(["t"]) == 2.5
+    assert model.widening([]) == model.widening(["other"]) == 1.0
+    line, reading = DeviationLine(slice(0, 1), (0.0, 0.0), constant), np.array([25.0, 0.0])
+    state, said = model.step(model.init((20.0, 0.0)), reading, 0.0)
+    widths = [
+        evaluate(line, [model], [state], [reading], [float(said)], 0.0, None, None, failed).half_width
+        for failed in ([], ["t"])
+    ]
+    assert widths == [model.half_width(state, reading), 2.5 * model.half_width(state, reading)]
