@@ -116,6 +116,8 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
     assert held("plan", capsys, drift, *study, "--no-curve", "-o", "next.ngc")["files"] == ["next.ngc", "next.csv"]
     assert held("plan", capsys, drift, *study, "--running")["running"]["states"]
     assert held("assess", capsys, "model.json", drift)["results"]
+    probed = held("assess", capsys, "model.json", drift, "--probing", "every 10 min")["results"]
+    assert all(r["probings"]["made"] for r in probed)
     assert held("iso230", capsys, drift, "--model", "model.json")["thermal"]
 
 
