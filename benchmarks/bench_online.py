@@ -1,7 +1,9 @@
 """One live sample: the compensator and the frozen model beside their estimator and a scikit-learn pipeline.
 
 Run with ``python benchmarks/bench_online.py``. All sides are timed in turn in one run, on the same readings; frozen
-model and estimator must say the same to 1e-12 relative. Goal: the median step of the compensator takes at most 50 us.
+model and estimator must say the same to 1e-12 relative. Goals: the median step of the compensator with one model, and
+that of `averaged` for the five channels of the virtual machine's demo with their bands and the watch over its 16
+temperatures, take at most 50 us.
 """
 
 import sys
@@ -20,8 +22,14 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
+from thermocomp.core.stack import Stack
+from thermocomp.datasets.virtual import record
 from thermocomp.models.dynamic import DynamicRidge
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
+from thermocomp.recording.stacking import stack
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.watch import begin, look
 
 FloatArray = NDArray[np.float64]
 
@@ -59,6 +67,30 @@ def percentiles(job: Callable[[int], object], count: int) -> tuple[float, float]
     return float(np.median(times)) / 1e3, float(np.quantile(times, 0.99)) / 1e3
 
 
+def step_of_five() -> Callable[[int], object]:
+    """Return the step of five channels: which temperatures are believed, what the models say, and their bands."""
+    (found,) = record("demo")
+    samples = stack([found], [c.name for c in found.displacements])
+    samples = samples.take(np.arange(len(samples)) % 9 == 0)
+    everything = np.ones(len(samples), dtype=np.bool_)
+    models = [train("averaged", samples, k, everything).model for k in range(len(samples.targets))]
+    watch = find_watch(samples, everything)
+    assert watch is not None
+    assert len(models) == 5
+    together = Stack(models)
+    names = [c.name for c in samples.inputs]
+    assert list(together.inputs) == [i.name for i in watch.inputs] == names
+    live, seen = together.init(), begin(watch)
+
+    def step(k: int) -> None:
+        nonlocal live, seen
+        seen, believed = look(watch, seen, 1.0 * k, samples.values[k // 20])  # a reading a second
+        live, _ = together.step(live, believed, 1.0)
+        together.half_widths(live, believed)
+
+    return step
+
+
 def main() -> int:
     X, y, dt, cycle = recording()
     speed = N_TEMPERATURES
@@ -94,13 +126,14 @@ def main() -> int:
     rows = [
         ("compensator: gate, model, limits", percentiles(compensator_step, 3000)),
         (f"frozen model alone ({len(names)} inputs, {len(estimator.coef_)} features)", percentiles(model_step, 3000)),
+        ("averaged, five channels, bands and watch", percentiles(step_of_five(), 3000)),
         ("scikit-learn pipeline, one row, no dynamics", percentiles(lambda k: pipeline.predict(X[k : k + 1]), 1500)),
     ]
     print(f"{'one sample':<48} {'p50 [us]':>9} {'p99 [us]':>9} {'peer / this':>12}")
     peer = rows[-1][1][0]
     for title, (p50, p99) in rows:
         print(f"{title:<48} {p50:>9.1f} {p99:>9.1f} {peer / p50:>11.1f}x")
-    reached = worst <= 1e-12 and rows[0][1][0] <= GOAL_US
+    reached = worst <= 1e-12 and max(rows[0][1][0], rows[2][1][0]) <= GOAL_US
     print(f"goal p50 <= {GOAL_US:.0f} us: {'reached' if reached else 'MISSED'}")
     return 0 if reached else 1
 

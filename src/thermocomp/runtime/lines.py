@@ -84,16 +84,16 @@ def evaluate(
     Said
     """
     deviation, refused, single = line.deviation(said), "", len(models) == 1
-    width = float(models[0].half_width(states[0], readings[0])) if single else math.nan
-    if failed and not math.isnan(width):
-        width *= models[0].widening(failed)
+    width, band = math.nan, models[0].band if single else None
+    if band is not None:
+        width = float(models[0].half_width(states[0], readings[0])) * (models[0].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
         return Said(deviation, width, None, "")
     directions = models[0].directions(states[0], readings[0]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
         wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions)))
-        if (band := models[0].band) is not None and single:
+        if band is not None:
             width *= float(learned.narrowing(time, directions, band.floor))
     if probing is not None:
         error = probing.deviation - deviation.at(probing.position)
