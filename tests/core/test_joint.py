@@ -26,7 +26,8 @@ from thermocomp.files import jsonfile, modelfile
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
 from thermocomp.recording.stacking import stack
-from thermocomp.runtime.compensator import TOGETHER, Compensator
+from thermocomp.runtime.advance import TOGETHER
+from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.band import Band
-from thermocomp.core.correction import Limits
+from thermocomp.core.correction import Deviation, Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.core.position import PositionModel
@@ -179,7 +179,7 @@ def test_a_lost_sensor_widens_the_band() -> None:
     line, reading = DeviationLine(slice(0, 1), (0.0, 0.0), constant), np.array([25.0, 0.0])
     state, said = model.step(model.init((20.0, 0.0)), reading, 0.0)
     widths = [
-        evaluate(line, [model], [state], [reading], [float(said)], 0.0, None, None, failed).half_width
+        evaluate(line, [model], [state], [reading], [float(said)], 0.0, None, None, failed, Deviation(0.0)).half_width
         for failed in ([], ["t"])
     ]
     assert widths == [model.half_width(state, reading), 2.5 * model.half_width(state, reading)]

@@ -49,6 +49,11 @@ class Deviation:
         """Deviation [um] at a position [mm] (Chen 1996, Eq. 2 to first order)."""
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
+    def less(self, other: "Deviation") -> "Deviation":
+        """Return this deviation less another one, with its own reference position."""
+        at = self.reference_position
+        return Deviation(self.offset - other.at(at), self.slope - other.slope, at)
+
 
 @dataclass(frozen=True)
 class Correction:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,46 +21,24 @@ from numpy.typing import ArrayLike
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
-from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.watch import Watch
-from thermocomp.core.zero import Gathered, robust_mean
-from thermocomp.runtime.adaptation import Adaptation, Probing
-from thermocomp.runtime.gate import explain_implausible, explain_untimely, is_number
+from thermocomp.core.zero import Gathered
+from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.advance import advance
+from thermocomp.runtime.clocking import place
+from thermocomp.runtime.gate import explain_implausible, is_number
 from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
+from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WORDS, WatchState, begin, look
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import best_lines
 
-#: what is said to be outside where each input is inside its own range, but all together are unlike the training
-TOGETHER = "inputs together"
-
-
-class CompensatorState(NamedTuple):
-    """All that a compensator remembers between two readings."""
-
-    models: tuple[State, ...]  #: one per model
-    corrections: dict[str, Correction]  #: in force, by target or axis
-    time: float | None  #: of the last reading that passed the gate [s]
-    clock: float | None  #: the latest at which a step was taken, whatever the gate said [s]
-    gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
-    watches: tuple[WatchState, ...]  #: over the temperatures
-    idle: dict[str, float]  #: how long no model has driven each target or axis; not there: one drives it [s]
-    learned: dict[str, Adaptation]  #: from probings, by target or axis
-
-
-class Compensated(NamedTuple):
-    """What a compensator says of one reading."""
-
-    corrections: dict[str, Correction]  #: in force after this reading, by target or axis
-    rejected: str  #: why the gate turned the reading away; empty if it passed
-    outside: tuple[str, ...]  #: inputs outside the trained range of a model
-    failed: dict[str, str]  #: sensors that are not believed, and what they are: see `thermocomp.runtime.watch`
-    held: dict[str, str]  #: targets or axes that no model drives, and why: held, then fading
-    half_widths: dict[str, float]  #: of the band about the deviation, by target or axis that has one [um]
-    refused: dict[str, str]  #: targets or axes whose probing was not used, and why
+#: after a restart a correction has caught up once it is so near to what its models want [um]
+ARRIVED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +54,19 @@ class Compensator:
     lines : dict of str to DeviationLine
         By target or axis.
     limits : Limits
+    watching : bool
+        It may be made though none of its targets may run: to look at what they would do.
 
     Raises
     ------
     InputError
-        The do-no-harm gate refused a model, or it is unproven and nobody takes it.
+        None of its targets may run: the do-no-harm gate refused a model, or it is unproven and nobody takes it.
     """
 
     models: tuple[ErrorModel, ...]
     lines: dict[str, DeviationLine]
     limits: Limits = Limits()
+    watching: bool = False
 
     @cached_property
     def watches(self) -> tuple[Watch, ...]:
@@ -96,12 +77,30 @@ class Compensator:
                 found.append(m.watch)
         return tuple(found)
 
+    @cached_property
+    def shadow(self) -> dict[str, Status]:
+        """Targets or axes that are predicted and must not run, and why."""
+        found = dict[str, Status]()
+        for target, line in self.lines.items():
+            try:
+                for m in self.models[line.models]:
+                    m.check_may_run()
+            except InputError as e:
+                found[target] = Status("shadow", str(e))
+        return found
+
     def __post_init__(self) -> None:
-        for m in self.models:
-            m.check_may_run()
+        if self.shadow and len(self.shadow) == len(self.lines) and not self.watching:
+            raise InputError(next(iter(self.shadow.values())).reason)
 
     @classmethod
-    def of(cls, sources: Sequence[ErrorModel | PositionModel], limits: Limits = Limits()) -> "Compensator":
+    def of(
+        cls,
+        sources: Sequence[ErrorModel | PositionModel],
+        limits: Limits = Limits(),
+        *,
+        watching: bool = False,
+    ) -> "Compensator":
         """Return the compensator of some targets.
 
         Parameters
@@ -110,11 +109,13 @@ class Compensator:
             One per target [um]. Of a `PositionModel` the thermal part alone: its profile is a table in the controller;
             where it is no straight line, the best one over the travel.
         limits : Limits
+        watching : bool
+            It may be made though none of them may run.
 
         Raises
         ------
         InputError
-            Two models have the same target, one does not predict micrometres, or may not run.
+            Two models have the same target, one does not predict micrometres, or none may run.
         """
         targets = [m.target for m in sources]
         if len(set(targets)) != len(targets):
@@ -131,7 +132,7 @@ class Compensator:
             else:
                 models.append(source)
                 lines[source.target] = DeviationLine(slice(begin, len(models)), (0.0, 0.0), constant)
-        return cls(tuple(models), lines, limits)
+        return cls(tuple(models), lines, limits, watching)
 
     @classmethod
     def of_machine(
@@ -167,13 +168,14 @@ class Compensator:
     def start(self) -> CompensatorState:
         """Return the state of a compensator that has seen no reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
-        watches = tuple(begin(w) for w in self.watches)
+        models, watches = tuple(m.init() for m in self.models), tuple(begin(w) for w in self.watches)
+        gathered = (Gathered(),) * len(self.models)
         return CompensatorState(
-            tuple(m.init() for m in self.models), none, None, None, (Gathered(),) * len(self.models), watches, {}, {}
+            *(models, none, None, None, None, 0.0, gathered, watches, {}, {}, {}, {}, dict(self.shadow), None)
         )
 
-    def gate(self, state: CompensatorState, reading: Reading, now: float) -> str:
-        """Say why a reading must not be used; the empty string if it may.
+    def gate(self, state: CompensatorState, reading: Reading) -> str:
+        """Say why a reading must not be used, whenever it was taken; the empty string if it may.
 
         A temperature is plausible while it stays within its trained range widened by the whole span of that range. The
         first readings decide what counts as zero: there the temperatures as a whole (their median) have to be within
@@ -187,135 +189,248 @@ class Compensator:
             Before the reading.
         reading : Reading
             The inputs of all models have to be in it.
-        now : float
-            The clock of the reading's source, now [s].
 
         Returns
         -------
         str
         """
-        why = explain_untimely(reading, state.time, now, self.limits)
         for model, memory in zip(self.models, state.models, strict=True):
-            if why:
-                break
             values = [reading.values.get(i.name) for i in model.inputs]
-            why = explain_implausible(model, values, memory.reference.tolist())
-        return why
+            if why := explain_implausible(model, values, memory.reference.tolist()):
+                return why
+        return ""
 
     def step(
-        self, state: CompensatorState, reading: Reading, now: float, probings: Mapping[str, Probing] | None = None
+        self,
+        state: CompensatorState,
+        reading: Reading,
+        now: float,
+        probings: Mapping[str, Probing] | None = None,
+        tick: float | None = None,
     ) -> tuple[CompensatorState, Compensated]:
         """Take one reading in and give the corrections that are in force after it.
 
         Parameters
         ----------
         state : CompensatorState
-            From `start` or the previous `step`.
+            From `start`, `resume` or the previous `step`.
         reading : Reading
         now : float
             The clock of the reading's source, now [s].
         probings : mapping of str to Probing, optional
             By target or axis, made at the time of the reading. They count from the next reading on.
+        tick : float, optional
+            The monotone clock of the process, now [s]: corrections move by it. Without it `now` is taken; then a clock
+            that goes back makes them wait until it is where it was.
 
         Returns
         -------
         state : CompensatorState
         said : Compensated
         """
-        probings = probings or {}
-        state, reading = self._believe(state, reading, now)
-        failed = _failed(self.watches, state.watches)
-        if rejected := self.gate(state, reading, now):
-            state, held = self._idle(state, now, dict.fromkeys(self.lines, rejected))
-            refused = dict.fromkeys(probings, f"its reading is rejected: {rejected}")
-            return state, Compensated(state.corrections, rejected, (), failed, held, {}, refused)
-        dt = 0.0 if state.time is None else reading.time - state.time
-        # Travel is not saved up: an outage, with rejected readings or with none, must not end in a jump.
-        travel = 0.0 if state.clock is None else min(now - state.clock, self.limits.reading_age)
-        states, begins, said, outside = list(state.models), list(state.gathered), list[float](), list[str]()
-        given = list[FloatArray]()
-        for k, model in enumerate(self.models):
-            memory, known = state.models[k], True
-            values = np.array([reading.values[i.name] for i in model.inputs])
-            if memory.memory is None and np.isnan(memory.reference).any():
-                resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
-                gathering = _zeroed(model, memory, begins[k], (reading.time, values, resting))
-                memory, begins[k], known, values = gathering
-            said.append(math.nan)
-            if known:
-                memory, deviation = model.step(memory, values, dt)
-                said[k] = float(deviation)
-                outside += _beyond(model, memory, values)
-            states[k] = memory
-            given.append(values)
-        corrections, idle, held = dict(state.corrections), dict(state.idle), dict[str, str]()
-        learned, widths = dict(state.learned), dict[str, float]()
+        probings, tick = probings or {}, now if tick is None else tick
+        instant, untimely = place(state, reading, now, tick, self.limits)
+        if not untimely:
+            state, reading = self._believe(state, reading, instant.time)
+        if why := untimely or self.gate(state, reading):
+            state, said = self.wait(state, tick, why)
+            return state, said._replace(refused=dict.fromkeys(probings, f"its reading is rejected: {why}"))
+        dt = 0.0 if state.time is None else instant.time - state.time
+        travel = self._travel(state, tick)
+        stepped = advance(self.models, state.models, state.gathered, reading, instant.time, dt)
+        failed, corrections, learned = (
+            _failed(self.watches, state.watches),
+            dict(state.corrections),
+            dict(state.learned),
+        )
+        references, raw, held = dict(state.references), dict(state.raw), dict[str, str]()
+        deviations, widths, states_of = dict[str, Deviation](), dict[str, float](), dict[str, Status]()
         refused = dict.fromkeys(probings, "no model drives its correction")
+        arrived = state.away is not None
         for target, line in self.lines.items():
-            models, told = self.models[line.models], said[line.models]
+            models, told = self.models[line.models], stepped.said[line.models]
+            if not all(map(math.isfinite, told)):
+                states_of[target] = Status("restarting", "its zero is being averaged")
+                continue
+            references.setdefault(target, Reference(reading.time, "start: mean over the first readings"))
+            answer = evaluate(
+                *(line, models, stepped.states[line.models], stepped.values[line.models], told, instant.time),
+                learned.get(target),
+                *(probings.get(target), failed, references[target].shift),
+            )
+            raw[target], deviations[target] = answer.raw, answer.deviation
+            if not math.isnan(answer.half_width):
+                widths[target] = answer.half_width
             if failed and (why := _unjudged(models, failed)):
                 held[target] = why
-            elif all(map(math.isfinite, told)):
-                now_said = evaluate(
-                    *(line, models, states[line.models], given[line.models], told, reading.time),
-                    *(learned.get(target), probings.get(target), failed),
-                )
-                wanted = Correction.opposing(now_said.deviation)
-                corrections[target] = limit_line(wanted, corrections[target], line.travel, travel, self.limits)
-                idle.pop(target, None)
-                if not math.isnan(now_said.half_width):
-                    widths[target] = now_said.half_width
-                if now_said.learned is not None:
-                    learned[target] = now_said.learned
-                if target in probings:
-                    refused[target] = now_said.refused
-        new = state._replace(
-            models=tuple(states), corrections=corrections, gathered=tuple(begins), idle=idle, learned=learned
-        )
-        new, held = self._idle(new, now, held)
-        return new._replace(time=reading.time), Compensated(
-            *(new.corrections, "", tuple(dict.fromkeys(outside)), failed, held, widths),
-            {target: why for target, why in refused.items() if why},
+                continue
+            if answer.learned is not None:
+                learned[target] = answer.learned
+            if target in probings:
+                refused[target] = answer.refused
+            corrections[target], states_of[target] = self._drive(state, target, answer.deviation, travel)
+            arrived &= states_of[target].word != "restarting"
+        new = state._replace(models=stepped.states, gathered=stepped.gathered, corrections=corrections, learned=learned)
+        new = new._replace(references=references, raw=raw, away=None if arrived else state.away)
+        new, idle = self._idle(new, tick, held, driven=states_of)
+        new = new._replace(time=instant.time, origin=instant.origin, taken=new.clock)
+        told_of = {t: why for t, why in refused.items() if why}
+        return new, Compensated(
+            *(new.corrections, "", stepped.outside, failed, states_of | idle, deviations, widths, told_of)
         )
 
-    def _believe(self, state: CompensatorState, reading: Reading, now: float) -> tuple[CompensatorState, Reading]:
+    def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:
+        """Let time go by without a usable reading: corrections stay for `Limits.hold`, then fade.
+
+        Parameters
+        ----------
+        state : CompensatorState
+        tick : float
+            The monotone clock of the process, now [s].
+        why : str
+            Why there is none.
+
+        Returns
+        -------
+        state : CompensatorState
+        said : Compensated
+        """
+        new, states = self._idle(state, tick, dict.fromkeys(self.lines, why))
+        failed = _failed(self.watches, state.watches)
+        return new, Compensated(new.corrections, why, (), failed, states, {}, {}, {})
+
+    def order(self, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
+        """Take a target or axis out, or let it run again.
+
+        Parameters
+        ----------
+        state : CompensatorState
+        target : str
+        status : Status or None
+            ``holding``: it stays where it is until somebody says otherwise; ``shadow``: it is predicted, and its
+            correction goes to zero within the limits; ``suspended``: the controller has none in force, and it begins
+            at zero again. None: it runs.
+
+        Returns
+        -------
+        CompensatorState
+
+        Raises
+        ------
+        InputError
+            There is no such target, a word is none of these, or its models may not run.
+        """
+        if target not in self.lines:
+            raise InputError(f"{target}: want one of {', '.join(self.lines)}")
+        if status is not None and status.word not in ("holding", "shadow", "suspended"):
+            raise InputError(f"{target}: nobody can order {status.word}: want holding, shadow or suspended")
+        if target in self.shadow and (status is None or status.word != "suspended"):
+            raise InputError(f"{target} runs in shadow only: {self.shadow[target].reason}")
+        orders = {t: s for t, s in state.orders.items() if t != target} | ({} if status is None else {target: status})
+        corrections = dict(state.corrections)
+        if status is not None and status.word == "suspended":
+            corrections[target] = Correction(0.0)
+        if status is None and target in self.shadow:
+            orders[target] = self.shadow[target]
+        return state._replace(orders=orders, corrections=corrections)
+
+    def rezero(
+        self, state: CompensatorState, target: str, time: float, why: str, in_force: Correction | None = None
+    ) -> CompensatorState:
+        """Let a target or axis count anew from where it is: its correction stays, and moves on from there.
+
+        Parameters
+        ----------
+        state : CompensatorState
+        target : str
+        time : float
+            On the stamps of the readings [s].
+        why : str
+            For the ledger, such as ``homing`` or ``work offset, by M. Weber``.
+        in_force : Correction, optional
+            What the controller says is in force now; the last one without it.
+
+        Returns
+        -------
+        CompensatorState
+            What was learned from probings is gone: it counted from the zero before.
+
+        Raises
+        ------
+        InputError
+            There is no such target, or its zero is still being averaged.
+        """
+        if target not in self.lines:
+            raise InputError(f"{target}: want one of {', '.join(self.lines)}")
+        if target not in state.references:
+            raise InputError(f"{target}: its zero is still being averaged; wait until that is known")
+        now, correction = state.raw[target], in_force or state.corrections[target]
+        at = now.reference_position
+        shift = Deviation(now.offset + correction.at(at), now.slope + correction.slope, at)
+        return state._replace(
+            references=state.references | {target: Reference(time, why, shift)},
+            corrections=state.corrections | {target: correction},
+            learned={t: a for t, a in state.learned.items() if t != target},
+        )
+
+    def _drive(
+        self, state: CompensatorState, target: str, deviation: Deviation, travel: float
+    ) -> tuple[Correction, Status]:
+        """Return the correction that a deviation wants, within the limits, and how the target is."""
+        before, line, order = state.corrections[target], self.lines[target], state.orders.get(target)
+        wanted = Correction.opposing(deviation)
+        if order is not None and order.word in ("holding", "suspended"):
+            return before, order
+        if order is not None:  # shadow
+            return limit_line(Correction(0.0), before, line.travel, travel, replace(self.limits, dead_band=0.0)), order
+        after = limit_line(wanted, before, line.travel, travel, self.limits)
+        if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, self.limits.dead_band):
+            return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero anew")
+        return after, Status("active")
+
+    def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
         """Return the reading with what stands in for temperatures that are not believed."""
-        if not self.watches or explain_untimely(reading, state.time, now, self.limits):
+        if not self.watches:
             return state, reading
         values, states = dict(reading.values), []
         for watch, before in zip(self.watches, state.watches, strict=True):
             given = [values.get(i.name) for i in watch.inputs]
             numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
             resting = watch.zeroing.stands(values.get(watch.zeroing.speed))
-            seen, believed = look(watch, before, reading.time, numbers, resting=resting)
+            seen, believed = look(watch, before, time, numbers, resting=resting)
             states.append(seen)
             values |= {watch.inputs[k].name: float(believed[k]) for k in watch.bank.temperatures.tolist()}
         return state._replace(watches=tuple(states)), replace(reading, values=values)
 
+    def _travel(self, state: CompensatorState, tick: float) -> float:
+        """Return the time that counts in a step: an outage, with rejected readings or with none, is no saved travel."""
+        if state.clock is None or not is_number(tick):
+            return 0.0
+        return max(0.0, min(tick - state.clock, self.limits.reading_age))
+
     def _idle(
-        self, state: CompensatorState, now: float, held: dict[str, str]
-    ) -> tuple[CompensatorState, dict[str, str]]:
-        """Let corrections that nothing drives fade once they were held for long; say how long they have been."""
-        if not math.isfinite(now):
-            return state, held
-        clock = _later(state.clock, now)
+        self, state: CompensatorState, tick: float, held: dict[str, str], driven: Collection[str] = ()
+    ) -> tuple[CompensatorState, dict[str, Status]]:
+        """Let corrections that nothing drives fade once they were held for long; say how they are."""
         # one reading counts for no more than its age may be: a clock that leaps makes nothing fade
-        travel = 0.0 if state.clock is None else min(clock - state.clock, self.limits.reading_age)
-        corrections, idle, said = dict(state.corrections), dict(state.idle), dict[str, str]()
+        travel = self._travel(state, tick)
+        clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)
+        corrections, states = dict(state.corrections), dict[str, Status]()
+        idle = {t: s for t, s in state.idle.items() if t not in driven}
         for target, why in held.items():
+            order = state.orders.get(target)
+            if order is not None and order.word in ("holding", "suspended"):
+                states[target] = order
+                continue
             idle[target] = idle.get(target, 0.0) + travel
             ends = self.lines[target].travel
             corrections[target] = fade(corrections[target], ends, idle[target], travel, self.limits)
-            word = "fading" if idle[target] > self.limits.hold else "held"
-            said[target] = f"{word}, not driven for {idle[target]:.0f} s: {why}"
-        return state._replace(corrections=corrections, clock=clock, idle=idle), said
-
-
-def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
-    """Return the inputs that are outside the trained range."""
-    if after.outside.any():
-        return [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-    return [] if model.distance(after, values) <= 1.0 else [TOGETHER]
+            if order is not None:
+                states[target] = order
+                continue
+            word: Literal["fading", "holding"] = "fading" if idle[target] > self.limits.hold else "holding"
+            states[target] = Status(word, f"not driven for {idle[target]:.0f} s: {why}")
+        return state._replace(corrections=corrections, clock=clock, idle=idle), states
 
 
 def _failed(watches: Sequence[Watch], states: Sequence[WatchState]) -> dict[str, str]:
@@ -338,28 +453,6 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
     return ""
 
 
-def _zeroed(
-    model: ErrorModel, memory: State, gathered: Gathered, reading: tuple[float, FloatArray, bool]
-) -> tuple[State, Gathered, bool, FloatArray]:
-    """Take a reading into the zero if it belongs there; return whether that is known now, and what the reading says.
-
-    Once it is, the model goes through the readings before this one, as if it had been known from the first of them; all
-    readings of the zero say their mean.
-    """
-    before, values = gathered, reading[1]
-    if gathered.belongs(model.zeroing, reading[0], reading[2]):
-        gathered = gathered.add(*reading)
-        if not gathered.complete(model.zeroing):
-            return memory, gathered, False, values
-        values = robust_mean(gathered.values)
-    mean, last = robust_mean(gathered.values), gathered.times[0]
-    memory = memory._replace(reference=np.where(np.isnan(memory.reference), mean, memory.reference))
-    for time in before.times:
-        memory, _ = model.step(memory, mean, time - last)
-        last = time
-    return memory, Gathered(), True, values
-
-
-def _later(clock: float | None, now: float) -> float:
-    """Return the clock, which never goes back: time that was travelled in must not be there to travel in again."""
-    return now if clock is None else max(clock, now)
+def _apart(one: Correction, other: Correction, travel: tuple[float, float]) -> float:
+    """Return how far two corrections are apart at most along the travel [um]."""
+    return max(abs(one.at(p) - other.at(p)) for p in travel)

@@ -6,7 +6,7 @@ It comes first, because numbers that are not numbers are treacherous further dow
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from statistics import median
 
@@ -74,14 +74,12 @@ def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
     return ""
 
 
-def explain_untimely(reading: Reading, last: float | None, now: float, limits: Limits) -> str:
-    """Say why a reading comes at a wrong time; the empty string if it does not.
+def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
+    """Say why a reading comes at a wrong time by its own clock; the empty string if it does not.
 
     Parameters
     ----------
     reading : Reading
-    last : float or None
-        Time of the last reading that was used [s].
     now : float
         The clock of the reading's source, now [s].
     limits : Limits
@@ -90,14 +88,15 @@ def explain_untimely(reading: Reading, last: float | None, now: float, limits: L
     -------
     str
     """
+    values: object = reading.values
+    if not isinstance(values, Mapping):
+        return f"reading holds {type(values).__name__} instead of values by channel"
     if not (is_number(reading.time) and is_number(now)):
         return f"time {reading.time} or clock {now} is not a number"
     if reading.time > now + CLOCK_SKEW:
         return f"reading is {reading.time - now:.1f} s ahead of the clock"
     if now - reading.time > limits.reading_age:
         return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s"
-    if last is not None and reading.time <= last:
-        return f"reading of {reading.time:g} s is not later than the last one of {last:g} s"
     return ""
 
 
@@ -119,4 +118,9 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number, and no truth value."""
-    return type(value) is not bool and isinstance(value, Real) and math.isfinite(value)
+    if type(value) is bool or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:  # an integer of 400 digits
+        return False

@@ -30,6 +30,7 @@ class Said(NamedTuple):
     half_width: float  #: of the band about it [um]; nan without one
     learned: Adaptation | None  #: after the probing, if there was one
     refused: str  #: why the probing was; empty if it was not, or there was none
+    raw: Deviation  #: what the models alone say, from their own zero
 
 
 def constant(said: Sequence[float]) -> Deviation:
@@ -60,6 +61,7 @@ def evaluate(
     learned: Adaptation | None,
     probing: Probing | None,
     failed: Collection[str],
+    zero: Deviation,
 ) -> Said:
     """Return what a line says of a reading.
 
@@ -78,17 +80,20 @@ def evaluate(
         Made at the time of the reading: it counts from the next one on.
     failed : collection of str
         Sensors that are not believed.
+    zero : Deviation
+        What is taken off what the models say: where the target counts from.
 
     Returns
     -------
     Said
     """
-    deviation, refused, single = line.deviation(said), "", len(models) == 1
+    raw, refused, single = line.deviation(said), "", len(models) == 1
+    deviation = raw.less(zero)
     width, band = math.nan, models[0].band if single else None
     if band is not None:
         width = float(models[0].half_width(states[0], readings[0])) * (models[0].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
-        return Said(deviation, width, None, "")
+        return Said(deviation, width, None, "", raw)
     directions = models[0].directions(states[0], readings[0]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
@@ -99,7 +104,7 @@ def evaluate(
         error = probing.deviation - deviation.at(probing.position)
         before = learned or adaptation.begin(_size(line, models), len(directions))
         learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
-    return Said(wanted, width, learned, refused)
+    return Said(wanted, width, learned, refused, raw)
 
 
 def _size(line: DeviationLine, models: Sequence[ErrorModel]) -> float:

@@ -1,0 +1,62 @@
+"""When a reading was taken, where clocks cannot be trusted.
+
+A reading carries a stamp of its source's clock, which may be set while the machine runs; the process has a monotone
+clock beside it. Stamps say how far two readings are apart as long as the monotone clock agrees. Corrections move by the
+monotone clock alone.
+"""
+
+import math
+from typing import NamedTuple
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.reading import Reading
+from thermocomp.runtime.gate import CLOCK_SKEW, explain_untimely
+from thermocomp.runtime.state import CompensatorState
+
+
+class Instant(NamedTuple):
+    """When a reading was taken."""
+
+    time: float  #: on the time of the state [s]
+    origin: float  #: of the state from now on [s]
+
+
+def place(state: CompensatorState, reading: Reading, now: float, tick: float, limits: Limits) -> tuple[Instant, str]:
+    """Return when a reading was taken, and why it comes at a wrong time; empty if it does not.
+
+    Parameters
+    ----------
+    state : CompensatorState
+    reading : Reading
+    now : float
+        The clock of the reading's source, now [s].
+    tick : float
+        The monotone clock of the process, now [s].
+    limits : Limits
+
+    Returns
+    -------
+    Instant
+    str
+    """
+    if why := explain_untimely(reading, now, limits):
+        return Instant(math.nan, state.origin), why
+    if state.time is None:
+        return Instant(reading.time, 0.0), ""
+    passed = 0.0 if state.taken is None else max(tick - state.taken, 0.0)
+    if math.isnan(state.origin):  # after a restart: what was saved is `away` old
+        return _set(state, reading, state.away or 0.0), ""
+    time, last = reading.time - state.origin, state.time + state.origin
+    back = time <= state.time
+    if back and (last <= now + CLOCK_SKEW or passed <= 0.0):
+        why = f"reading of {reading.time:g} s is not later than the last one of {last:g} s"
+        return Instant(math.nan, state.origin), why
+    if back or abs(time - state.time - passed) > limits.reading_age:  # the clock was set
+        return _set(state, reading, passed), ""
+    return Instant(time, state.origin), ""
+
+
+def _set(state: CompensatorState, reading: Reading, passed: float) -> Instant:
+    """Return when a reading was taken, so long after the last one, whatever its stamp says."""
+    time = (state.time or 0.0) + passed
+    return Instant(time, reading.time - time)
