@@ -1,0 +1,202 @@
+"""The state of a compensator as a file: whole or not at all, bit-exact, refused where it is damaged or of others."""
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import AwareDatetime
+from pydantic_core import SchemaValidator
+
+from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.zero import MOST, Gathered
+from thermocomp.files import jsonfile
+from thermocomp.files.modelfile import entry_of
+from thermocomp.files.typed import decode, encode, want
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import CompensatorState
+from thermocomp.runtime.watch import WORDS
+
+KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
+
+
+@dataclass(frozen=True)
+class _Stored:
+    written: AwareDatetime
+    models: str
+    state: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A state and when it was.
+
+    Parameters
+    ----------
+    written : datetime
+        In UTC.
+    state : CompensatorState
+    """
+
+    written: datetime
+    state: CompensatorState
+
+
+@cache
+def _reader() -> SchemaValidator:
+    return jsonfile.reader_of(_Stored)
+
+
+def fingerprint(compensator: Compensator) -> str:
+    """Return what tells the models of a compensator from others."""
+    watches = [asdict(w) for w in compensator.watches]
+    entries = [entry_of(m) for m in compensator.models]
+    text = json.dumps([list(compensator.lines), entries, watches], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
+    """Return the text of a state file.
+
+    Parameters
+    ----------
+    state : CompensatorState
+    compensator : Compensator
+        Whose state it is.
+    written : datetime
+        Now, with its time zone.
+
+    Raises
+    ------
+    InputError
+        `written` does not know its time zone.
+    """
+    if written.tzinfo is None:
+        raise InputError(f"state of a compensator: {written} has no time zone")
+    entry = {
+        "written": written.astimezone(UTC).isoformat(),
+        "models": fingerprint(compensator),
+        "state": encode(state),
+    }
+    return jsonfile.pack(KIND, [entry])
+
+
+def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
+    """Read the text of a state file.
+
+    Parameters
+    ----------
+    text : str
+    compensator : Compensator
+        Whose state it must be.
+    source : str
+        What to call it in an error.
+
+    Raises
+    ------
+    ModelFileError
+        Not JSON, not a state file, of a newer version, altered, incomplete, of other models, or no state that these
+        models can be in.
+    """
+    (stored,) = jsonfile.unpack(KIND, _reader(), text, source).models[:1]
+    if stored.models != fingerprint(compensator):
+        raise ModelFileError(f"{source}: the state of other models; start without it, or with the models it belongs to")
+    try:
+        state = decode(CompensatorState, stored.state, "state")
+        _check(state, compensator)
+    except (ValueError, InputError) as e:
+        raise ModelFileError(f"{source}: no state that these models can be in: {e}") from e
+    return Saved(stored.written, state)
+
+
+def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
+    """Write a state over the one before: a kill leaves one of them, whole.
+
+    Raises
+    ------
+    InputError
+        It cannot be written there.
+    """
+    jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
+
+
+def read(path: str | Path, compensator: Compensator) -> Saved:
+    """Read a state file.
+
+    Raises
+    ------
+    ModelFileError
+        There is no such file, or it cannot be used; see `loads`.
+    """
+    text, source = jsonfile.read(KIND, path)
+    return loads(text, compensator, source)
+
+
+# -- what these models can be in ---------------------------------------------------------------------------------------
+
+
+def _check(state: CompensatorState, compensator: Compensator) -> None:
+    """Raise `ValueError` unless it is a state of this compensator."""
+    cold, lines = compensator.start(), compensator.lines
+    want(list(state.corrections) == list(lines), list(state.corrections), "corrections", f"those of {', '.join(lines)}")
+    for name in ("idle", "learned", "references", "raw", "orders"):
+        want(set(getattr(state, name)) <= set(lines), None, name, f"none but {', '.join(lines)}")
+    most = compensator.limits.magnitude * (1 + 1e-9)
+    for target, correction in state.corrections.items():
+        largest = max(abs(correction.at(p)) for p in lines[target].travel)
+        want(largest <= most, largest, f"corrections.{target}", f"at most {most:g} um")
+    for name, number in (("time", state.time), ("clock", state.clock), ("taken", state.taken), ("away", state.away)):
+        want(number is None or math.isfinite(number) or name == "away", number, name, "a finite number")
+    want(all(0.0 <= v < math.inf for v in state.idle.values()), None, "idle", "times")
+    for name in ("models", "gathered", "watches"):
+        found, expected = len(getattr(state, name)), len(getattr(cold, name))
+        want(found == expected, found, name, f"{expected} of them")
+    for k, (model, own, begun) in enumerate(zip(compensator.models, state.models, state.gathered, strict=True)):
+        place, n = f"models.{k}", len(model.inputs)
+        _alike(own.reference, (n,), f"{place}.reference", finite=False)
+        memory = model.step(model.init(np.zeros(n)), np.zeros(n), 0.0)[0].memory
+        if own.memory is not None and memory is not None:
+            _alike(own.memory, memory.shape, f"{place}.memory")
+            _alike(own.reference, (n,), f"{place}.reference")
+        _alike(own.deviation, (), f"{place}.deviation")
+        _alike(own.outside, (n,), f"{place}.outside")
+        _check_gathered(begun, n, f"gathered.{k}")
+    for k, (watch, seen, first) in enumerate(zip(compensator.watches, state.watches, cold.watches, strict=True)):
+        for name, value in seen._asdict().items():
+            if isinstance(value, np.ndarray):
+                # what is used in the predictions is always a number; instants may be unknown
+                sure = name in ("memory", "traces", "used", "predicted", "usual")
+                _alike(
+                    value, getattr(first, name).shape, f"watches.{k}.{name}", finite=sure and not np.isnan(seen.time)
+                )
+        want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"watches.{k}.fault", "a known fault")
+        _check_gathered(seen.gathered, len(watch.inputs), f"watches.{k}.gathered")
+    for target, learned in state.learned.items():
+        place, n = f"learned.{target}", len(learned.mean)
+        _alike(learned.mean, (n,), f"{place}.mean")
+        _alike(learned.covariance, (n, n), f"{place}.covariance")
+        sound = n >= 1 and np.linalg.eigvalsh(learned.covariance).min() >= -1e-6 * max(
+            np.trace(learned.covariance), 1.0
+        )
+        want(bool(sound) and 0.0 < learned.size < math.inf, None, place, "a mean with its covariance")
+        models = compensator.models[lines[target].models]
+        known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
+        want(n in known, n, f"{place}.mean", f"{max(known)} numbers")
+
+
+def _check_gathered(gathered: Gathered, n: int, place: str) -> None:
+    want(len(gathered.times) == len(gathered.values) <= MOST, len(gathered.times), place, f"at most {MOST} readings")
+    want(all(map(math.isfinite, gathered.times)), None, f"{place}.times", "numbers")
+    for values in gathered.values:
+        _alike(values, (n,), f"{place}.values")
+
+
+def _alike(found: Any, shape: tuple[int, ...], place: str, *, finite: bool = True) -> None:
+    want(found.shape == shape, list(found.shape), place, f"the shape {list(shape)}")
+    if finite:
+        want(bool(np.isfinite(found).all()), None, place, "finite numbers")

@@ -1,0 +1,197 @@
+"""The state of a compensator comes back as it was, or not at all."""
+
+import json
+import math
+import random
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from driftmodels import ACCEPTED, lags, static
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.reading import Reading
+from thermocomp.core.zero import Zeroing
+from thermocomp.datasets.virtual import record
+from thermocomp.files import jsonfile, statefile
+from thermocomp.files.typed import encode
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
+from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
+from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import CompensatorState, Status
+
+NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+FEW = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "spindle_rpm")
+
+
+@pytest.fixture(scope="module")
+def samples() -> Samples:
+    found = stack(record("demo"), ["x1_um", "z_um"])
+    return found.take(np.arange(len(found)) % 9 == 0).only(FEW)
+
+
+@pytest.fixture(scope="module")
+def machine(samples: Samples) -> Compensator:
+    everything = np.ones(len(samples), dtype=np.bool_)
+    watch = find_watch(samples, everything)
+    models = [train("averaged", samples, k, everything).model for k in range(2)]
+    return Compensator.of([replace(m, watch=watch, honest_error=ACCEPTED) for m in models], Limits())
+
+
+def run(machine: Compensator, samples: Samples, rows: int) -> CompensatorState:
+    names, state = [c.name for c in samples.inputs], machine.start()
+    for k in range(rows):
+        values = dict(zip(names, samples.values[k].tolist(), strict=True))
+        if k > 150:
+            values["t_motor_C"] = math.nan
+        probings = {"z_um": Probing(5.0)} if k == 100 else None
+        state, _ = machine.step(state, Reading(float(samples.time[k]), values), float(samples.time[k]), probings)
+    return state
+
+
+def same(one: object, other: object) -> bool:
+    one, other = ({"state": plain(encode(x))} for x in (one, other))
+    return json.dumps(one) == json.dumps(other)
+
+
+def plain(value: Any) -> Any:
+    """Return JSON in which an array of no dimension is its number."""
+    if isinstance(value, dict):
+        return value["values"][0] if value.get("shape") == [] else {k: plain(v) for k, v in value.items()}
+    return [plain(v) for v in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 5, 90, 101, 200])
+def test_it_comes_back_bit_by_bit(machine: Compensator, samples: Samples, rows: int, tmp_path: Path) -> None:
+    state = run(machine, samples, rows)
+    state = machine.order(state, "x1_um", Status("holding", "by M. Weber"))
+    if rows > 5:
+        state = machine.rezero(state, "x1_um", 5.0, "homing")
+    statefile.write(state, machine, tmp_path / "state.json", NOW)
+    saved = statefile.read(tmp_path / "state.json", machine)
+    assert saved.written == NOW
+    assert same(saved.state, state)
+    statefile.write(machine.start(), machine, tmp_path / "state.json", NOW)  # over the one before
+    assert same(statefile.read(tmp_path / "state.json", machine).state, machine.start())
+
+
+def test_other_families_too(tmp_path: Path) -> None:
+    models = [replace(m, honest_error=ACCEPTED) for m in (lags(room=True), static("y_um"))]
+    machine = Compensator.of([replace(m, zeroing=Zeroing(60.0, 60.0)) for m in models])
+    state = machine.start()
+    for k in range(5):
+        reading = Reading(30.0 * k, {"spindle_rpm": 1000.0, "t3_C": 20.0})
+        state, _ = machine.step(state, reading, reading.time)
+        statefile.write(state, machine, tmp_path / "state.json", NOW)
+        assert same(statefile.read(tmp_path / "state.json", machine).state, state)
+
+
+def test_the_state_of_other_models_is_refused(machine: Compensator, samples: Samples) -> None:
+    text = statefile.dumps(run(machine, samples, 5), machine, NOW)
+    other = Compensator.of([replace(m, intercept=1e-9) for m in machine.models])
+    with pytest.raises(ModelFileError, match=r"here\.json: the state of other models"):
+        statefile.loads(text, other, "here.json")
+    with pytest.raises(InputError, match="time zone"):
+        statefile.dumps(machine.start(), machine, datetime(2026, 1, 1))
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    found = [path]
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        found += places(inner, (*path, key))
+    return found
+
+
+BAD: tuple[object, ...] = (
+    None,
+    "x",
+    -1,
+    True,
+    1e300,
+    [],
+    {},
+    "nan",
+    "inf",
+    "1.0",
+    [[1.0]],
+    {"shape": [2], "values": [1.0]},
+)
+
+
+def damaged(content: dict[str, Any], rng: random.Random) -> str:
+    """Return a state in which one place is something else, with a checksum that is right."""
+    body = json.loads(json.dumps(content["models"]))
+    path = rng.choice([p for p in places(body) if len(p) > 1])
+    inner = body
+    for key in path[:-1]:
+        inner = inner[key]
+    if rng.random() < 0.2:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = rng.choice(BAD)
+    return jsonfile.pack(statefile.KIND, body)
+
+
+def loaded(text: str, machine: Compensator) -> tuple[CompensatorState | None, str]:
+    try:
+        return statefile.loads(text, machine, "state.json").state, ""
+    except ModelFileError as e:
+        return None, str(e)
+
+
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.long)])
+def test_what_is_damaged_with_a_right_checksum_never_moves_an_axis(
+    machine: Compensator, samples: Samples, count: int
+) -> None:
+    """It is refused by name, or what it says is within all limits, finite, and lets the machine run."""
+    state, rng, refused = run(machine, samples, 170), random.Random(1), 0
+    content = json.loads(statefile.dumps(state, machine, NOW))
+    names = [c.name for c in samples.inputs]
+    readings = [Reading(1e9 + 10.0 * k, dict(zip(names, samples.values[170].tolist(), strict=True))) for k in range(3)]
+    for _ in range(count):
+        text = damaged(content, rng)
+        found, error = loaded(text, machine)
+        if found is None:
+            assert error.startswith("state.json: ")
+            refused += 1
+            continue
+        before = found.corrections
+        for k, reading in enumerate(readings):
+            found, said = machine.step(found, reading, reading.time, tick=reading.time)
+            for target, correction in said.corrections.items():
+                assert abs(correction.offset) <= machine.limits.magnitude * (1 + 1e-9)
+                moved = abs(correction.offset - before[target].offset)
+                assert moved <= machine.limits.rate * (60.0 if k == 0 else 10.0) + 1e-9
+            before = said.corrections
+    assert refused > 0.5 * count
+
+
+@pytest.mark.parametrize("count", [300, pytest.param(10_000, marks=pytest.mark.long)])
+def test_what_is_damaged_by_a_byte_is_refused_by_name(
+    machine: Compensator, samples: Samples, count: int, tmp_path: Path
+) -> None:
+    raw, rng = statefile.dumps(run(machine, samples, 170), machine, NOW).encode(), random.Random(2)
+    path = tmp_path / "state.json"
+    for _ in range(count):
+        data = bytearray(raw)
+        what = rng.random()
+        if what < 0.3:
+            data = data[: rng.randrange(len(data))]
+        elif what < 0.5:
+            place = rng.randrange(len(data))
+            data[place:place] = bytes(rng.randrange(256) for _ in range(rng.randrange(1, 5)))
+        else:
+            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        if bytes(data).split() == raw.split():
+            continue
+        path.write_bytes(bytes(data))
+        with pytest.raises(ModelFileError, match=r"state\.json"):
+            statefile.read(path, machine)
