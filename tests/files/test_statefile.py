@@ -3,8 +3,10 @@
 import json
 import math
 import random
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -140,9 +142,9 @@ def damaged(content: dict[str, Any], rng: random.Random) -> str:
     return jsonfile.pack(statefile.KIND, body)
 
 
-def loaded(text: str, machine: Compensator) -> tuple[CompensatorState | None, str]:
+def attempt(read: Callable[[], statefile.Saved]) -> tuple[CompensatorState | None, str]:
     try:
-        return statefile.loads(text, machine, "state.json").state, ""
+        return read().state, ""
     except ModelFileError as e:
         return None, str(e)
 
@@ -158,7 +160,7 @@ def test_what_is_damaged_with_a_right_checksum_never_moves_an_axis(
     readings = [Reading(1e9 + 10.0 * k, dict(zip(names, samples.values[170].tolist(), strict=True))) for k in range(3)]
     for _ in range(count):
         text = damaged(content, rng)
-        found, error = loaded(text, machine)
+        found, error = attempt(partial(statefile.loads, text, machine, "state.json"))
         if found is None:
             assert error.startswith("state.json: ")
             refused += 1
@@ -178,8 +180,8 @@ def test_what_is_damaged_with_a_right_checksum_never_moves_an_axis(
 def test_what_is_damaged_by_a_byte_is_refused_by_name(
     machine: Compensator, samples: Samples, count: int, tmp_path: Path
 ) -> None:
-    raw, rng = statefile.dumps(run(machine, samples, 170), machine, NOW).encode(), random.Random(2)
-    path = tmp_path / "state.json"
+    state, rng = run(machine, samples, 170), random.Random(2)
+    raw, path, unharmed = statefile.dumps(state, machine, NOW).encode(), tmp_path / "state.json", 0
     for _ in range(count):
         data = bytearray(raw)
         what = rng.random()
@@ -190,8 +192,8 @@ def test_what_is_damaged_by_a_byte_is_refused_by_name(
             data[place:place] = bytes(rng.randrange(256) for _ in range(rng.randrange(1, 5)))
         else:
             data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-        if bytes(data).split() == raw.split():
-            continue
         path.write_bytes(bytes(data))
-        with pytest.raises(ModelFileError, match=r"state\.json"):
-            statefile.read(path, machine)
+        found, error = attempt(partial(statefile.read, path, machine))
+        assert "state.json" in error if found is None else same(found, state)  # a blank, or a digit beyond the last bit
+        unharmed += found is not None
+    assert unharmed < 0.02 * count

@@ -25,6 +25,10 @@ from thermocomp.runtime.watch import WORDS
 KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 
+#: of a watch
+_INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
+
+
 @dataclass(frozen=True)
 class _Stored:
     written: AwareDatetime
@@ -174,10 +178,13 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
                 _alike(
                     value, getattr(first, name).shape, f"watches.{k}.{name}", finite=sure and not np.isnan(seen.time)
                 )
+        instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
+        known = instants[np.isfinite(instants)]
+        want(not known.size or known.max() <= seen.time, None, f"watches.{k}", "no instant later than its last look")
         want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"watches.{k}.fault", "a known fault")
         _check_gathered(seen.gathered, len(watch.inputs), f"watches.{k}.gathered")
     for target, learned in state.learned.items():
-        place, n = f"learned.{target}", len(learned.mean)
+        place, n = f"learned.{target}", learned.mean.size
         _alike(learned.mean, (n,), f"{place}.mean")
         _alike(learned.covariance, (n, n), f"{place}.covariance")
         sound = n >= 1 and np.linalg.eigvalsh(learned.covariance).min() >= -1e-6 * max(

@@ -181,7 +181,7 @@ def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArra
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
     """Return what stands in for a sensor, minus the reference."""
-    gone = np.nan_to_num(time - state.since, nan=0.0)
+    gone = np.maximum(np.nan_to_num(time - state.since, nan=0.0), 0.0)
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
 
