@@ -174,13 +174,14 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         for name, value in seen._asdict().items():
             if isinstance(value, np.ndarray):
                 # what is used in the predictions is always a number; instants may be unknown
-                sure = name in ("memory", "traces", "used", "predicted", "usual")
+                sure = name in ("reference", "memory", "traces", "used", "predicted", "usual", "bridge")
                 _alike(
                     value, getattr(first, name).shape, f"watches.{k}.{name}", finite=sure and not np.isnan(seen.time)
                 )
         instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
         known = instants[np.isfinite(instants)]
         want(not known.size or known.max() <= seen.time, None, f"watches.{k}", "no instant later than its last look")
+        want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"watches.{k}.since", "when each failed")
         want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"watches.{k}.fault", "a known fault")
         _check_gathered(seen.gathered, len(watch.inputs), f"watches.{k}.gathered")
     for target, learned in state.learned.items():
