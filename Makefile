@@ -51,7 +51,7 @@ $(VENV)/.study: pyproject.toml
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study]' --group dev
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live]' --group dev
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml

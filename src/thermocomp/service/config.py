@@ -1,0 +1,179 @@
+"""The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import ConfigDict, Discriminator, TypeAdapter, ValidationError, with_config
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.tomlfile import as_json, read_toml
+
+Names = dict[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MqttIn:
+    """Readings from an MQTT topic."""
+
+    kind: Literal["mqtt"]
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+    names: Names = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedIn:
+    """The virtual machine."""
+
+    kind: Literal["simulated"]
+    experiment: str = "demo"
+    seed: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayIn:
+    """A recording played back."""
+
+    kind: Literal["replay"]
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class MqttOut:
+    """Corrections to an MQTT topic."""
+
+    kind: Literal["mqtt"]
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOut:
+    """Corrections to a file."""
+
+    kind: Literal["file"]
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """The page to watch it on.
+
+    Parameters
+    ----------
+    host, port : str, int
+        Where it is served; loopback unless it is stated otherwise.
+    token_file : str
+        File with the token that buttons want; without one the page only shows.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8731
+    token_file: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.port <= 65535:
+            raise InputError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
+
+
+In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
+Out = Annotated[MqttOut | FileOut, Discriminator("kind")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Config:
+    """What the service runs.
+
+    Parameters
+    ----------
+    models : tuple of str
+        Model files.
+    sources, sinks : tuple
+        Where readings come from, where corrections go.
+    state : str
+        File that the state is kept in; without one every start is a cold one.
+    limits : Limits
+    shadow : bool
+        Nothing moves: the models are watched.
+    speed : float
+        Seconds of the machine in a second of the world: for the virtual machine and recordings alone.
+    page : Page or None
+    """
+
+    models: tuple[str, ...]
+    sources: tuple[In, ...]
+    sinks: tuple[Out, ...] = ()
+    state: str = ""
+    limits: Limits = Limits()
+    shadow: bool = False
+    speed: float = 1.0
+    page: Page | None = None
+
+    def __post_init__(self) -> None:
+        if not self.models:
+            raise InputError("models = []: name at least one model file, as 'thermocomp fit' writes it")
+        if not self.sources:
+            raise InputError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
+        if not 0.0 < self.speed <= 10_000.0:
+            raise InputError(f"speed = {self.speed:g}: want more than 0, at most 10000")
+        if self.speed != 1.0 and any(isinstance(s, MqttIn) for s in self.sources):
+            raise InputError(f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1")
+
+
+class Settings(NamedTuple):
+    """A configuration and the folder that its files are named from."""
+
+    config: Config
+    folder: Path
+
+
+_ADAPTER: TypeAdapter[Config] = TypeAdapter(
+    with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(Config)
+)
+_PLAIN = {
+    "missing": "is missing",
+    "unexpected_keyword_argument": "is no key that is known",
+    "extra_forbidden": "is no key that is known",
+    "dataclass_type": "must be a table, such as [limits]",
+    "tuple_type": "must be a list: [...]",
+    "dict_type": "must be a table",
+    "union_tag_not_found": 'has no kind: write kind = "..."',
+}
+
+
+def read_config(path: str | Path) -> Settings:
+    """Read a configuration.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is no TOML, or something in it is wrong: all of it is listed, each with its place.
+    """
+    content = read_toml(path, "configuration of the service")
+    try:
+        config = _ADAPTER.validate_json(as_json(content))
+    except ValidationError as e:
+        errors = e.errors(include_url=False)
+        lines = [_tell(dict(error)) for error in errors]
+        raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
+    return Settings(config, Path(path).resolve().parent)
+
+
+def _tell(error: dict[str, Any]) -> str:
+    kinds = ("mqtt", "simulated", "replay", "file")
+    place = ".".join(f"{k + 1}" if isinstance(k, int) else str(k) for k in error["loc"] if k not in kinds) or "file"
+    context = error.get("ctx", {})
+    if error["type"] == "value_error":
+        return str(context["error"]) if place == "file" else f"{place}: {context['error']}"
+    if error["type"] == "union_tag_invalid":
+        return f"{place}: kind = {context['tag']!r} is none of {context['expected_tags']}"
+    message = _PLAIN.get(error["type"])
+    return f"{place} {message}" if message else f"{place}: {error['msg']}, found {error['input']!r:.60}"

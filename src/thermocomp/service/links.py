@@ -1,0 +1,94 @@
+"""Links of the service: each source and each sink in a task of its own, connected anew when it is lost."""
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable, Mapping
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.ports import Sink, Source
+from thermocomp.core.reading import Reading
+
+#: a connection that takes longer, or a sink that does not answer for so long, has failed [s]
+TIMEOUT = 5.0
+#: between two attempts: at first, and at most [s]
+FIRST, LONGEST = 0.5, 30.0
+
+
+async def read_from(source: Source, take: Callable[[Reading], None]) -> None:
+    """Take what a source says for ever; one that is played to its end stays closed.
+
+    Parameters
+    ----------
+    source : Source
+    take : callable
+        Called with each reading.
+    """
+    wait = FIRST
+    while True:
+        try:
+            await source.connect(TIMEOUT)
+            async for reading in source.readings():
+                take(reading)
+                wait = FIRST
+            if source.status().state == "closed":
+                return
+        except (ThermocompError, OSError):
+            pass  # its status says why
+        finally:
+            with contextlib.suppress(ThermocompError, OSError):
+                if source.status().state != "closed":
+                    await source.close()
+        await asyncio.sleep(wait)
+        wait = min(2 * wait, LONGEST)
+
+
+class Outlet:
+    """A sink that gets the newest corrections, as fast as it takes them.
+
+    Parameters
+    ----------
+    sink : Sink
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self.sink = sink
+        self.applied: dict[str, Correction] = {}  #: what it has taken last
+        self._newest: dict[str, Correction] = {}
+        self._news = asyncio.Event()
+
+    def put(self, corrections: Mapping[str, Correction]) -> None:
+        """Hand corrections over, at once; what was not taken yet is replaced."""
+        self._newest = dict(corrections)
+        self._news.set()
+
+    async def run(self) -> None:
+        """Apply what is put, for ever."""
+        wait = FIRST
+        while True:
+            try:
+                await self.sink.connect(TIMEOUT)
+                while True:
+                    await self._news.wait()
+                    self._news.clear()
+                    newest = self._newest
+                    async with asyncio.timeout(TIMEOUT):
+                        await self.sink.apply(newest)
+                    self.applied, wait = newest, FIRST
+            except (ThermocompError, OSError, TimeoutError):
+                self._news.set()  # what was lost is applied after the next connection
+            await asyncio.sleep(wait)
+            wait = min(2 * wait, LONGEST)
+
+    async def flush(self) -> None:
+        """Apply what was put last, if the sink is there."""
+        with contextlib.suppress(ThermocompError, OSError, TimeoutError):
+            async with asyncio.timeout(TIMEOUT):
+                await self.sink.apply(self._newest)
+
+
+async def within(seconds: float, work: Awaitable[None]) -> None:
+    """Do something that may fail or take too long, without waiting for ever."""
+    with contextlib.suppress(ThermocompError, OSError, TimeoutError):
+        async with asyncio.timeout(seconds):
+            await work

@@ -1,0 +1,213 @@
+"""The service: readings come in, the compensator takes each, corrections go out; whatever fails, the rest goes on."""
+
+import asyncio
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.ports import Sink, Source
+from thermocomp.core.reading import Reading
+from thermocomp.files import statefile
+from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
+from thermocomp.service.clock import Clock
+from thermocomp.service.links import Outlet, read_from, within
+
+#: events that are kept to be shown
+EVENTS = 200
+#: points of each curve that are kept to be shown, and time between two [s of the machine]
+POINTS, EVERY = 720, 30.0
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened.
+
+    Parameters
+    ----------
+    time : float
+        Of the machine, seconds since 1970.
+    kind : str
+        ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
+    text : str
+    """
+
+    time: float
+    kind: str
+    text: str
+
+
+@dataclass
+class Service:
+    """A compensator between sources and sinks.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    sources : sequence of Source
+    sinks : sequence of Sink
+    clock : Clock
+    state_path : Path or None
+        Where the state is kept.
+    """
+
+    compensator: Compensator
+    sources: Sequence[Source]
+    sinks: Sequence[Sink]
+    clock: Clock = field(default_factory=Clock)
+    state_path: Path | None = None
+    state: CompensatorState = field(init=False)
+    said: Compensated | None = field(default=None, init=False)
+    events: deque[Event] = field(init=False)
+    curves: deque[dict[str, float]] = field(init=False)  #: what is drawn: a row of numbers, ``time`` first
+    latest: dict[str, tuple[float, float]] = field(default_factory=dict, init=False)  #: value and when, by channel
+    counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
+    listeners: set[Callable[[], None]] = field(default_factory=set, init=False)
+    probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
+
+    def __post_init__(self) -> None:
+        self.events, self.curves = deque(maxlen=EVENTS), deque(maxlen=POINTS)
+        self.outlets = [Outlet(sink) for sink in self.sinks]
+        self.state = self._begin()
+        self._saved, self._dirty = -1e9, False
+        self._heard = self.clock.tick()
+
+    # -- what happens --------------------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Run until it is cancelled; then save the state and leave the corrections as they are."""
+        try:
+            async with asyncio.TaskGroup() as group:
+                for source in self.sources:
+                    group.create_task(read_from(source, self.take))
+                for outlet in self.outlets:
+                    group.create_task(outlet.run())
+                group.create_task(self._watch())
+        finally:
+            for outlet in self.outlets:
+                await outlet.flush()
+            for close in [*(s.close for s in self.sources), *(s.close for s in self.sinks)]:
+                await within(2.0, close())
+            self._save()
+
+    def take(self, reading: Reading) -> None:
+        """Take a reading of a source in: with it goes the latest of the others."""
+        tick, now = self.clock.tick(), self.clock.now()
+        stamp, most = self.clock.of(reading.time), self.compensator.limits.reading_age
+        if now - stamp > most:
+            self.counts["rejected"] += 1
+            return
+        for name, value in reading.values.items():
+            self.latest[name] = (value, tick)
+        if len(self.latest) > 10_000:  # names that nobody knows, without end
+            self.latest = {n: v for n, v in self.latest.items() if tick - v[1] <= most}
+        fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
+        probings, self.probings = self.probings, {}
+        self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
+        self._heard = tick
+        self.counts["readings"] += 1
+        self.counts["rejected"] += bool(said.rejected)
+        self._tell(said, probings)
+
+    def order(self, target: str, status: Status | None) -> None:
+        """Take a target out, or let it run again; see `Compensator.order`."""
+        self.state = self.compensator.order(self.state, target, status)
+        word = f"{status.word}: {status.reason}" if status else "runs again"
+        self._say("state", f"{target} {word}, as ordered")
+        self._dirty = True
+
+    def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
+        """Let a target count anew from now; see `Compensator.rezero`."""
+        self.state = self.compensator.rezero(self.state, target, self.clock.now(), why, in_force)
+        self._say("reference", f"{target} counts anew: {why}")
+        self._dirty = True
+
+    def probe(self, target: str, probing: Probing) -> None:
+        """Use a probing with the next reading."""
+        self.probings[target] = probing
+
+    # -- inside --------------------------------------------------------------------------------------------------------
+
+    def _begin(self) -> CompensatorState:
+        cold = self.compensator.start()
+        if self.state_path is None:
+            return cold
+        if not self.state_path.exists():
+            self._say("service", f"cold start: there is no {self.state_path}")
+            return cold
+        try:
+            saved = statefile.read(self.state_path, self.compensator)
+        except ThermocompError as e:
+            self._say("service", f"cold start: {e}")
+            kept = self.state_path.with_name(f"{self.state_path.name}.refused")
+            with contextlib.suppress(OSError):
+                self.state_path.replace(kept)
+            return cold
+        age = (datetime.now(UTC) - saved.written).total_seconds() * self.clock.speed
+        state = resume(saved.state, cold, age)
+        how = "goes on" if state.references else "begins anew, with the corrections that are in force"
+        self._say("service", f"start after {age:.0f} s: {how}")
+        return state
+
+    async def _watch(self) -> None:
+        """Look after what no reading does: time goes by, the state is saved."""
+        while True:
+            await asyncio.sleep(min(1.0, max(0.1, 1.0 / self.clock.speed)))
+            tick = self.clock.tick()
+            silent = tick - self._heard
+            if silent > max(2.0, 2.0 * self.clock.speed):
+                why = f"no reading for {silent:.0f} s"
+                self.state, said = self.compensator.wait(self.state, tick, why)
+                self._tell(said, {})
+            if self._dirty and time.monotonic() - self._saved >= 1.0:
+                self._dirty, self._saved = False, time.monotonic()
+                await asyncio.to_thread(self._save)
+
+    def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
+        before, self.said = self.said, said
+        for outlet in self.outlets:
+            outlet.put(said.corrections)
+        for target, status in said.states.items():
+            if before is None or before.states.get(target, Status("active")).word != status.word:
+                self._say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
+        for name, fault in said.failed.items():
+            if before is None or before.failed.get(name) != fault:
+                self._say("sensor", f"{name} {fault}: what the others predict stands in")
+        for name in (before.failed if before else {}).keys() - said.failed.keys():
+            self._say("sensor", f"{name} is believed again")
+        for target in probings:
+            why = said.refused.get(target)
+            self._say("probing", f"{target} {'refused: ' + why if why else 'taken'}")
+        now = self.clock.now()
+        if said.deviations and (not self.curves or now - self.curves[-1]["time"] >= EVERY):
+            self.curves.append({"time": now, **self._numbers(said)})
+        self._dirty = True
+        for listener in list(self.listeners):
+            listener()
+
+    def _numbers(self, said: Compensated) -> dict[str, float]:
+        heat = {i.name for m in self.compensator.models for i in m.inputs if i.quantity == "temperature"}
+        found = {name: self.latest[name][0] for name in sorted(heat & self.latest.keys())}
+        for target, deviation in said.deviations.items():
+            found[f"{target} predicted"] = deviation.offset
+            if target in said.half_widths:
+                found[f"{target} +-"] = said.half_widths[target]
+        return found | {f"{target} correction": c.offset for target, c in said.corrections.items()}
+
+    def _say(self, kind: str, text: str) -> None:
+        self.events.append(Event(self.clock.now(), kind, text))
+
+    def _save(self) -> None:
+        if self.state_path is None:
+            return
+        try:
+            statefile.write(self.state, self.compensator, self.state_path, datetime.now(UTC))
+        except (ThermocompError, OSError) as e:
+            self._say("service", f"the state is not saved: {e}")
