@@ -43,6 +43,7 @@ COMMANDS = {
     "volumetric": "Tell the error of the tool's tip at a point and all over the work volume, and what corrections "
     "leave of it.",
     "revise": "Correct an NC program by the drift it will cause, before it is run.",
+    "serve": "Run the compensator live: sensors in, corrections out, with a page to watch.",
     "papers": "Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds "
     "here.",
 }

@@ -8,8 +8,7 @@ from thermocomp.core.exceptions import MissingExtraError
 #: top-level modules that each extra brings
 EXTRAS: dict[str, tuple[str, ...]] = {
     "study": ("jinja2", "joblib", "matplotlib", "openpyxl", "pandas", "pyarrow", "scipy", "sklearn"),
-    "serve": ("fastapi", "uvicorn"),
-    "mqtt": ("aiomqtt",),
+    "live": ("aiomqtt", "fastapi", "jinja2", "uvicorn"),
     "opcua": ("asyncua",),
     "onnx": ("onnx", "onnxruntime"),
     "dask": ("dask", "distributed"),

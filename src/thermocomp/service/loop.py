@@ -123,6 +123,10 @@ class Service:
         self._say("state", f"{target} {word}, as ordered")
         self._dirty = True
 
+    def watch_only(self, target: str) -> None:
+        """Let a target run in shadow from the start, as configured."""
+        self.state = self.compensator.order(self.state, target, Status("shadow", "by configuration"))
+
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
         """Let a target count anew from now; see `Compensator.rezero`."""
         self.state = self.compensator.rezero(self.state, target, self.clock.now(), why, in_force)

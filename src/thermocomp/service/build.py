@@ -1,0 +1,76 @@
+"""The service that a configuration describes."""
+
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from thermocomp.adapters.mqtt import MqttSink, MqttSource
+from thermocomp.adapters.plain import FileSink, ReplaySource, SimulatedSource
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.ports import Sink, Source
+from thermocomp.files import modelfile
+from thermocomp.files.protocols import read_protocol
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.service.clock import Clock
+from thermocomp.service.config import FileOut, In, MqttIn, Out, ReplayIn, Settings
+from thermocomp.service.loop import Service
+from thermocomp.simulation.protocol import Experiment
+
+
+def build(settings: Settings) -> Service:
+    """Return the service of a configuration; nothing is connected yet.
+
+    Parameters
+    ----------
+    settings : Settings
+
+    Raises
+    ------
+    InputError
+        A model file or an experiment cannot be used, or none of the models may run.
+    """
+    config, folder = settings
+    models = [model for path in config.models for model in modelfile.read(folder / path)]
+    compensator = Compensator.of(models, config.limits, watching=config.shadow)
+    service = Service(
+        compensator,
+        [_source(one, folder, config.speed) for one in config.sources],
+        [_sink(one, folder) for one in config.sinks],
+        Clock(config.speed),
+        folder / config.state if config.state else None,
+    )
+    if config.shadow:
+        for target in compensator.lines.keys() - compensator.shadow.keys():
+            service.watch_only(target)
+    return service
+
+
+def find_experiment(name: str, folder: Path) -> Experiment:
+    """Return an experiment of the virtual machine: one that comes with the package, or a protocol of one's own.
+
+    Raises
+    ------
+    InputError
+        There is none, or it cannot be used.
+    """
+    if name.endswith(".toml"):
+        return read_protocol(folder / name)
+    home = files("thermocomp.datasets") / "protocols"
+    known = sorted(p.name.removesuffix(".toml") for p in home.iterdir() if p.name.endswith(".toml"))
+    if name not in known:
+        raise InputError(f"experiment {name!r}: want a path that ends in .toml, or one of {', '.join(known)}")
+    with as_file(home / f"{name}.toml") as path:
+        return read_protocol(path)
+
+
+def _source(one: In, folder: Path, speed: float) -> Source:
+    if isinstance(one, MqttIn):
+        return MqttSource(topic=one.topic, host=one.host, port=one.port, names=dict(one.names))
+    if isinstance(one, ReplayIn):
+        return ReplaySource(path=folder / one.file, speed=speed)
+    return SimulatedSource(experiment=find_experiment(one.experiment, folder), seed=one.seed, speed=speed)
+
+
+def _sink(one: Out, folder: Path) -> Sink:
+    if isinstance(one, FileOut):
+        return FileSink(path=folder / one.file)
+    return MqttSink(topic=one.topic, host=one.host, port=one.port)
