@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, SettingError
 
 #: one position, or an array of them
 _Position = TypeVar("_Position", float, NDArray[np.float64])
@@ -137,9 +137,9 @@ class Limits:
         for name in ("magnitude", "rate", "reading_age", "hold", "fade"):
             value = getattr(self, name)
             if not value > 0:  # also refuses nan
-                raise InputError(f"limit {name} = {value}: must be positive")
+                raise SettingError(f"limit {name} = {value}: must be positive")
         if not (self.dead_band >= 0 and math.isfinite(self.dead_band)):
-            raise InputError(f"limit dead_band = {self.dead_band}: must be finite and not negative")
+            raise SettingError(f"limit dead_band = {self.dead_band}: must be finite and not negative")
 
     def in_words(self) -> str:
         """Return what holds for corrections as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""

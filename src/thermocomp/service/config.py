@@ -7,10 +7,17 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import ConfigDict, Discriminator, TypeAdapter, ValidationError, with_config
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.files.tomlfile import as_json, read_toml
 
 Names = dict[str, str]
+
+
+def _check_broker(topic: str, port: int) -> None:
+    if not topic.strip():
+        raise SettingError(f"topic = {topic!r}: name one, such as 'machine/7/temperatures'")
+    if not 0 < port <= 65535:
+        raise SettingError(f"port = {port}: want one from 1 to 65535")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +29,9 @@ class MqttIn:
     host: str = "127.0.0.1"
     port: int = 1883
     names: Names = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check_broker(self.topic, self.port)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +60,9 @@ class MqttOut:
     host: str = "127.0.0.1"
     port: int = 1883
 
+    def __post_init__(self) -> None:
+        _check_broker(self.topic, self.port)
+
 
 @dataclass(frozen=True, kw_only=True)
 class FileOut:
@@ -77,7 +90,7 @@ class Page:
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65535:
-            raise InputError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
+            raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
 
 
 In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
@@ -115,13 +128,15 @@ class Config:
 
     def __post_init__(self) -> None:
         if not self.models:
-            raise InputError("models = []: name at least one model file, as 'thermocomp fit' writes it")
+            raise SettingError("models = []: name at least one model file, as 'thermocomp fit' writes it")
         if not self.sources:
-            raise InputError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
+            raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
         if not 0.0 < self.speed <= 10_000.0:
-            raise InputError(f"speed = {self.speed:g}: want more than 0, at most 10000")
+            raise SettingError(f"speed = {self.speed:g}: want more than 0, at most 10000")
         if self.speed != 1.0 and any(isinstance(s, MqttIn) for s in self.sources):
-            raise InputError(f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1")
+            raise SettingError(
+                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1"
+            )
 
 
 class Settings(NamedTuple):

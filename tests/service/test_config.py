@@ -1,0 +1,94 @@
+"""A configuration: all that is wrong with it at once, in words that help."""
+
+from pathlib import Path
+
+import pytest
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.service.config import MqttIn, Page, read_config
+
+GOOD = """
+models = ["model.json"]
+state = "state.json"
+
+[limits]
+magnitude = 80.0
+rate = 0.05
+
+[[sources]]
+kind = "mqtt"
+topic = "machine/7/temperatures"
+names = {motor = "t_motor_C"}
+
+[[sinks]]
+kind = "file"
+file = "corrections.json"
+
+[page]
+port = 8080
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "serve.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_what_it_says(tmp_path: Path) -> None:
+    config, folder = read_config(written(tmp_path, GOOD))
+    assert folder == tmp_path
+    assert config.sources == (MqttIn(kind="mqtt", topic="machine/7/temperatures", names={"motor": "t_motor_C"}),)
+    assert (config.limits.magnitude, config.limits.hold) == (80.0, 1800.0)
+    assert config.page == Page(port=8080)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('models = ["model.json"]', "", "models is missing"),
+        ('models = ["model.json"]', "models = []", "name at least one model file"),
+        ('models = ["model.json"]', 'models = "model.json"', "models must be a list"),
+        ('models = ["model.json"]', "models = [7]", "models.1: Input should be a valid string, found 7"),
+        ('state = "state.json"', 'stat = "state.json"', "stat is no key that is known"),
+        ("magnitude = 80.0", "magnitude = -1.0", "limits: limit magnitude = -1.0: must be positive"),
+        ("magnitude = 80.0", 'magnitude = "80 um"', "limits.magnitude: Input should be a valid number"),
+        ("rate = 0.05", "rates = 0.05", "limits.rates is no key that is known"),
+        ('kind = "mqtt"', 'kind = "mqqt"', "sources.1: kind = 'mqqt' is none of 'mqtt', 'simulated', 'replay'"),
+        ('kind = "mqtt"', "", 'sources.1 has no kind: write kind = "..."'),
+        ('topic = "machine/7/temperatures"', "", "sources.1.topic is missing"),
+        ('topic = "machine/7/temperatures"', "topic = 7", "sources.1.topic: Input should be a valid string"),
+        ('topic = "machine/7/temperatures"', 'topic = ""', "topic = '': name one"),
+        ('topic = "machine/7/temperatures"', 'topic = "a"\nport = 0', "port = 0: want one from 1 to 65535"),
+        ('names = {motor = "t_motor_C"}', 'names = ["t_motor_C"]', "sources.1.names must be a table"),
+        ('kind = "file"', 'kind = "linux"', "sinks.1: kind = 'linux' is none of"),
+        ("port = 8080", "port = 80800", "page: port = 80800: want a port from 0"),
+        ("port = 8080", 'port = "8080"', "page.port: Input should be a valid integer, found '8080'"),
+        ("[page]", "[pages]", "pages is no key that is known"),
+        ('state = "state.json"', "speed = 60.0", "a machine that MQTT tells of runs at the speed of the world"),
+        ('state = "state.json"', "speed = 0.0", "speed = 0: want more than 0"),
+        ('state = "state.json"', 'state = "state.json', "not valid TOML"),
+    ],
+)
+def test_what_is_wrong(old: str, new: str, says: str, tmp_path: Path) -> None:
+    assert old in GOOD
+    with pytest.raises(InputError, match=r"serve\.toml") as caught:
+        read_config(written(tmp_path, GOOD.replace(old, new)))
+    assert says in str(caught.value)
+
+
+def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("rate = 0.05", "rates = 0.05").replace("port = 8080", 'port = "x"').replace("file =", "fil =")
+    with pytest.raises(InputError) as caught:
+        read_config(written(tmp_path, text))
+    lines = str(caught.value).splitlines()
+    assert lines[0].endswith("4 to mend:")
+    assert [
+        any(word in line for line in lines) for word in ("limits.rates", "page.port", "sinks.1.fil ", "sinks.1.file")
+    ]
+    assert len(lines) == 5
+
+
+def test_there_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such configuration"):
+        read_config(tmp_path / "serve.toml")

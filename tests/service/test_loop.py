@@ -1,0 +1,250 @@
+"""The service between sources and sinks: what is lost comes back, and nothing stops the rest."""
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import aiomqtt
+import pytest
+from broker import Mosquitto
+from driftmodels import ACCEPTED, growing
+
+from thermocomp.adapters.mqtt import MqttSink, MqttSource
+from thermocomp.adapters.plain import FileSink
+from thermocomp.core.correction import Correction, Limits
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.ports import Status as LinkStatus
+from thermocomp.core.reading import Reading
+from thermocomp.files import statefile
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import Status
+from thermocomp.service.loop import Service
+
+QUICK = Limits(rate=1e9)
+
+
+def machine(limits: Limits = QUICK) -> Compensator:
+    return Compensator.of([growing("z_um", 2.0)], limits)
+
+
+class Given:
+    """A source that says what it is given."""
+
+    def __init__(self) -> None:
+        self.queue: asyncio.Queue[Reading | None] = asyncio.Queue()
+        self.connects = 0
+
+    async def connect(self, timeout: float) -> None:
+        self.connects += timeout > 0
+
+    async def readings(self) -> AsyncIterator[Reading]:
+        while (reading := await self.queue.get()) is not None:
+            yield reading
+        raise ThermocompError("lost")
+
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected")
+
+    async def close(self) -> None:
+        pass
+
+
+class Broken:
+    """A sink that never takes anything, or hangs."""
+
+    def __init__(self, *, hangs: bool) -> None:
+        self.hangs, self.tried = hangs, 0
+
+    async def connect(self, timeout: float) -> None:
+        self.tried += timeout > 0
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        if self.hangs:
+            await asyncio.sleep(1e6)
+        raise ThermocompError(f"refused {len(corrections)}")
+
+    def status(self) -> LinkStatus:
+        return LinkStatus("failed")
+
+    async def close(self) -> None:
+        pass
+
+
+def say(source: Given, temperature: float) -> None:
+    source.queue.put_nowait(Reading(time.time(), {"t": temperature}))
+
+
+async def until(right: object, seconds: float = 10.0) -> None:
+    """Wait until something holds."""
+    assert callable(right)
+    async with asyncio.timeout(seconds):
+        while not right():
+            await asyncio.sleep(0.01)
+
+
+async def running(service: Service, work: object) -> None:
+    """Do something while the service runs."""
+    assert callable(work)
+    task = asyncio.create_task(service.run())
+    try:
+        await work()
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def test_readings_go_in_and_corrections_come_out(tmp_path: Path) -> None:
+    source, path = Given(), tmp_path / "corrections.json"
+    service = Service(machine(), [source], [FileSink(path=path)])
+
+    async def work() -> None:
+        for k in range(3):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+        await until(lambda: path.exists() and json.loads(path.read_text())["corrections"]["z_um"]["offset_um"] == -4.0)
+
+    asyncio.run(running(service, work))
+    assert service.counts == {"readings": 3, "rejected": 0}
+    assert [e.text for e in service.events if e.kind == "state"] == ["z_um active"]
+
+
+@pytest.mark.parametrize("hangs", [True, False])
+def test_one_dead_sink_and_a_lost_source_stop_nothing(hangs: bool, tmp_path: Path) -> None:
+    first, second, broken, path = Given(), Given(), Broken(hangs=hangs), tmp_path / "corrections.json"
+    service = Service(machine(), [first, second], [broken, FileSink(path=path)])
+
+    async def work() -> None:
+        say(second, 20.0)
+        await until(lambda: service.counts["readings"] == 1)
+        first.queue.put_nowait(None)
+        say(second, 21.0)
+        await until(lambda: path.exists() and '"offset_um": -2.0' in path.read_text())
+        await until(lambda: first.connects == 2)
+        say(first, 22.0)
+        await until(lambda: '"offset_um": -4.0' in path.read_text())
+
+    asyncio.run(running(service, work))
+    assert broken.tried >= 1
+
+
+def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
+    source, path = Given(), tmp_path / "state.json"
+    service = Service(machine(), [source], [], state_path=path)
+
+    async def warm() -> None:
+        for k in range(3):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+
+    asyncio.run(running(service, warm))
+    assert statefile.read(path, machine()).state.corrections["z_um"].offset == -4.0
+    slow = machine(Limits(rate=0.1))
+    again, other = Service(slow, [source], [], state_path=path), Given()
+    again.sources = [other]
+    assert again.state.corrections["z_um"].offset == -4.0
+    assert "goes on" in again.events[0].text
+
+    async def on() -> None:
+        say(other, 22.0)
+        await until(lambda: again.counts["readings"] == 1)
+
+    asyncio.run(running(again, on))
+    assert again.state.corrections["z_um"].offset == -4.0
+    assert again.state.references == service.state.references
+
+
+def test_a_damaged_state_is_a_cold_start_and_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    path.write_text("{}", encoding="ascii")
+    service = Service(machine(), [], [], state_path=path)
+    assert service.events[0].text.startswith("cold start: ")
+    assert (tmp_path / "state.json.refused").read_text(encoding="ascii") == "{}"
+    other = replace(growing("z_um", 2.0), intercept=1.0, honest_error=ACCEPTED)
+    statefile.write(machine().start(), machine(), path, datetime.now(UTC))
+    assert "other models" in Service(Compensator.of([other]), [], [], state_path=path).events[0].text
+
+
+def test_without_a_reading_it_holds_and_says_so() -> None:
+    source = Given()
+    service = Service(machine(), [source], [])
+
+    async def work() -> None:
+        say(source, 20.0)
+        await until(lambda: service.counts["readings"] == 1)
+        await until(lambda: service.said is not None and service.said.states["z_um"].word == "holding")
+
+    asyncio.run(running(service, work))
+    assert any("no reading for" in e.text for e in service.events)
+
+
+def test_what_is_ordered_is_in_the_events() -> None:
+    service = Service(machine(), [], [])
+    service.take(Reading(time.time(), {"t": 20.0}))
+    time.sleep(0.01)
+    service.take(Reading(time.time(), {"t": 21.0}))
+    service.order("z_um", Status("holding", "by M. Weber"))
+    service.rezero("z_um", "homing")
+    assert [e.text for e in service.events][-2:] == [
+        "z_um holding: by M. Weber, as ordered",
+        "z_um counts anew: homing",
+    ]
+
+
+def test_an_old_reading_is_not_used() -> None:
+    service = Service(machine(), [], [])
+    service.take(Reading(time.time() - 100.0, {"t": 20.0}))
+    assert service.counts == {"readings": 0, "rejected": 1}
+    assert service.said is None
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> object:
+    found = Mosquitto(tmp_path)
+    found.start()
+    yield found
+    found.kill()
+
+
+def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
+    source = MqttSource(topic="m/7", port=broker.port, names={"temperature": "t"})
+    service = Service(machine(), [source], [MqttSink(topic="m/7/corrections", port=broker.port)])
+    heard: list[float] = []
+
+    async def listen() -> None:
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            await client.subscribe("m/7/corrections")
+            async for message in client.messages:
+                assert isinstance(message.payload, bytes)
+                heard.append(json.loads(message.payload)["corrections"]["z_um"]["offset_um"])
+
+    async def publish(temperature: float, count: int) -> None:
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            await client.publish("m/7", b"nonsense")
+            await client.publish("m/7", json.dumps({"temperature": temperature, "time": time.time()}))
+            await until(lambda: service.counts["readings"] >= count)
+
+    async def work() -> None:
+        listener = asyncio.create_task(listen())
+        await until(lambda: source.status().state == "connected")
+        await asyncio.sleep(0.3)
+        await publish(20.0, 1)
+        await publish(21.0, 2)
+        await until(lambda: heard[-1:] == [-2.0])
+        await asyncio.gather(asyncio.to_thread(broker.kill))
+        await until(lambda: source.status().state == "failed" or source.status().state == "closed")
+        broker.start()
+        await until(lambda: source.status().state == "connected", 20.0)
+        listener.cancel()
+        listener = asyncio.create_task(listen())
+        await asyncio.sleep(1.0)
+        await publish(22.0, 3)
+        await until(lambda: heard[-1:] == [-4.0], 20.0)
+        listener.cancel()
+
+    asyncio.run(running(service, work))
+    assert source.refused == 3
+    assert "no JSON" in source.last_refusal

@@ -1,0 +1,56 @@
+"""Readings as messages: bounded, and what is no number is missing."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.adapters.messages import read_message, write_message
+from thermocomp.core.correction import Correction
+from thermocomp.core.exceptions import ReadingError
+
+
+def test_values_by_name() -> None:
+    found = read_message(
+        '{"motor": 21.5, "n": 4000, "time": 100.5, "s": "x", "b": true, "z": null}', 7.0, {"motor": "t1_C"}
+    )
+    assert found.time == 100.5
+    assert found.values == {"t1_C": 21.5, "n": 4000.0}
+    assert read_message(b'{"a": 1}', 7.0, {}).time == 7.0
+
+
+@pytest.mark.parametrize(
+    ("payload", "says"),
+    [
+        (b"21.5", "no table"),
+        (b"\xff\xfe", "no JSON"),
+        (b"{", "no JSON"),
+        (b"[" * 50_000, "no JSON"),
+        (b'{"time": "noon"}', "want seconds since 1970"),
+        (b'{"time": NaN}', "want seconds since 1970"),
+        (b"x" * 70_000, "at most 65,536"),
+        (json.dumps({f"t{k}": k for k in range(2000)}).encode(), "at most 1,000"),
+    ],
+)
+def test_what_is_none(payload: bytes, says: str) -> None:
+    with pytest.raises(ReadingError, match=says):
+        read_message(payload, 7.0, {})
+
+
+@given(st.binary(max_size=200) | st.text(max_size=200))
+def test_whatever_comes(payload: bytes | str) -> None:
+    try:
+        found = read_message(payload, 7.0, {})
+    except ReadingError:
+        return
+    assert all(math.isfinite(v) for v in (found.time, *found.values.values()))
+
+
+def test_corrections() -> None:
+    table = json.loads(write_message({"Z": Correction(1.5, 2.0, 3.0)}, 9.0))
+    assert table == {
+        "time": 9.0,
+        "corrections": {"Z": {"offset_um": 1.5, "slope_um_per_m": 2.0, "reference_position_mm": 3.0}},
+    }
