@@ -26,8 +26,8 @@ from thermocomp.files import jsonfile, modelfile
 from thermocomp.models.covering import find_joint_support
 from thermocomp.models.training import train
 from thermocomp.recording.stacking import stack
-from thermocomp.runtime.advance import TOGETHER
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.group import TOGETHER
 
 FloatArray = NDArray[np.float64]
 

@@ -115,7 +115,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         _check(state, compensator)
     except (ValueError, InputError) as e:
         raise ModelFileError(f"{source}: no state that these models can be in: {e}") from e
-    return Saved(stored.written, state)
+    return Saved(stored.written, compensator.share(state.models, state))
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:

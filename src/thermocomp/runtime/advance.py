@@ -1,4 +1,4 @@
-"""All models of a compensator, one reading further: each from a zero of its own."""
+"""All models of a compensator, one reading further: each group from a zero of its own."""
 
 import math
 from collections.abc import Sequence
@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.model import FloatArray, State
 from thermocomp.core.reading import Reading
 from thermocomp.core.zero import Gathered, robust_mean
-
-#: what is said to be outside where each input is inside its own range, but all together are unlike the training
-TOGETHER = "inputs together"
+from thermocomp.runtime.group import Group
 
 
 class Advanced(NamedTuple):
@@ -20,12 +18,13 @@ class Advanced(NamedTuple):
     states: tuple[State, ...]
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, where it is not known
     said: list[float]  #: deviation of each; nan while its zero is not known
+    half_widths: list[float]  #: of the bands about them; nan without one
     values: list[FloatArray]  #: what each took in; a reading of the zero is the mean of all of them
     outside: tuple[str, ...]  #: inputs outside the trained range
 
 
 def advance(
-    models: Sequence[ErrorModel],
+    groups: Sequence[Group],
     states: Sequence[State],
     gathered: Sequence[Gathered],
     reading: Reading,
@@ -36,7 +35,9 @@ def advance(
 
     Parameters
     ----------
-    models, states, gathered : sequence of ErrorModel, State, Gathered
+    groups : sequence of Group
+    states, gathered : sequence of State, Gathered
+        Of the models.
     reading : Reading
     time : float
         When it was taken [s].
@@ -47,47 +48,45 @@ def advance(
     -------
     Advanced
     """
-    after, begins, said, given, outside = list(states), list(gathered), list[float](), list[FloatArray](), list[str]()
-    for k, model in enumerate(models):
-        memory, known = states[k], True
-        values = np.array([reading.values[i.name] for i in model.inputs], dtype=np.float64)
-        if memory.memory is None and np.isnan(memory.reference).any():
-            resting = model.zeroing.stands(reading.values.get(model.zeroing.speed))
-            memory, begins[k], known, values = _zeroed(model, memory, begins[k], (time, values, resting))
-        said.append(math.nan)
+    after, begins, n = list(states), list(gathered), len(states)
+    said, widths, given, outside = [math.nan] * n, [math.nan] * n, [np.empty(0)] * n, list[str]()
+    for group in groups:
+        first, known = group.members[0], True
+        mine = [states[k] for k in group.members]
+        values = np.array([reading.values[name] for name in group.names], dtype=np.float64)
+        if mine[0].memory is None and np.isnan(mine[0].reference).any():
+            resting = group.lead.zeroing.stands(reading.values.get(group.lead.zeroing.speed))
+            mine, begun, known, values = _zeroed(group, mine, begins[first], (time, values, resting))
+            for k in group.members:
+                begins[k] = begun
+        answers, bands = [math.nan] * len(mine), [math.nan] * len(mine)
         if known:
-            memory, deviation = model.step(memory, values, dt)
-            said[k] = float(deviation)
-            outside += _beyond(model, memory, values)
-        after[k] = memory
-        given.append(values)
-    return Advanced(tuple(after), tuple(begins), said, given, tuple(dict.fromkeys(outside)))
-
-
-def _beyond(model: ErrorModel, after: State, values: FloatArray) -> list[str]:
-    """Return the inputs that are outside the trained range."""
-    if after.outside.any():
-        return [i.name for i, out in zip(model.inputs, after.outside, strict=True) if out]
-    return [] if model.distance(after, values) <= 1.0 else [TOGETHER]
+            mine, answers = group.step(mine, values, dt)
+            bands = group.half_widths(mine, values)
+            outside += group.beyond(mine, values)
+        for k, state, answer, width in zip(group.members, mine, answers, bands, strict=True):
+            after[k], said[k], widths[k], given[k] = state, answer, width, values
+    return Advanced(tuple(after), tuple(begins), said, widths, given, tuple(dict.fromkeys(outside)))
 
 
 def _zeroed(
-    model: ErrorModel, memory: State, gathered: Gathered, reading: tuple[float, FloatArray, bool]
-) -> tuple[State, Gathered, bool, FloatArray]:
+    group: Group, states: list[State], gathered: Gathered, reading: tuple[float, FloatArray, bool]
+) -> tuple[list[State], Gathered, bool, FloatArray]:
     """Take a reading into the zero if it belongs there; return whether that is known now, and what the reading says.
 
-    Once it is, the model goes through the readings before this one, as if it had been known from the first of them; all
+    Once it is, the models go through the readings before this one, as if it had been known from the first of them; all
     readings of the zero say their mean.
     """
-    before, values = gathered, reading[1]
-    if gathered.belongs(model.zeroing, reading[0], reading[2]):
+    before, values, zeroing = gathered, reading[1], group.lead.zeroing
+    if gathered.belongs(zeroing, reading[0], reading[2]):
         gathered = gathered.add(*reading)
-        if not gathered.complete(model.zeroing):
-            return memory, gathered, False, values
+        if not gathered.complete(zeroing):
+            return states, gathered, False, values
         values = robust_mean(gathered.values)
     mean, last = robust_mean(gathered.values), gathered.times[0]
-    memory = memory._replace(reference=np.where(np.isnan(memory.reference), mean, memory.reference))
+    reference = np.where(np.isnan(states[0].reference), mean, states[0].reference)
+    states = [s._replace(reference=reference) for s in states]
     for time in before.times:
-        memory, _ = model.step(memory, mean, time - last)
+        states, _ = group.step(states, mean, time - last)
         last = time
-    return memory, Gathered(), True, values
+    return states, Gathered(), True, values

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Machine
-from thermocomp.core.model import ErrorModel
+from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.watch import Watch
@@ -30,8 +30,9 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.gate import explain_implausible, is_number
+from thermocomp.runtime.group import Group
 from thermocomp.runtime.limits import fade, limit_line
-from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
+from thermocomp.runtime.lines import DeviationLine, Spoken, constant, evaluate, straight
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WORDS, WatchState, begin, look
 from thermocomp.volumetric.model import VolumetricModel
@@ -76,6 +77,11 @@ class Compensator:
             if m.watch is not None and m.watch not in found:
                 found.append(m.watch)
         return tuple(found)
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """Models that go in step."""
+        return Group.of(self.models)
 
     @cached_property
     def shadow(self) -> dict[str, Status]:
@@ -168,11 +174,22 @@ class Compensator:
     def start(self) -> CompensatorState:
         """Return the state of a compensator that has seen no reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
-        models, watches = tuple(m.init() for m in self.models), tuple(begin(w) for w in self.watches)
+        models, watches = [m.init() for m in self.models], tuple(begin(w) for w in self.watches)
         gathered = (Gathered(),) * len(self.models)
-        return CompensatorState(
-            *(models, none, None, None, None, 0.0, gathered, watches, {}, {}, {}, {}, dict(self.shadow), None)
+        return self.share(
+            models,
+            CompensatorState(
+                *((), none, None, None, None, 0.0, gathered, watches, {}, {}, {}, {}, dict(self.shadow), None)
+            ),
         )
+
+    def share(self, models: Sequence[State], state: CompensatorState) -> CompensatorState:
+        """Return a state with these models' states, in which what several of them have in common is one."""
+        found = list(models)
+        for group in self.groups:
+            for k, own in zip(group.members, group.share([found[k] for k in group.members]), strict=True):
+                found[k] = own
+        return state._replace(models=tuple(found))
 
     def gate(self, state: CompensatorState, reading: Reading) -> str:
         """Say why a reading must not be used, whenever it was taken; the empty string if it may.
@@ -194,9 +211,9 @@ class Compensator:
         -------
         str
         """
-        for model, memory in zip(self.models, state.models, strict=True):
-            values = [reading.values.get(i.name) for i in model.inputs]
-            if why := explain_implausible(model, values, memory.reference.tolist()):
+        for group in self.groups:
+            values = [reading.values.get(name) for name in group.names]
+            if why := explain_implausible(group.lead, values, state.models[group.members[0]].reference.tolist()):
                 return why
         return ""
 
@@ -237,7 +254,7 @@ class Compensator:
             return state, said._replace(refused=dict.fromkeys(probings, f"its reading is rejected: {why}"))
         dt = 0.0 if state.time is None else instant.time - state.time
         travel = self._travel(state, tick)
-        stepped = advance(self.models, state.models, state.gathered, reading, instant.time, dt)
+        stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
         failed, corrections, learned = (
             _failed(self.watches, state.watches),
             dict(state.corrections),
@@ -253,11 +270,10 @@ class Compensator:
                 states_of[target] = Status("restarting", "its zero is being averaged")
                 continue
             references.setdefault(target, Reference(reading.time, "start: mean over the first readings"))
-            answer = evaluate(
-                *(line, models, stepped.states[line.models], stepped.values[line.models], told, instant.time),
-                learned.get(target),
-                *(probings.get(target), failed, references[target].shift),
-            )
+            mine = line.models
+            spoken = Spoken(models, stepped.states[mine], stepped.values[mine], told, stepped.half_widths[mine])
+            zero, probing = references[target].shift, probings.get(target)
+            answer = evaluate(line, spoken, instant.time, learned.get(target), probing, failed, zero)
             raw[target], deviations[target] = answer.raw, answer.deviation
             if not math.isnan(answer.half_width):
                 widths[target] = answer.half_width

@@ -23,6 +23,16 @@ class DeviationLine(NamedTuple):
     deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
 
 
+class Spoken(NamedTuple):
+    """What the models of a line say of a reading."""
+
+    models: Sequence[ErrorModel]
+    states: Sequence[State]  #: after the step that took the reading in
+    readings: Sequence[FloatArray]  #: (n_inputs,) each
+    said: Sequence[float]
+    half_widths: Sequence[float]  #: of the bands about that; nan without one
+
+
 class Said(NamedTuple):
     """What a line says of one reading."""
 
@@ -53,10 +63,7 @@ def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
 
 def evaluate(
     line: DeviationLine,
-    models: Sequence[ErrorModel],
-    states: Sequence[State],
-    readings: Sequence[FloatArray],
-    said: Sequence[float],
+    spoken: Spoken,
     time: float,
     learned: Adaptation | None,
     probing: Probing | None,
@@ -68,10 +75,8 @@ def evaluate(
     Parameters
     ----------
     line : DeviationLine
-    models, states, readings : sequence of ErrorModel, State, ndarray of shape (n_inputs,)
-        Of the line; the states after the step that took the reading in.
-    said : sequence of float
-        What each model says.
+    spoken : Spoken
+        By its models.
     time : float
         Of the reading [s].
     learned : Adaptation or None
@@ -87,11 +92,12 @@ def evaluate(
     -------
     Said
     """
+    models, states, readings, said, half_widths = spoken
     raw, refused, single = line.deviation(said), "", len(models) == 1
     deviation = raw.less(zero)
     width, band = math.nan, models[0].band if single else None
     if band is not None:
-        width = float(models[0].half_width(states[0], readings[0])) * (models[0].widening(failed) if failed else 1.0)
+        width = half_widths[0] * (models[0].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
         return Said(deviation, width, None, "", raw)
     directions = models[0].directions(states[0], readings[0]) if single else np.zeros(0)

@@ -1,0 +1,91 @@
+"""Models of a compensator that go in step: what they have in common is worked out once."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from thermocomp.core.bounds import GAP
+from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.core.together import Together, TogetherState
+
+#: what is said to be outside where each input is inside its own range, but all together are unlike the training
+TOGETHER = "inputs together"
+
+
+class Group:
+    """Models with the same inputs, states and zero, each with a read-out of its own; or a single model of any family.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+        Of a compensator.
+    members : sequence of int
+        Which of them.
+    """
+
+    def __init__(self, models: Sequence[ErrorModel], members: Sequence[int]) -> None:
+        self.members = tuple(members)
+        self.models = tuple(models[k] for k in members)
+        self.lead = self.models[0]
+        self.names = tuple(i.name for i in self.lead.inputs)
+        paced = [m for m in self.models if isinstance(m, PacedDynamic)]
+        self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
+        joints = [m.joint for m in self.models]
+        #: those whose joint support is no other's: of them alone it is asked how far a reading is
+        self._apart = [m for k, m in enumerate(self.models) if m.joint is not None and m.joint not in joints[:k]]
+
+    @staticmethod
+    def of(models: Sequence[ErrorModel]) -> tuple["Group", ...]:
+        """Return the groups of models, in the order of their first members."""
+        alike: dict[object, list[int]] = {}
+        for k, m in enumerate(models):
+            key = Together.key(m) if isinstance(m, PacedDynamic) else None
+            alike.setdefault(k if key is None else (key, m.zeroing), []).append(k)
+        return tuple(Group(models, members) for members in alike.values())
+
+    def share(self, states: Sequence[State]) -> list[State]:
+        """Return states that share what is the same in all of them."""
+        lead = states[0]
+        same = all(_equal(s.reference, lead.reference) and _equal(s.memory, lead.memory) for s in states)
+        shared = {"reference": lead.reference, "memory": lead.memory, "outside": lead.outside}
+        return [s._replace(**shared) for s in states] if same else list(states)
+
+    def step(self, states: Sequence[State], values: FloatArray, dt: float) -> tuple[list[State], list[float]]:
+        """Take a reading in; see `ErrorModel.step`."""
+        lead = states[0]
+        if self._together is None or any(
+            s.memory is not lead.memory or s.reference is not lead.reference for s in states
+        ):
+            each = [m.step(s, values, dt) for m, s in zip(self.models, states, strict=True)]
+            return self.share([s for s, _ in each]), [float(d) for _, d in each]
+        before = TogetherState(lead.reference, lead.memory, lead.reference, lead.outside)
+        after, deviations = self._together.step(before, values, min(dt, GAP))
+        found = [State(after.reference, after.memory, d, after.outside) for d in deviations]
+        return found, deviations.tolist()
+
+    def half_widths(self, states: Sequence[State], values: FloatArray) -> list[float]:
+        """Return the half-widths of the bands about what was said of a reading; nan without one [unit of the model]."""
+        lead = states[0]
+        if self._together is not None and all(s.memory is lead.memory for s in states):
+            change = self.lead.change(lead, values)
+            now = TogetherState(lead.reference, lead.memory, change, lead.outside)
+            return list(self._together.half_widths(now).tolist())
+        return [
+            math.nan if m.band is None else float(m.half_width(s, values))
+            for m, s in zip(self.models, states, strict=True)
+        ]
+
+    def beyond(self, states: Sequence[State], values: FloatArray) -> list[str]:
+        """Return the inputs that are outside the trained range of a model."""
+        if states[0].outside.any():
+            return [name for name, out in zip(self.names, states[0].outside.tolist(), strict=True) if out]
+        near = all(m.distance(states[0], values) <= 1.0 for m in self._apart)
+        return [] if near else [TOGETHER]
+
+
+def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return one is other or bool(np.array_equal(one, other, equal_nan=True))
