@@ -49,8 +49,9 @@ class Group:
         """Return states that share what is the same in all of them."""
         lead = states[0]
         same = all(_equal(s.reference, lead.reference) and _equal(s.memory, lead.memory) for s in states)
-        shared = {"reference": lead.reference, "memory": lead.memory, "outside": lead.outside}
-        return [s._replace(**shared) for s in states] if same else list(states)
+        if not same:
+            return list(states)
+        return [State(lead.reference, lead.memory, s.deviation, lead.outside) for s in states]
 
     def step(self, states: Sequence[State], values: FloatArray, dt: float) -> tuple[list[State], list[float]]:
         """Take a reading in; see `ErrorModel.step`."""
