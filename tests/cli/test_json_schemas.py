@@ -116,6 +116,7 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
     assert held("plan", capsys, drift, *study, "--no-curve", "-o", "next.ngc")["files"] == ["next.ngc", "next.csv"]
     assert held("plan", capsys, drift, *study, "--running")["running"]["states"]
     assert held("assess", capsys, "model.json", drift)["results"]
+    assert held("explain", capsys, "model.json")["models"][0]["sensors"]
     assert held("iso230", capsys, drift, "--model", "model.json")["thermal"]
 
 

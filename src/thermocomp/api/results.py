@@ -15,6 +15,7 @@ from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
 from thermocomp.recording.recording import Recording
@@ -197,6 +198,10 @@ class FittedModels(Result):
     def half_width(self) -> dict[str, float]:
         """Mean half-width of the band over the unseen rows, by target [um]; nan without a band."""
         return {a.target: a.half_width for a in self.fitted.comparison.overall()}
+
+    def explain(self) -> Explanations:
+        """Return what the models are, how good they are, and what a failure of each sensor does: print it."""
+        return explain_all(self.fitted.models)
 
     def predict(self, table: Columns, time: ArrayLike | str | None = None) -> pd.DataFrame:
         """Replay all models through a table; see `thermocomp.core.model.ErrorModel.predict`.
