@@ -4,10 +4,9 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
-from driftmodels import ACCEPTED, lags
-from smallmachine import small_machine
+from driftmodels import lags
+from watchedmachine import LOST, watched_model
 
 from thermocomp.cli.app import run
 from thermocomp.core.band import Band
@@ -19,20 +18,11 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
 from thermocomp.files import modelfile
-from thermocomp.models.training import train
-from thermocomp.models.watching import find_watch
-from thermocomp.recording.stacking import stack
-
-LOST = {"t1_C": 1.5, "t2_C": 2.5, "t3_C": 9.0, "t1_C, t2_C": 3.0, "t1_C, t3_C": 9.5}
 
 
 @pytest.fixture(scope="module")
 def model() -> ErrorModel:
-    samples = stack([small_machine()], ["z_um"])
-    every = np.ones(len(samples), np.bool_)
-    found = train("averaged", samples, 0, every).model
-    judged = replace(ACCEPTED, lost=LOST, rms=1.25, none_rms=5.0)
-    return replace(found, watch=find_watch(samples, every), honest_error=judged)
+    return watched_model()
 
 
 def watched(model: ErrorModel) -> Watch:
