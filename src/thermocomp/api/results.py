@@ -279,6 +279,13 @@ class Assessed(Result):
         """Return how the model ran through the recordings, for the first target or another."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
 
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page that ``thermocomp assess -o`` writes; return its path."""
+        from thermocomp.report import assessed
+
+        assessed.write(self.judged, self.recordings, Path(path), overwrite=overwrite)
+        return Path(path)
+
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *_told(self.trouble)])
 

@@ -19,7 +19,7 @@ from thermocomp.core.watch import Watch
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
-from thermocomp.runtime.watch import GOOD, WORDS
+from thermocomp.runtime.watch import GOOD, MISSING, WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int8]
@@ -33,7 +33,7 @@ class Fault(NamedTuple):
     begin: float  #: when it was found, on the clock of its recording [s]
     end: float  #: when it was believed again, or the recording ends [s]
     returned: bool  #: it was believed again
-    beside: float  #: mean of its reading minus what stood in; nan where it read nothing [degC]
+    beside: float  #: mean of its reading minus what stood in; nan where it was missing [degC]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             float(recording.time[a]),
             float(recording.time[min(b, len(recording) - 1)]),
             b < len(recording) and fault[b, j] == GOOD,
-            _mean(read[a:b, j] - stood_in[a:b, j]),
+            float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
         )
         for j, name in enumerate(watch.names)
         for a, b in _runs(fault[:, j])
@@ -231,11 +231,6 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
     for a, b in pairwise(edges):
         if fault[a] != GOOD:
             yield a, b
-
-
-def _mean(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else float("nan")
 
 
 def _has(recording: Recording, name: str) -> bool:
