@@ -112,7 +112,8 @@ def _mapping(folder: Path, version: int) -> None:
 def _test(folder: Path, version: int) -> None:
     speed = 1000.0 + version
     trial = Trial("run", speed, ((0.0, 900.0), (speed, 7200.0)))
-    testprogram.write_test(trial, folder / "test.ngc", small_machine().channels, overwrite=True)
+    picture = b"picture %d" % version
+    testprogram.write_test(trial, folder / "test.ngc", small_machine().channels, picture=picture, overwrite=True)
 
 
 #: by the name of the kind
@@ -141,5 +142,5 @@ WRITERS: dict[str, Writer] = {
     ),
     "program": _revise("linuxcnc"),
     "program written out": _revise("fanuc"),
-    "thermal test": Writer(_test, ("test.csv", "test.ngc"), "test.ngc"),
+    "thermal test": Writer(_test, ("test.csv", "test.ngc", "test.png"), "test.ngc"),
 }
