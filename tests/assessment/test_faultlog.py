@@ -13,6 +13,7 @@ from thermocomp.assessment.metrics import rms
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
+from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.runtime.compensator import Compensator
@@ -147,3 +148,36 @@ def test_held_from_the_first_row_it_is_zero() -> None:
     assert (second == 0).all()
     assert (first[time[test == 0] <= 3600 - 60 + Limits().hold] == 10.0).all()
     assert first[-1] == pytest.approx(10 * math.exp(-(time.max() - (3600 - 60) - Limits().hold) / Limits().fade))
+
+
+def test_models_of_two_files_have_a_watch_each(model: ErrorModel) -> None:
+    assert model.watch is not None
+    deaf = replace(model.watch, sensors=tuple(replace(s, off=80.0, jump=80.0) for s in model.watch.sensors))
+    other = replace(model, watch=deaf)
+    recording = failing(t1_C=(4.0, 4.0))
+    judged = study.assess([model, other], [recording], starts=Start())
+    logs = find_faults(judged, [recording])
+    assert [log.failed for log in logs] == [("t1_C",), ()]
+    first, second = judged.overall()
+    assert [c.failed for c in find_costs(model, first, logs)] == [(), ("t1_C",)]
+    assert [c.failed for c in find_costs(other, second, logs)] == [()]
+
+
+def test_rows_of_an_earlier_file_are_gone_through_and_not_counted(model: ErrorModel) -> None:
+    whole = failing(t1_C=(6.0, 4.0), t2_C=(9.0, None))
+    parts = []
+    for rows in (slice(0, 420), slice(420, None)):
+        time = whole.time[rows] - whole.time[rows][0]
+        table = whole.table.iloc[rows].reset_index(drop=True)
+        cycles = find_cycles(time, table["spindle_rpm"].to_numpy())
+        parts.append(replace(whole, name=f"from {rows.start}", time=time, table=table, cycles=cycles))
+    first, second = parts
+    judged = study.assess([model], [second], starts=Start("continued", earlier=(first,)))
+    (log,) = find_faults(judged, [second])
+    assert [(f.sensor, f.word, f.begin) for f in log.faults] == [
+        ("t1_C", "stepped", 0.0),  # found before, in the first file
+        ("t2_C", "missing", 2 * 3600.0),
+    ]
+    assert len(log.time) == len(second)
+    costs = find_costs(model, judged.overall()[0], [log])
+    assert [c.failed for c in costs] == [("t1_C",), ("t1_C", "t2_C")]

@@ -15,6 +15,7 @@ from thermocomp.core.contributions import gains
 from thermocomp.core.explained import FAR, explain, explain_all
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
 from thermocomp.files import modelfile
@@ -39,13 +40,20 @@ def test_every_number_is_that_of_the_model(model: ErrorModel) -> None:
         if s.quantity == "temperature":
             own = watched(model).sensors[watched(model).names.index(s.name)]
             assert (s.jump, s.off, s.moved, s.unseen) == (own.jump, own.off, own.moved, own.unseen)
-            assert s.undetected == abs(known[s.name].settled) * own.off
+            assert s.undetected == abs(known[s.name].settled) * own.off > 0
             assert s.lost == LOST[s.name]
     assert {s.name: s.runs_on for s in told.sensors} == {
         "t1_C": True, "t2_C": True, "t3_C": False, "spindle_rpm": False
     }  # fmt: skip
     assert told.pairs == (2, 1)
     assert json.loads(json.dumps(told.to_dict()))["sensors"][0]["name"] == told.sensors[0].name
+
+
+def test_a_drift_shifts_the_answer_whichever_way_it_counts(model: ErrorModel) -> None:
+    assert isinstance(model, PacedDynamic)
+    turned = tuple(replace(t, direct=-t.direct, lagged=tuple(-w for w in t.lagged)) for t in model.temperatures)
+    shifts = [{s.name: s.undetected for s in m.explain().sensors} for m in (model, replace(model, temperatures=turned))]
+    assert shifts[0] == pytest.approx(shifts[1])
 
 
 def test_a_dozen_lines_say_it(model: ErrorModel) -> None:

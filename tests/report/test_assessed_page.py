@@ -126,6 +126,27 @@ def test_without_a_failure_there_is_a_sentence() -> None:
     assert why == "No watch over the temperatures was asked: the model file holds none; fit it anew."
 
 
+def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:
+    (whole,) = judged.overall()
+    refused = replace(judged, assessments=(replace(whole, caveat="no honest test"),))
+    assert '<p class="verdict">z_um: refused' in assessed.render(refused, [recording])
+    fine = replace(whole, verdict=replace(whole.verdict, caps=()), robustness=None)
+    assert fine.accepted
+    assert '<p class="verdict good">z_um: accepted' in assessed.render(
+        replace(judged, assessments=(fine,)), [recording]
+    )
+
+
+def test_what_was_bad_when_it_was_fitted_is_told_first(judged: Judged, recording: Recording) -> None:
+    known = watched_model().honest_error
+    assert known is not None
+    bad = replace(watched_model(), honest_error=replace(known, verdict="refused", reason="does harm in 3"))
+    told = words(assessed.render(replace(judged, models=(bad,)), [recording]))
+    assert "But: z_um: refused when it was fitted: does harm in 3." in told
+    never = replace(judged, models=(replace(bad, honest_error=None),))
+    assert "But: z_um: never judged on cycles it had not seen" in words(assessed.render(never, [recording]))
+
+
 def test_two_recordings_are_told_apart(recording: Recording) -> None:
     day = replace(failing(t2_C=(5.0, None)), name="other", start="2024-05-01T22:00:00")
     # another noise: the same day twice is refused

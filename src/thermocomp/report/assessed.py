@@ -4,7 +4,7 @@ A section of it is a function that makes one of what was judged, and a line in `
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,7 +47,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
             "verdict": "; ".join(map(_verdict, overall)) + ".",
             "good": all(a.accepted for a in overall),
             "predictions": draw_runs(seen, recordings),
-            "cautions": [*content["cautions"], *(c for s in sections for c in s.cautions)],
+            "cautions": [*_fitted_badly(judged), *content["cautions"], *(c for s in sections for c in s.cautions)],
             "sections": sections,
             "measured": [figures.measured(r) for r in recordings],
         },
@@ -71,6 +71,15 @@ def _verdict(a: Assessment) -> str:
     if a.failure:
         return f"{a.target}: {a.reason}"
     return f"{a.target}: {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um"
+
+
+def _fitted_badly(judged: Judged) -> Iterator[str]:
+    """Yield what was found when models were fitted, if that was not good."""
+    for m in judged.models:
+        if m.honest_error is None:
+            yield f"{m.target}: never judged on cycles it had not seen when it was fitted; it does not run."
+        elif not m.accepted:
+            yield f"{m.target}: {m.honest_error.word} when it was fitted: {m.honest_error.why}."
 
 
 def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
