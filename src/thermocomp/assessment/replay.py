@@ -13,7 +13,7 @@ from thermocomp.core.watch import Watch
 from thermocomp.core.zero import first_rows, robust_mean
 from thermocomp.recording.samples import Samples
 from thermocomp.runtime import batch
-from thermocomp.runtime.watch import begin, look
+from thermocomp.runtime.watch import WatchState, begin, look
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -130,20 +130,49 @@ def believe(watch: Watch | None, samples: Samples, rows: BoolArray) -> Samples:
     An input of the watch that the samples have not got is missing to it. Rows without a speed are passed on unchanged.
     """
     names = [c.name for c in samples.inputs]
-    if watch is None or any(i.name not in names for i in watch.inputs if i.quantity != "temperature"):
+    if watch is None or not can_look(watch, samples):
         return samples
     values, known = samples.values.copy(), [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
     for test in np.unique(samples.test[rows]).tolist():
-        mine = np.flatnonzero(samples.test == test)
-        zero = given_zero(samples, places, test) if all(known) else None
-        state = begin(watch, zero)
-        for row in mine.tolist():
-            given = np.full(len(watch.inputs), np.nan)
-            given[known] = samples.values[row, places]
-            state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+        for row, _, let in look_through(watch, samples, test):
             values[row, places] = let[known]
     return replace(samples, values=values)
+
+
+def can_look(watch: Watch, samples: Samples) -> bool:
+    """Return whether samples have the speeds of a watch, without which it says nothing."""
+    names = [c.name for c in samples.inputs]
+    return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
+
+
+def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
+    """Go through a test with a watch; an input of it that the samples have not got is missing to it.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        With its speeds.
+    test : int
+
+    Yields
+    ------
+    row : int
+    state : WatchState
+        After the reading.
+    let : ndarray of shape (n_inputs,)
+        What it lets through, in the order of its inputs.
+    """
+    names = [c.name for c in samples.inputs]
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    state = begin(watch, given_zero(samples, places, test) if all(known) else None)
+    for row in np.flatnonzero(samples.test == test).tolist():
+        given = np.full(len(watch.inputs), np.nan)
+        given[known] = samples.values[row, places]
+        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+        yield row, state, let
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:

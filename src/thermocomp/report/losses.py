@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+from thermocomp.core.explained import FAR
 from thermocomp.core.model import ErrorModel
-
-#: a sensor that may be further off than this before it is found is named [degC]
-FAR = 3.0
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
