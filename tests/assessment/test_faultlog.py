@@ -8,9 +8,8 @@ import pytest
 from watchedmachine import LOST, failing, watched_model
 
 from thermocomp.assessment import study
-from thermocomp.assessment.faultlog import find_costs, find_faults, hold
+from thermocomp.assessment.faultlog import find_costs, find_faults
 from thermocomp.assessment.metrics import rms
-from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
 from thermocomp.recording.cycles import find_cycles
@@ -137,17 +136,6 @@ def test_without_a_watch_there_is_no_log(model: ErrorModel) -> None:
     judged = study.assess([bare], [recording], starts=Start())
     assert find_faults(judged, [recording]) == ()
     assert find_costs(bare, judged.overall()[0], ()) == ()
-
-
-def test_held_from_the_first_row_it_is_zero() -> None:
-    time = np.tile(np.arange(0.0, 6 * 3600, 60.0), 2)
-    test = np.repeat([0, 1], len(time) // 2)
-    idle = (test == 1) | (time >= 3600)
-    found = hold(np.full(len(time), 10.0), time, test, idle, Limits())
-    first, second = found[test == 0], found[test == 1]
-    assert (second == 0).all()
-    assert (first[time[test == 0] <= 3600 - 60 + Limits().hold] == 10.0).all()
-    assert first[-1] == pytest.approx(10 * math.exp(-(time.max() - (3600 - 60) - Limits().hold) / Limits().fade))
 
 
 def test_models_of_two_files_have_a_watch_each(model: ErrorModel) -> None:

@@ -1,7 +1,7 @@
 """Which temperatures fell out in recordings, what stood in for them, and what that cost: a replay of the watch."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.assessment.metrics import rms
-from thermocomp.assessment.replay import can_look, look_through
+from thermocomp.assessment.replay import can_look, look_through, stack_watched
 from thermocomp.assessment.results import Assessment
 from thermocomp.assessment.study import Judged
-from thermocomp.core.correction import Limits
-from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
-from thermocomp.recording.stacking import stack
 from thermocomp.runtime.watch import GOOD, MISSING, WORDS
 
 FloatArray = NDArray[np.float64]
@@ -129,9 +126,6 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
     lost = {k: _lost(model, log) for k, log in own.items()}
     failed = [lost[k][row] for k, row in places]
     driven = {names: not names or model.may_lose(names) for names in dict.fromkeys(failed)}
-    idle = np.array([not driven[names] for names in failed], dtype=np.bool_)
-    time = np.array([own[k].time[row] for k, row in places])
-    ran = hold(assessment.predicted, time, assessment.test, idle, assessment.limits or Limits())
     steps = {k: np.diff(log.time, prepend=log.time[0]) for k, log in own.items()}
     hours = np.array([steps[k][row] for k, row in places]) / 3600
     known, found = model.honest_error, list[Cost]()
@@ -139,60 +133,15 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
         rows = np.array([f == names for f in failed], dtype=np.bool_)
         honest = None if known is None else known.lost.get(", ".join(names)) if names else known.rms
         measured = assessment.measured[rows]
-        left, none = rms(measured, ran[rows]), rms(measured, np.zeros_like(measured))
+        left, none = rms(measured, assessment.predicted[rows]), rms(measured, np.zeros_like(measured))
         found.append(Cost(names, float(hours[rows].sum()), left, none, honest, runs_on))
     return tuple(found)
 
 
-def hold(
-    predicted: FloatArray, time: FloatArray, test: NDArray[np.intp], idle: NDArray[np.bool_], limits: Limits
-) -> FloatArray:
-    """Return what a correction opposes if it is held, then fades, in rows in which nothing drives it.
-
-    Parameters
-    ----------
-    predicted : ndarray of shape (n_rows,)
-        What it would oppose, were it driven [um].
-    time : ndarray of shape (n_rows,)
-        [s]
-    test : ndarray of int of shape (n_rows,)
-    idle : ndarray of bool of shape (n_rows,)
-    limits : Limits
-
-    Returns
-    -------
-    ndarray of shape (n_rows,)
-        [um]
-    """
-    held = predicted.copy()
-    anew = np.diff(test, prepend=-1) != 0
-    for k in np.flatnonzero(idle).tolist():
-        if anew[k]:
-            held[k], since = 0.0, time[k]
-        elif not idle[k - 1]:
-            held[k], since = held[k - 1], time[k - 1]
-        else:
-            fading = min(time[k] - time[k - 1], max(0.0, time[k] - since - limits.hold))
-            held[k] = held[k - 1] * np.exp(-fading / limits.fade)
-    return held
-
-
 def _logs(watch: Watch, judged: Judged, recordings: Sequence[Recording]) -> Iterator[FaultLog]:
     target = next(a.target for a in judged.overall() if not a.failure)
-    known = [i.name for i in watch.inputs if all(_has(r, i.name) for r in recordings)]
-    if not known:
-        return
-    samples = stack(
-        recordings,
-        [target],
-        known,
-        rezero=any(i.rezero for i in watch.inputs),
-        zeroing=watch.zeroing,
-        starts=[start for _, start in judged.starts],
-    )
-    called = zip(samples.inputs, known, strict=True)
-    samples = replace(samples, inputs=tuple(replace(channel, name=own) for channel, own in called))
-    if can_look(watch, samples):
+    samples = stack_watched(watch, target, recordings, [start for _, start in judged.starts])
+    if samples is not None and can_look(watch, samples):
         for k, recording in enumerate(recordings):
             yield _log(watch, samples, k, recording)
 
@@ -231,14 +180,6 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
     for a, b in pairwise(edges):
         if fault[a] != GOOD:
             yield a, b
-
-
-def _has(recording: Recording, name: str) -> bool:
-    try:
-        recording.channel(name)
-    except InputError:
-        return False
-    return True
 
 
 def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:

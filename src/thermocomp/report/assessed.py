@@ -15,7 +15,7 @@ from thermocomp.assessment.study import Judged
 from thermocomp.core.draft import write_text
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.splits import Judging
-from thermocomp.report import faults, figures
+from thermocomp.report import faults, figures, probings
 from thermocomp.report.html import draw_runs, page
 from thermocomp.report.layout import laid_out
 from thermocomp.report.sections import Section
@@ -92,4 +92,8 @@ def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
 
 
 #: of the page, in their order: each makes one of what was judged, or none where it has nothing to say
-SECTIONS: tuple[Callable[[Judged, Sequence[Recording]], Section | None], ...] = (faults.section, _covered)
+SECTIONS: tuple[Callable[[Judged, Sequence[Recording]], Section | None], ...] = (
+    faults.section,
+    probings.section,
+    _covered,
+)

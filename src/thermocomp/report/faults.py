@@ -72,7 +72,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
         parts.append(
             "Held, then fades: without these sensors the model was never judged, or does harm. The correction stays "
             f"for {limits.hold / 60:g} min, then goes to zero with a time constant of {limits.fade / 3600:g} h: that "
-            "is what the RMS here is of. The tables and curves above go on with what stood in."
+            "is what is judged here and above."
         )
     return Section(TITLE, parts, cautions)
 
