@@ -1,10 +1,10 @@
 """What a failed sensor costs from when it is reported: by what stands in for it, or by a correction that is held.
 
-Run with ``python benchmarks/bench_standin.py [instants]`` (5 per cycle: 20 in all). Of fl_thermal (rows 0-6668, all sensors and six) each
-thermal cycle is left out in turn; `averaged` and the watch know nothing of it. Every temperature fails in every way at
-random instants of it. From the report on, for two hours at least and to the end of the cycle, the RMS error of what the
-compensator leaves is divided by that with all sensors well. Which models may go on without a sensor is judged on the
-other cycles, each of them left out in turn too.
+Run with ``python benchmarks/bench_standin.py [instants]`` (5 per cycle: 20 in all). Of fl_thermal (rows 0-6668, all
+sensors and six) each thermal cycle is left out in turn; `averaged` and the watch know nothing of it. Every temperature
+fails in every way at random instants of it, two hours before its end at the latest. From the report on, if an hour is
+left of the cycle, the RMS error of what the compensator leaves is divided by that with all sensors well. Which models
+may go on without a sensor is judged on the other cycles, each of them left out in turn too.
 """
 
 import os
@@ -38,7 +38,7 @@ SIX = ("t4_C", "t5_C", "t7_C", "t9_C", "t11_C", "t16_C")
 KINDS = ("dead", "stuck", "3 degC off", "1 degC/h")
 LEARNED = 6669
 INSTANTS = 5
-#: after the report, at least [s]
+#: before the end of the cycle it fails at the latest; half of it has to be left after the report [s]
 AFTER = 2 * 3600.0
 #: goals: ratio with what stands in; harm above no compensation where the correction is held [-; um]
 RATIO, MARGIN = 2.0, 1.0
