@@ -13,6 +13,8 @@ from thermocomp.core.watch import LASTING, Watched
 
 #: a sensor that may drift further than this before it is found off wants a spare beside it [degC]
 FAR = 3.0
+#: the same if what stands in for it leaves so many times the error with all
+DEAR = 2.0
 #: a time constant or a time step changes nothing of what is settled [s]
 _ANY = 60.0
 
@@ -206,6 +208,8 @@ def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
         return "nothing predicts it"
     if not model.may_lose([name]):
         return "without it the correction is held, then fades"
+    if model.widening([name]) > DEAR:
+        return f"what stands in for it leaves {model.widening([name]):.1f} times the error"
     return f"its slow drift is found only from {seen.off:.1f} degC on" if seen.off > FAR else ""
 
 
