@@ -84,9 +84,10 @@ def test_a_correction_that_does_harm_is_held_then_fades(model: ErrorModel) -> No
     assert (before.failed, before.runs_on, before.honest) == ((), True, 1.25)
     assert (after.failed, after.runs_on, after.honest) == (("t3_C",), False, 9.0)
     assert after.rms == pytest.approx(rms(measured[later], said[later]), rel=0.02)
-    assert after.rms > 2 * rms(
-        measured[later], judged.overall()[0].predicted[later]
-    )  # who let it run on would be wrong
+    (whole,) = judged.overall()
+    assert whole.predicted == pytest.approx(said, abs=0.1)
+    assert whole.alone is not None
+    assert after.rms > 2 * rms(measured[later], whole.alone[later])  # it would have gone on with what stands in
     assert after.none_rms == pytest.approx(rms(measured[later], np.zeros(later.sum())))
 
 
