@@ -3,24 +3,26 @@
 Run with ``python benchmarks/bench_watch.py``. Each thermal cycle is left out in turn: of the virtual machine, and of
 fl_thermal (rows 0-6668, six sensors and all) where the measured data are there. In the cycle left out every temperature
 fails in every way at instants drawn at random; a failure that begins less than four hours before the end of the
-recording is not drawn.
+recording is not drawn. And every two are swapped, each at its own zero, as if the watch had gone through the cycles
+before with them swapped, and had noticed nothing. See ``bench_standin.py`` for what failures then cost.
 """
 
 import os
 import sys
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.watch import Watch
+from thermocomp.core.watch import LASTING, Watch
 from thermocomp.datasets.virtual import record
 from thermocomp.files import recordings
 from thermocomp.models.watching import find_watch
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
-from thermocomp.runtime.watch import GOOD, begin, look
+from thermocomp.runtime.watch import GOOD, SWAPPED, WatchState, begin, look
 
 FloatArray = NDArray[np.float64]
 
@@ -37,7 +39,9 @@ LEARNED = 6669
 def cases() -> Iterator[tuple[str, Samples]]:
     for physics in ("linear", "nonlinear"):
         whole = stack(record("demo", physics=physics), ["z_um"])
-        yield f"demo, {physics}, six", whole.take(np.arange(len(whole)) % 3 == 0).only([*FEW, "spindle_rpm"])
+        thinned = whole.take(np.arange(len(whole)) % 3 == 0)
+        yield f"demo, {physics}, six", thinned.only([*FEW, "spindle_rpm"])
+        yield f"demo, {physics}, sixteen", thinned
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
     if not path.is_file():
@@ -70,16 +74,74 @@ def found(watch: Watch, samples: Samples, failures: list[tuple[int, int, str]]) 
     return when
 
 
+def swapped_before(watch: Watch, samples: Samples, stop: int, pairs: list[tuple[int, int]]) -> WatchState:
+    """Return the states at a row, (1 + n_pairs,): as it was, and as it were with two sensors swapped from the start."""
+    names = [c.name for c in samples.inputs]
+    columns, n = [names.index(i.name) for i in watch.inputs], len(watch.sensors)
+    state, runs = begin(watch, samples.reference()[0][columns], (1 + len(pairs),)), 1 + len(pairs)
+    for k in range(stop):
+        values = np.repeat(samples.values[k : k + 1, columns], runs, axis=0)
+        state, _ = look(watch, state, float(samples.time[k]), values, resting=bool(samples.stands[k]))
+    for run, (i, j) in enumerate(pairs, start=1):
+        for lagged in (state.memory, state.traces, state.used):
+            for lag in range(0, n * len(watch.time_constants) if lagged is not state.used else n, n):
+                lagged[run, [lag + i, lag + j]] = lagged[run, [lag + j, lag + i]]
+    return state._replace(evidence=np.zeros_like(state.evidence))
+
+
+def swaps(watch: Watch, samples: Samples, cycle: int) -> Iterator[tuple[str, bool, float]]:
+    """Yield what was made of every pair, whether the two differ by more than both limits, and how long after [s]."""
+    pairs = list(combinations(range(len(watch.sensors)), 2))
+    rows = np.flatnonzero(samples.cycle == cycle)
+    names = [c.name for c in samples.inputs]
+    columns = [names.index(i.name) for i in watch.inputs]
+    state, off = swapped_before(watch, samples, int(rows[0]), pairs), watch.limits("off")
+    first, when = np.zeros((1 + len(pairs), len(watch.sensors)), dtype=np.intp), np.full(1 + len(pairs), np.inf)
+    change, zero = samples.change()[:, columns], samples.reference()[0][columns]
+    for k in rows.tolist():
+        values = np.repeat(change[k : k + 1], 1 + len(pairs), axis=0)
+        for run, (i, j) in enumerate(pairs, start=1):
+            values[run, [i, j]] = values[run, [j, i]]
+        state, _ = look(watch, state, float(samples.time[k]), values + zero, resting=bool(samples.stands[k]))
+        new = (state.fault != GOOD) & (first == GOOD)
+        first[new] = state.fault[new]
+        when[new.any(axis=-1)] = np.minimum(when[new.any(axis=-1)], samples.time[k])
+    for run, (i, j) in enumerate(pairs, start=1):
+        apart = rows[np.abs(change[rows, i] - change[rows, j]) > max(off[i], off[j])]
+        accused = set(np.flatnonzero(first[run]).tolist())
+        if not accused:
+            what = "not found"
+        elif (first[run, [i, j]] == SWAPPED).all():
+            what = "named" if len(accused) == 2 else "named, and another"
+        elif (first[run] == SWAPPED).any():
+            what = "another pair named"
+        else:
+            what = "one by one" if accused <= {i, j} else "another one accused"
+        differ = bool(len(apart)) and len(apart) * float(np.median(np.diff(samples.time[rows]))) > LASTING
+        yield what, differ, float(when[run] - samples.time[apart[0]]) if differ else np.nan
+
+
+def show_swaps(title: str, found: list[tuple[str, bool, float]]) -> None:
+    for differ, words in ((True, "differ by more than both limits"), (False, "are more alike")):
+        mine = [what for what, of, _ in found if of is differ]
+        counts = ", ".join(f"{what} {mine.count(what)}" for what in dict.fromkeys(sorted(mine)))
+        print(f"  swapped, {len(mine)} that {words}: {counts or 'none'}")
+    delays = np.array([d for what, of, d in found if of and what.startswith("named")]) / 60
+    if delays.size:
+        print(f"  named after: median {np.median(delays):.0f} min, 90 % {np.quantile(delays, 0.9):.0f} min ({title})")
+
+
 def main() -> int:
     reached = True
     for title, samples in cases():
         delays: dict[str, list[float]] = {kind: [] for kind in GOALS}
         late: dict[str, set[str]] = {kind: set() for kind in GOALS}
-        wrong, alarms = 0, list[str]()
+        wrong, alarms, exchanged = 0, list[str](), list[tuple[str, bool, float]]()
         for cycle in np.unique(samples.cycle[samples.cycle >= 0]).tolist():
             watch = find_watch(samples, samples.cycle != cycle)
             if watch is None:
                 raise SystemExit(f"{title}: nothing to watch")
+            exchanged += swaps(watch, samples, cycle)
             rng = np.random.default_rng(cycle)
             mine = np.flatnonzero((samples.cycle == cycle) & (samples.time < samples.time[-1] - 4 * 3600.0))
             failures = [
@@ -107,6 +169,7 @@ def main() -> int:
                 f"{'; late: ' + ' '.join(sorted(late[kind])) if late[kind] else ''}"
             )
             reached &= share == 1.0
+        show_swaps(title, exchanged)
         reached &= not alarms
     print(f"goal, all in time, no false alarm: {'reached' if reached else 'MISSED'}")
     return 0 if reached else 1

@@ -113,11 +113,13 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
     assert held("select", capsys, drift, *study, "--method", "partial-f")["choices"]
     assert held("fit", capsys, drift, *study, "--model", "ols", "-o", "model.json")["models"]
     assert held("plan", capsys, drift, *study)["curve"]["cycles"]
-    assert held("plan", capsys, drift, *study, "--no-curve", "-o", "next.ngc")["files"] == ["next.ngc", "next.csv"]
+    written = held("plan", capsys, drift, *study, "--no-curve", "-o", "next.ngc")["files"]
+    assert written == ["next.ngc", "next.csv", "next.png"]
     assert held("plan", capsys, drift, *study, "--running")["running"]["states"]
     assert held("assess", capsys, "model.json", drift)["results"]
     probed = held("assess", capsys, "model.json", drift, "--probing", "every 10 min")["results"]
     assert all(r["probings"]["made"] for r in probed)
+    assert held("explain", capsys, "model.json")["models"][0]["sensors"]
     assert held("iso230", capsys, drift, "--model", "model.json")["thermal"]
 
 

@@ -25,8 +25,9 @@ def test_it_prints_the_tests_and_writes_the_best(drift: str, capsys: pytest.Capt
     assert "Next: 6,000 1/min" in told
     assert "no run faster than 3,000 1/min" in " ".join(told.split())
     assert "So far:" in told
-    assert "Written: next.ngc, next.csv" in told
+    assert "Written: next.ngc, next.csv, next.png" in told
     assert "S6000 M3" in Path("next.ngc").read_text(encoding="ascii")
+    assert Path("next.png").read_bytes().startswith(b"\x89PNG")
     assert run([*given]) == 2
     assert "next.ngc: exists already" in " ".join(capsys.readouterr().err.split())
     assert run([*given, "--no-curve", "--overwrite", "--dialect", "fanuc", "--probe-every", "0"]) == 0
@@ -55,6 +56,7 @@ def test_a_running_test_may_end_or_not(drift: str, capsys: pytest.CaptureFixture
     ("more", "words"),
     [
         (("-o", "test.csv"), "name the NC program, such as test.ngc"),
+        (("-o", "test.png"), "name the NC program, such as test.ngc"),
         (("-o", "nowhere/test.ngc"), "there is no folder"),
         (("-o", "drift.ngc", "--overwrite"), "drift.csv: is also an input"),
         (("--running", "-o", "test.ngc"), "--running judges a test, and writes none"),
@@ -78,12 +80,12 @@ def test_in_python_it_is_a_table_a_figure_and_a_sentence(tmp_path: Path) -> None
     assert table["gain"].is_monotonic_decreasing
     assert found.next.trial.speed == 6000.0
     assert found.curve is not None
-    assert len(found.plot().axes) == 2
+    assert len(found.plot().axes) == 5
     assert str(found).startswith("Next: 6,000 1/min for ")
     assert found.write(tmp_path / "a.ngc", dialect="fanuc", every=0) == tmp_path / "a.csv"
     alone = tc.plan(small_machine((2000.0,)), "z_um")
     assert alone.curve is None
-    assert len(alone.plot().axes) == 1
+    assert len(alone.plot().axes) == 4
 
 
 def test_one_running_test_is_judged(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ WRITING = {
     "files/jsonfile.py",
     "files/recordings.py",
     "files/testprogram.py",
+    "report/assessed.py",
     "report/checks.py",
     "report/html.py",
     "report/iso230.py",

@@ -23,7 +23,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import SplineProfile
 from thermocomp.core.trial import Trial
 from thermocomp.files import modelfile, positionfile, recordings, testprogram
-from thermocomp.report import checks, html
+from thermocomp.report import assessed, checks, html
 from thermocomp.report import iso230 as iso230pages
 from thermocomp.report import papers as paperpages
 from thermocomp.report import volumetric as volumetricpages
@@ -112,7 +112,8 @@ def _mapping(folder: Path, version: int) -> None:
 def _test(folder: Path, version: int) -> None:
     speed = 1000.0 + version
     trial = Trial("run", speed, ((0.0, 900.0), (speed, 7200.0)))
-    testprogram.write_test(trial, folder / "test.ngc", small_machine().channels, overwrite=True)
+    picture = b"picture %d" % version
+    testprogram.write_test(trial, folder / "test.ngc", small_machine().channels, picture=picture, overwrite=True)
 
 
 #: by the name of the kind
@@ -130,6 +131,7 @@ WRITERS: dict[str, Writer] = {
     "parquet": _recording("parquet"),
     "check page": _page(checks, "render", lambda p: checks.write([], [], p, overwrite=True)),
     "report": _page(html, "render", lambda p: html.write(None, [], p, overwrite=True)),  # type: ignore[arg-type]
+    "page of assess": _page(assessed, "render", lambda p: assessed.write(None, [], p, overwrite=True)),  # type: ignore[arg-type]
     "selection page": _page(html, "render_choices", lambda p: html.write_choices([], [], p, overwrite=True)),
     "iso230 page": _page(iso230pages, "render", lambda p: iso230pages.write([], [], [], p, overwrite=True)),
     "papers page": _page(paperpages, "render", lambda p: paperpages.write([], p, seed=0, overwrite=True)),
@@ -140,5 +142,5 @@ WRITERS: dict[str, Writer] = {
     ),
     "program": _revise("linuxcnc"),
     "program written out": _revise("fanuc"),
-    "thermal test": Writer(_test, ("test.csv", "test.ngc"), "test.ngc"),
+    "thermal test": Writer(_test, ("test.csv", "test.ngc", "test.png"), "test.ngc"),
 }

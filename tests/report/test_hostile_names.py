@@ -14,12 +14,15 @@ from hostile import NAMES, renamed
 from matplotlib.figure import Figure
 from smallmachine import small_machine
 
-from thermocomp.assessment import selecting
+from thermocomp.assessment import selecting, study
 from thermocomp.assessment.choice import Settings
 from thermocomp.assessment.compare import compare
+from thermocomp.assessment.faultlog import find_faults
 from thermocomp.core.shown import shorten
 from thermocomp.iso230 import part2
 from thermocomp.iso230.settling import time_constants
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
 from thermocomp.papers.pictures import single
 from thermocomp.papers.study import Claim, PlotCurve, Study, StudyTable
 from thermocomp.recording import splits
@@ -27,7 +30,8 @@ from thermocomp.recording.findings import Finding
 from thermocomp.recording.positioning import Positioning
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.stacking import stack
-from thermocomp.report import checks, drawing, figures, html, iso230figures, papers
+from thermocomp.recording.starts import Start
+from thermocomp.report import assessed, checks, drawing, faults, figures, html, iso230figures, papers
 from thermocomp.report import iso230 as iso230pages
 
 REPORT = Path(figures.__file__).parent
@@ -75,6 +79,27 @@ def test_what_was_measured(name: str) -> None:
     assert page.count(
         shorten(name, 48).split("...")[0].replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")[:20]
     )
+
+
+def test_what_failed() -> None:
+    """A model takes no name with unprintable characters, and none of more than 200: these are the others."""
+    names = [n for n in NAMES if n.strip() and n.isprintable() and len(n) <= 200]
+    assert len(names) > 10
+    for k in range(0, len(names), 4):
+        plain = small_machine()
+        renames = dict(zip(("t1_C", "t2_C", "t3_C", "z_um"), (names + names)[k : k + 4], strict=True))
+        channels = tuple(replace(c, name=renames.get(c.name, c.name)) for c in plain.channels)
+        recording = replace(plain, table=plain.table.rename(columns=renames), channels=channels, name=names[k])
+        samples = stack([recording], [renames["z_um"]])
+        every = np.ones(len(samples), np.bool_)
+        model = replace(train("ols", samples, 0, every).model, watch=find_watch(samples, every))
+        lost = replace(recording, table=recording.table.assign(**{renames["t1_C"]: np.nan}))
+        judged = study.assess([model], [recording], starts=Start())
+        (log,) = find_faults(judged, [lost])
+        assert renames["t1_C"] in log.failed
+        said = [t.strip() for t in (*texts(faults.draw_timeline(log, lost)), *texts(faults.draw_stand_ins(log)))]
+        assert shorten(renames["t1_C"], 28).strip() in said
+        is_sound(assessed.render(judged, [lost]))
 
 
 @pytest.mark.parametrize("first", range(0, len(NAMES), 12))

@@ -133,6 +133,21 @@ def test_counted_anew_the_correction_begins_at_zero_again() -> None:
     assert found.compensated[190:] == pytest.approx(found.deviation[190:])
 
 
+def test_a_correction_that_nothing_drives_is_held_and_then_fades() -> None:
+    time = np.arange(0.0, 6 * 3600.0, 60.0)
+    table = np.column_stack([np.where(time > 0, 25.0, 20.0), np.zeros(len(time))])
+    limits = Limits(rate=1e9)
+    for undriven in (time >= 3600.0, np.ones(len(time), dtype=np.bool_)):
+        found = batch.run(STATIC, limits, time, table, undriven=undriven)
+        before = found.compensated[undriven.argmax() - 1] if undriven.argmax() else 0.0
+        since = time[undriven] - time[undriven][0] + 60.0
+        assert (found.compensated[undriven][since <= limits.hold] == before).all()
+        # the row in which the hold ends fades as a whole
+        left = before * math.exp(-(since[-1] - limits.hold) / limits.fade)
+        assert found.compensated[-1] == pytest.approx(left)
+        assert found.deviation[-1] == pytest.approx(14.5)  # the model alone goes on
+
+
 def test_a_slow_limit_is_seen_in_what_runs_and_not_in_the_model() -> None:
     time = np.arange(0.0, 3600.0, 10.0)
     table = np.column_stack([20.0 + np.minimum(time / 60, 10.0), np.zeros(len(time))])

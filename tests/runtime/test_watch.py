@@ -57,6 +57,18 @@ def run(watch: Watch, samples: Samples, values: FloatArray) -> tuple[WatchState,
     return state, first, when, through
 
 
+def test_a_spindle_that_starts_within_the_zero_accuses_nothing(samples: Samples) -> None:
+    """Five minutes of rest were to be averaged; the states of the speed began as if it had always turned."""
+    learned = find_watch(samples, samples.cycle >= 0)
+    assert learned is not None
+    begun = int(np.flatnonzero(~samples.stands)[0])
+    cut = samples.take(np.arange(len(samples)) >= begun - 3)
+    cut = replace(cut, time=cut.time - cut.time[0])
+    assert learned.zeroing.at_rest > cut.time[3]
+    _, first, _, _ = run(learned, cut, cut.values[:, None])
+    assert not first.any()
+
+
 def disturbed(samples: Samples, row: int) -> FloatArray:
     """Return one sound run, and one per sensor and kind of failure from a row on, (n_rows, n_runs, n_inputs)."""
     n, count = len(SIX), 1 + 4 * len(SIX)

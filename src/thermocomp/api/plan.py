@@ -71,7 +71,7 @@ class Planned(Result):
         )
 
     def plot(self) -> "Figure":
-        """Return the figure of the tests, and of the learning curve."""
+        """Return the figure of the gap that the next test fills, of all tests, and of the learning curve."""
         from thermocomp.report import plans
 
         return plans.draw(self.plan, self.curve).figure
@@ -79,7 +79,7 @@ class Planned(Result):
     def write(
         self, path: str | Path, *, dialect: Dialect = "linuxcnc", every: float = EVERY, overwrite: bool = False
     ) -> Path:
-        """Write the next test as an NC program, and beside it the sheet for what is measured.
+        """Write the next test as an NC program, and beside it the sheet for what is measured, and the figure (.png).
 
         Parameters
         ----------
@@ -100,8 +100,16 @@ class Planned(Result):
         InputError
             A file is there already, or cannot be there.
         """
+        from thermocomp.report.drawing import png
+
         return testprogram.write_test(
-            self.next.trial, Path(path), self.channels, dialect=dialect, every=60.0 * every, overwrite=overwrite
+            self.next.trial,
+            Path(path),
+            self.channels,
+            dialect=dialect,
+            every=60.0 * every,
+            picture=png(self.plot()),
+            overwrite=overwrite,
         )
 
     def __str__(self) -> str:

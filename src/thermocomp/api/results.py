@@ -15,6 +15,7 @@ from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.methods import deployable
 from thermocomp.recording.recording import Recording
@@ -198,6 +199,10 @@ class FittedModels(Result):
         """Mean half-width of the band over the unseen rows, by target [um]; nan without a band."""
         return {a.target: a.half_width for a in self.fitted.comparison.overall()}
 
+    def explain(self) -> Explanations:
+        """Return what the models are, how good they are, and what a failure of each sensor does: print it."""
+        return explain_all(self.fitted.models)
+
     def predict(self, table: Columns, time: ArrayLike | str | None = None) -> pd.DataFrame:
         """Replay all models through a table; see `thermocomp.core.model.ErrorModel.predict`.
 
@@ -273,6 +278,13 @@ class Assessed(Result):
     def plot(self, target: str | None = None) -> "Figure":
         """Return how the model ran through the recordings, for the first target or another."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page that ``thermocomp assess -o`` writes; return its path."""
+        from thermocomp.report import assessed
+
+        assessed.write(self.judged, self.recordings, Path(path), overwrite=overwrite)
+        return Path(path)
 
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *_told(self.trouble)])

@@ -29,7 +29,7 @@ _STEP = 60.0
 #: of them those that are counted
 _EVERY = 5
 #: speeds nearer than this share of the top speed are one
-_SAME = 0.1
+SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,62 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Covered:
+    """What was recorded so far.
+
+    Parameters
+    ----------
+    runs : tuple of (float, float, float)
+        Mean speed [1/min] and length [s] of each run, and length of the stop after it [s]; 0 without one.
+    rooms : tuple of float
+        How far the room's temperature changed within each test [degC]; none: it is not known.
+    """
+
+    runs: tuple[tuple[float, float, float], ...]
+    rooms: tuple[float, ...]
+
+    @classmethod
+    def of(cls, samples: Samples, column: int) -> "Covered":
+        """Return what some samples cover; their spindle speed is in a column."""
+        runs: list[tuple[float, float, float]] = []
+        ranges = []
+        air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
+        for test in range(len(samples.test_names)):
+            mine = np.flatnonzero((samples.test == test) & samples.valid)
+            speed, dt = np.abs(samples.values[mine, column]), samples.take(mine).dt()
+            dt[~np.isfinite(dt)] = 0.0
+            level = np.round(speed / max(float(speed.max(initial=0.0)), 1.0) / 0.05)
+            edges = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(mine)]
+            parts = [(float(speed[a:b].mean()), float(dt[a:b].sum())) for a, b in pairwise(edges)]
+            for (v, length), after in zip(parts, [*parts[1:], (np.inf, 0.0)], strict=True):
+                if v > 0 and length > 0:
+                    runs.append((v, length, after[1] if after[0] == 0 else 0.0))
+            ranges += [float(np.ptp(samples.values[mine][:, j])) for j in air[:1] if mine.size]
+        return cls(tuple(runs), tuple(ranges))
+
+    def news(self, trial: Trial, top_speed: float, swing: float) -> str:
+        """Say what in a test was not there so far; its speeds, lengths and stops, each by itself."""
+        if trial.kind == "room" and not self.rooms:
+            return "no temperature of the room was recorded"
+        if trial.kind == "room":
+            most = max(self.rooms)
+            return f"the room changed by {most:.1f} degC at most" if most < 0.5 * swing else ""
+        fastest = max((v for v, _, _ in self.runs), default=0.0)
+        near = [run for run in self.runs if abs(run[0] - trial.speed) <= SAME * top_speed]
+        if not near:
+            faster = trial.speed > fastest
+            return f"no run faster than {fastest:,.0f} 1/min" if faster else "no run at about this speed"
+        _, (_, length), *_ = trial.steps
+        longest, stop = max(own for _, own, _ in near), max(after for _, _, after in near)
+        found = ""
+        if longest < 0.5 * length:
+            found = f"no run at about this speed longer than {longest / 3600:.1f} h"
+        elif trial.kind == "stop" and stop < 0.5 * length:
+            found = f"no stop longer than {stop / 3600:.1f} h after such a run" if stop else "no stop after such a run"
+        return found
+
+
+@dataclass(frozen=True)
 class Plan:
     """Tests that could be run next, the one that would bring most first.
 
@@ -65,6 +121,8 @@ class Plan:
         gains; an order of size, no judged error.
     top_speed, hours, swing : float
         What the grid was made with [1/min], [h], [degC].
+    covered : Covered
+        What was recorded so far.
     """
 
     candidates: tuple[Candidate, ...]
@@ -72,6 +130,7 @@ class Plan:
     top_speed: float
     hours: float
     swing: float
+    covered: Covered
 
 
 def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
@@ -154,13 +213,13 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     use = _all_that_is_done(grid, tables)
     before = doubt.spread(use)
     gains = [float((before - doubt.after(f, t.duration).spread(use)).mean()) for t, f in zip(grid, tables, strict=True)]
-    covered = _Covered.of(samples, doubt.speed)
+    covered = Covered.of(samples, doubt.speed)
     found = [
         Candidate(t, float(doubt.spread(f).mean()), gain, covered.news(t, top_speed, swing))
         for t, f, gain in zip(grid, tables, gains, strict=True)
     ]
     best = sorted(found, key=lambda c: -c.gain)
-    return Plan(tuple(best), float(before.mean()), top_speed, hours, swing)
+    return Plan(tuple(best), float(before.mean()), top_speed, hours, swing, covered)
 
 
 def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:
@@ -185,49 +244,3 @@ def _foretell(trial: Trial, doubt: Doubt, swing: float, ambient: BoolArray) -> F
     rate = swing / float(time[-1])
     air, parts = rate * time, rate * (time - LAG * -np.expm1(-time / LAG))
     return doubt.table(speed, _STEP, np.where(ambient, air[:, None], parts[:, None]))[::_EVERY]
-
-
-@dataclass(frozen=True)
-class _Covered:
-    """What was recorded so far."""
-
-    runs: tuple[tuple[float, float, float], ...]  #: mean speed [1/min], length [s], and that of the stop after it [s]
-    room: float  #: how far the room's temperature changed within a test [degC]; nan: it is not known
-
-    @classmethod
-    def of(cls, samples: Samples, column: int) -> "_Covered":
-        runs: list[tuple[float, float, float]] = []
-        ranges = []
-        air = [j for j, c in enumerate(samples.inputs) if AMBIENT.search(c.name) and c.quantity == "temperature"]
-        for test in range(len(samples.test_names)):
-            mine = np.flatnonzero((samples.test == test) & samples.valid)
-            speed, dt = np.abs(samples.values[mine, column]), samples.take(mine).dt()
-            dt[~np.isfinite(dt)] = 0.0
-            level = np.round(speed / max(float(speed.max(initial=0.0)), 1.0) / 0.05)
-            edges = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(mine)]
-            parts = [(float(speed[a:b].mean()), float(dt[a:b].sum())) for a, b in pairwise(edges)]
-            for (v, length), after in zip(parts, [*parts[1:], (np.inf, 0.0)], strict=True):
-                if v > 0 and length > 0:
-                    runs.append((v, length, after[1] if after[0] == 0 else 0.0))
-            ranges += [float(np.ptp(samples.values[mine][:, j])) for j in air[:1] if mine.size]
-        return cls(tuple(runs), max(ranges, default=float("nan")))
-
-    def news(self, trial: Trial, top_speed: float, swing: float) -> str:
-        """Say what in a test was not there so far; its speeds, lengths and stops, each by itself."""
-        if trial.kind == "room" and np.isnan(self.room):
-            return "no temperature of the room was recorded"
-        if trial.kind == "room":
-            return f"the room changed by {self.room:.1f} degC at most" if self.room < 0.5 * swing else ""
-        fastest = max((v for v, _, _ in self.runs), default=0.0)
-        near = [run for run in self.runs if abs(run[0] - trial.speed) <= _SAME * top_speed]
-        if not near:
-            faster = trial.speed > fastest
-            return f"no run faster than {fastest:,.0f} 1/min" if faster else "no run at about this speed"
-        _, (_, length), *_ = trial.steps
-        longest, stop = max(own for _, own, _ in near), max(after for _, _, after in near)
-        found = ""
-        if longest < 0.5 * length:
-            found = f"no run at about this speed longer than {longest / 3600:.1f} h"
-        elif trial.kind == "stop" and stop < 0.5 * length:
-            found = f"no stop longer than {stop / 3600:.1f} h after such a run" if stop else "no stop after such a run"
-        return found

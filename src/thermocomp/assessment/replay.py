@@ -11,9 +11,12 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel, State
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import first_rows, robust_mean
+from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
+from thermocomp.recording.stacking import stack
+from thermocomp.recording.starts import Start
 from thermocomp.runtime import batch
-from thermocomp.runtime.watch import begin, look
+from thermocomp.runtime.watch import WatchState, begin, look
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -63,6 +66,7 @@ def replay_compensated(
     rows: BoolArray,
     limits: Limits = Limits(),
     probings: Probings | None = None,
+    watched: Samples | None = None,
 ) -> Replayed:
     """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
 
@@ -80,13 +84,16 @@ def replay_compensated(
     probings : Probings, optional
         Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
         from the next row on.
+    watched : Samples, optional
+        The same rows with all inputs of the model's watch, as they were recorded: see `stack_watched`. What the watch
+        finds failed is replaced; a correction that must not run without it is held, then fades.
 
     Returns
     -------
     Replayed
     """
     columns, within = _columns(model, samples), limits if model.unit == "um" else None
-    samples = believe(model.watch, samples, rows)
+    samples, undriven = believe(model, samples, rows, watched)
     n, why = len(samples), ""
     deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
     outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
@@ -109,6 +116,7 @@ def replay_compensated(
             reference=given_zero(samples, columns, test),
             resting=samples.stands[mine],
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
+            undriven=undriven[mine],
             probed=probed,
             repeatability=probings.repeatability if probings else 0.0,
         )
@@ -124,26 +132,88 @@ def replay_compensated(
     )
 
 
-def believe(watch: Watch | None, samples: Samples, rows: BoolArray) -> Samples:
-    """Return samples as a watch lets them through, in the tests that hold `rows`; the same without a watch.
+def believe(
+    model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
+) -> tuple[Samples, BoolArray]:
+    """Return samples as a model's watch lets them through, and where its correction is held, in the tests of `rows`.
 
-    An input of the watch that the samples have not got is missing to it. Rows without a speed are passed on unchanged.
+    They are the same, and nothing is held, without a watch or its speeds. Rows without a speed are passed on unchanged.
+    """
+    undriven, watch, seen = np.zeros(len(samples), dtype=np.bool_), model.watch, watched or samples
+    if watch is None or not can_look(watch, seen):
+        return samples, undriven
+    names, values = [c.name for c in samples.inputs], samples.values.copy()
+    known = [i.name in names for i in watch.inputs]
+    places = [names.index(i.name) for i in watch.inputs if i.name in names]
+    fault, allowed = np.zeros(len(watch.names), dtype=np.int8), True
+    for test in np.unique(samples.test[rows]).tolist():
+        for row, state, let in look_through(watch, seen, test):
+            values[row, places] = let[known]
+            if (state.fault != fault).any():
+                fault = state.fault
+                failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
+                allowed = not failed or model.may_lose(failed)
+            undriven[row] = not allowed
+        fault, allowed = np.zeros_like(fault), True
+    return replace(samples, values=values), undriven
+
+
+def stack_watched(
+    watch: Watch, target: str, recordings: Sequence[Recording], starts: Sequence[Start] | Start | None
+) -> Samples | None:
+    """Return all rows of recordings with the inputs of a watch, as they were recorded; None if none has any.
+
+    Parameters
+    ----------
+    watch : Watch
+    target : str
+        A displacement channel: samples have one.
+    recordings : sequence of Recording
+    starts : Start or sequence of Start or None
+        How each begins.
+    """
+    known = [i.name for i in watch.inputs if all(r.has(i.name) for r in recordings)]
+    if not known:
+        return None
+    rezero = any(i.rezero for i in watch.inputs)
+    samples = stack(recordings, [target], known, rezero=rezero, zeroing=watch.zeroing, starts=starts)
+    called = zip(samples.inputs, known, strict=True)
+    return replace(samples, inputs=tuple(replace(channel, name=own) for channel, own in called))
+
+
+def can_look(watch: Watch, samples: Samples) -> bool:
+    """Return whether samples have the speeds of a watch, without which it says nothing."""
+    names = [c.name for c in samples.inputs]
+    return all(i.name in names for i in watch.inputs if i.quantity != "temperature")
+
+
+def look_through(watch: Watch, samples: Samples, test: int) -> Iterator[tuple[int, WatchState, FloatArray]]:
+    """Go through a test with a watch; an input of it that the samples have not got is missing to it.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        With its speeds.
+    test : int
+
+    Yields
+    ------
+    row : int
+    state : WatchState
+        After the reading.
+    let : ndarray of shape (n_inputs,)
+        What it lets through, in the order of its inputs.
     """
     names = [c.name for c in samples.inputs]
-    if watch is None or any(i.name not in names for i in watch.inputs if i.quantity != "temperature"):
-        return samples
-    values, known = samples.values.copy(), [i.name in names for i in watch.inputs]
+    known = [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    for test in np.unique(samples.test[rows]).tolist():
-        mine = np.flatnonzero(samples.test == test)
-        zero = given_zero(samples, places, test) if all(known) else None
-        state = begin(watch, zero)
-        for row in mine.tolist():
-            given = np.full(len(watch.inputs), np.nan)
-            given[known] = samples.values[row, places]
-            state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
-            values[row, places] = let[known]
-    return replace(samples, values=values)
+    state = begin(watch, given_zero(samples, places, test) if all(known) else None)
+    for row in np.flatnonzero(samples.test == test).tolist():
+        given = np.full(len(watch.inputs), np.nan)
+        given[known] = samples.values[row, places]
+        state, let = look(watch, state, float(samples.time[row]), given, resting=bool(samples.stands[row]))
+        yield row, state, let
 
 
 def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatArray, BoolArray]:

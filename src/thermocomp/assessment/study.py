@@ -17,7 +17,7 @@ from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.pieces import explain
 from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.refit import stress_written
-from thermocomp.assessment.replay import are_absolute
+from thermocomp.assessment.replay import are_absolute, stack_watched
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -273,7 +273,8 @@ def assess(
         progress(f"{model.target} {model.family}")
         try:
             samples = _stacked(model, recordings, starts)
-            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits, probings)
+            watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
+            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits, probings, watched)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
@@ -353,7 +354,12 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
 
 
 def _assess(
-    model: ErrorModel, samples: Samples, rules: Rules, limits: Limits, probings: Probings | None
+    model: ErrorModel,
+    samples: Samples,
+    rules: Rules,
+    limits: Limits,
+    probings: Probings | None,
+    watched: Samples | None,
 ) -> tuple[Assessment, Judging]:
     """Judge a model on what it has not learned from; on everything if there is nothing else, and say so.
 
@@ -376,7 +382,7 @@ def _assess(
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings)
+    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings, watched=watched)
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging

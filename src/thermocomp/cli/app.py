@@ -34,6 +34,7 @@ COMMANDS = {
     "map": "Write how a logger's file is to be read and cleaned, asking what cannot be seen.",
     "select": "Choose the few temperature sensors that a model needs.",
     "fit": "Fit a model, judge it on thermal cycles it has not seen, and write it with its honest error.",
+    "explain": "Say what the models of a file are made of, how good they are, and what a failure of each sensor does.",
     "assess": "Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.",
     "compare": "Compare methods on thermal cycles they have not seen, beside no compensation.",
     "plan": "Say how much test is enough, and write the test that would teach most next as an NC program.",

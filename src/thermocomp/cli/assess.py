@@ -6,11 +6,13 @@ from thermocomp.cli import loudness
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.options import (
     CompensatorOptions,
+    OptionalOutput,
     read_recordings,
     tell_trouble,
 )
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console
+from thermocomp.core.draft import refuse_existing
 
 
 def assess(
@@ -23,6 +25,8 @@ def assess(
     probing: str | None = None,
     compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
     beginning: Beginning = Beginning(),  # noqa: B008 - frozen
+    output: OptionalOutput = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> int:
     """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its range.
@@ -47,6 +51,10 @@ def assess(
         Its limits: what would run is judged, not the model alone.
     beginning : Beginning
         How the recordings begin.
+    output : Path
+        Report to write (.html): also which sensors failed, what stood in, and what it cost.
+    overwrite : bool
+        Write over an existing report.
     json : bool
         Print results for a machine instead of a table.
 
@@ -56,6 +64,8 @@ def assess(
         0 no model refused, 1 one was refused here or when it was fitted, or has learned from all there is to judge it
         on, 2 unusable input.
     """
+    if output is not None:
+        refuse_existing([output], overwrite, [model, *recordings], ".html")
     tests = read_recordings(recordings, mapping)
     from thermocomp.assessment import study as studies
     from thermocomp.assessment.probing import Probings
@@ -77,6 +87,10 @@ def assess(
             probings=probings,
             progress=progress,
         )
-    out.show_assess(judged, trouble, console, as_json=json)
+    if output is not None:
+        from thermocomp.report import assessed
+
+        assessed.write(judged, tests, output, overwrite=overwrite)
+    out.show_assess(judged, trouble, console, as_json=json, report=output)
     before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in judged.overall()} else 0

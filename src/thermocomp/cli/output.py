@@ -157,7 +157,9 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
     console.print(f"Model file: {words(path)}", soft_wrap=True)
 
 
-def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool) -> None:
+def show_assess(
+    judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool, report: Path | None = None
+) -> None:
     """Print how models did on recordings."""
     if as_json:
         content = {
@@ -201,6 +203,8 @@ def show_assess(judged: Judged, trouble: Sequence[str], console: Console, *, as_
         if m.honest_error is not None and not m.accepted:
             word = mark(f"{m.honest_error.word} when it was fitted")
             console.print(f"{word} {words(m.target)}: {words(m.honest_error.why)}", soft_wrap=True)
+    if report is not None:
+        console.print(f"Report: {words(report)}", soft_wrap=True)
 
 
 def _tell_starts(begins: Sequence[tuple[str, Start]], console: Console) -> None:

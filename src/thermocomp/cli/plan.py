@@ -13,7 +13,7 @@ from thermocomp.cli.options import OptionalOutput, StudyOptions, read_recordings
 from thermocomp.cli.progress import show_steps
 from thermocomp.cli.terminal import console, print_table, words
 from thermocomp.core.exceptions import InputError
-from thermocomp.files.testprogram import Dialect, sheet_of
+from thermocomp.files.testprogram import Dialect, picture_of, sheet_of
 
 if TYPE_CHECKING:
     from thermocomp.api.plan import Planned
@@ -78,7 +78,7 @@ def plan(
     running : bool
         The recording is that of a test that is still running: judge whether its run or stop may end.
     output : Path
-        NC program to write (.ngc, .nc ...); beside it a sheet (.csv) for what is measured.
+        NC program to write (.ngc, .nc ...); beside it a sheet (.csv) for what is measured, and a figure (.png).
     overwrite : bool
         Write over existing files.
     json : bool
@@ -91,9 +91,11 @@ def plan(
     """
     if running:
         return _judge_running(recordings, study, output, as_json=json)
-    files = [] if output is None else [output, sheet_of(output)]
-    if output is not None and output.suffix.lower() in ("", ".csv"):
-        raise InputError(f"{output}: name the NC program, such as test.ngc; the sheet beside it ends in .csv")
+    files = [] if output is None else [output, sheet_of(output), picture_of(output)]
+    if output is not None and output.suffix.lower() in ("", ".csv", ".png"):
+        raise InputError(
+            f"{output}: name the NC program, such as test.ngc; sheet and figure beside it end in .csv and .png"
+        )
     ready = study.prepare(recordings, beginning, files, overwrite, "", judged=False)
     from thermocomp.api import plan as api
     from thermocomp.assessment import learningcurve

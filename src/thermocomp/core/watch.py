@@ -163,6 +163,12 @@ class Watch:
         lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)
         return np.stack([np.eye(n) - direct, np.eye(n) - direct - lagged])
 
+    @cached_property
+    def pairs(self) -> tuple[IntArray, IntArray]:
+        """Every two sensors."""
+        first, second = np.triu_indices(len(self.sensors), 1)
+        return first, second
+
     def limits(self, what: str) -> FloatArray:
         """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or what is unseen of it."""
         return self._limits[what]

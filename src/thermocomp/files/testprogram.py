@@ -136,9 +136,10 @@ def write_test(
     *,
     dialect: Dialect = "linuxcnc",
     every: float = 0.0,
+    picture: bytes = b"",
     overwrite: bool = False,
 ) -> Path:
-    """Write a test: its NC program, and beside it the sheet.
+    """Write a test: its NC program, and beside it the sheet, and a picture of why it is run.
 
     Parameters
     ----------
@@ -148,6 +149,8 @@ def write_test(
         Of `write_sheet`.
     dialect, every
         Of `write_program`.
+    picture : bytes
+        PNG; empty: there is none.
     overwrite : bool
 
     Returns
@@ -161,10 +164,15 @@ def write_test(
         The test cannot be written, or a file cannot be there: see `thermocomp.core.draft.drafts`.
     """
     sheet = sheet_of(program)
-    texts = {sheet: write_sheet(trial, channels, every), program: write_program(trial, dialect, every)}
-    with drafts(list(texts), overwrite=overwrite) as started:
-        for target, text in texts.items():
-            started[target].write_text(text, encoding="ascii" if target == program else "utf-8", newline="\n")
+    contents = {
+        sheet: write_sheet(trial, channels, every).encode("utf-8"),
+        program: write_program(trial, dialect, every).encode("ascii"),
+    }
+    if picture:
+        contents = {picture_of(program): picture} | contents
+    with drafts(list(contents), overwrite=overwrite) as started:
+        for target, content in contents.items():
+            started[target].write_bytes(content)
         started.publish()
     return sheet
 
@@ -172,6 +180,11 @@ def write_test(
 def sheet_of(program: Path) -> Path:
     """Return where the sheet of a program stands."""
     return program.with_suffix(".csv")
+
+
+def picture_of(program: Path) -> Path:
+    """Return where the picture of a program stands."""
+    return program.with_suffix(".png")
 
 
 def clock(seconds: float) -> str:

@@ -193,6 +193,14 @@ class Recording:
         hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(names)}"
         raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
 
+    def has(self, name: str) -> bool:
+        """Return whether `channel` finds a channel."""
+        try:
+            self.channel(name)
+        except InputError:
+            return False
+        return True
+
     def values(self, channels: Sequence[Channel]) -> FloatArray:
         """Return the columns of `channels` as an array of shape (n_rows, n_channels), in house units."""
         return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)

@@ -126,7 +126,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             ax.set_visible(False)
         points = POINTS // columns
         for ax, block in zip(axes.flat, blocks, strict=False):
-            hours = _clock(block, time)
+            hours = clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
             if block.band:
                 _draw_band(ax, block, hours, points)
@@ -206,7 +206,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         return svg(figure)
 
 
-def _clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
+def clock(block: Assessment, time: Sequence[FloatArray]) -> FloatArray:
     """Return hours since the block's first row; tests follow each other without a gap."""
     seconds = np.array([time[t][r] for t, r in zip(block.test, block.row, strict=True)])
     for k in np.flatnonzero(np.diff(block.test)) + 1:

@@ -17,6 +17,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.report import contributions, figures, selections
 from thermocomp.report.bands import describe_coverage
+from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
 
@@ -36,19 +37,8 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
     -------
     str
     """
-    times = [r.time for r in recordings]
     overall = comparison.overall()
-    drawn = {}
-    for target in dict.fromkeys(a.target for a in overall):
-        shown = comparison.best(target)
-        if shown is None:  # nothing may be used: show the least bad, marked as refused
-            candidates = [a for a in overall if a.target == target and not a.failure]
-            shown = min(candidates, key=lambda a: a.metric("rms"), default=None)
-        if shown is not None:
-            blocks = [
-                a for a in comparison.assessments if (a.target, a.model) == (target, shown.model) and not a.overall
-            ]
-            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times), _held(shown))
+    drawn = draw_runs(comparison, recordings)
     stressed = dict.fromkeys(model for model, *_ in drawn.values())
     content = summarise(comparison, recordings, samples)
     models = {t["name"]: t["formula"]["model"] for t in content["targets"] if t["formula"]}
@@ -69,6 +59,35 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             if any(a.model == m and a.robustness is not None for a in overall)
         },
     )
+
+
+def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str]]:
+    """Return how the best model of each target ran; where nothing may be used the least bad, marked as refused.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    dict of str to (str, Drawn, str)
+        By target: the model, its run through the judged blocks, and how its band did; of no target without a run.
+    """
+    times = [r.time for r in recordings]
+    overall = comparison.overall()
+    drawn = {}
+    for target in dict.fromkeys(a.target for a in overall):
+        shown = comparison.best(target)
+        if shown is None:  # nothing may be used: show the least bad, marked as refused
+            candidates = [a for a in overall if a.target == target and not a.failure]
+            shown = min(candidates, key=lambda a: a.metric("rms"), default=None)
+        if shown is not None:
+            blocks = [
+                a for a in comparison.assessments if (a.target, a.model) == (target, shown.model) and not a.overall
+            ]
+            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times), _held(shown))
+    return drawn
 
 
 def _held(shown: Assessment) -> str:

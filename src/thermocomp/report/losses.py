@@ -2,10 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+from thermocomp.core.explained import DEAR, FAR
 from thermocomp.core.model import ErrorModel
-
-#: a sensor that may be further off than this before it is found is named [degC]
-FAR = 3.0
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
@@ -23,6 +21,7 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
     watch = next((m.watch for m in models if m.watch is not None), None)
     if watch is None:
         return
+    dear = dict[str, None]()
     for model in models:
         found = model.honest_error
         single = {} if found is None else {n: v for n, v in found.lost.items() if ", " not in n}
@@ -37,7 +36,14 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
             )
         if gone := [n for n in single if n not in stood]:
             said.append(f"without {', '.join(gone)} its correction is held, then fades")
+        heat = [n for n in single if n in watch.names]
+        dear |= dict.fromkeys(n for n in heat if n not in stood or single[n] > DEAR * found.rms)
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
+    if dear:
+        yield (
+            f"A spare is recommended beside {', '.join(dear)}: without it a correction is held, or leaves over "
+            f"{DEAR:g} times its error"
+        )
     blind = [f"{n} ({s.off:.1f} degC)" for n, s in zip(watch.names, watch.sensors, strict=True) if s.off > FAR]
     if blind:
         yield (

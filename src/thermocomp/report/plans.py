@@ -1,14 +1,23 @@
-"""The figure of a plan: what each test would bring, and how the error falls with what was learned from."""
+"""The figure of a plan: the gap that the next test fills, what each test would bring, and how the error falls."""
 
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from thermocomp.assessment.learningcurve import LearningCurve
-from thermocomp.assessment.planning import Plan
+from thermocomp.assessment.planning import SAME, Plan
+from thermocomp.core.trial import Trial
 from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
+from thermocomp.report.figures import MEASURED, NONE, PREDICTED, RESIDUAL, SHADE
+
+#: how the next test is marked
+_STAR: dict[str, Any] = {"marker": "*", "ms": 12, "ls": "", "color": RESIDUAL, "zorder": 4}
 
 
 def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
-    """Draw the tests that could be run next, and beside them the learning curve if there is one.
+    """Draw what was recorded with the next test in its gap; below it all tests, and the learning curve if there is one.
 
     Parameters
     ----------
@@ -20,26 +29,104 @@ def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
     Drawn
     """
     with drawing("plan"):
-        figure = Figure(figsize=(9.6, 1.4 + 0.22 * len(plan.candidates)), layout="constrained")
-        axes = figure.subplots(1, 2 if curve else 1, squeeze=False)[0]
-        tests = axes[0]
-        tests.barh(range(len(plan.candidates)), [c.gain for c in plan.candidates], color="#1f77b4", height=0.7)
-        name_ticks(tests.yaxis, [c.trial.words for c in plan.candidates], fontsize=7)
-        tests.invert_yaxis()
-        tests.set_xlabel("expected to take off the error [um]")
-        tests.set_title(f"next test (expected error now {plan.expected:.2f} um)")
+        below = 1.4 + 0.22 * len(plan.candidates)
+        figure = Figure(figsize=(9.6, 3.0 + below), layout="constrained")
+        gap, brings = figure.subfigures(2, 1, squeeze=False, height_ratios=[3.0, below])[:, 0]
+        runs, stops, room = gap.subplots(1, 3)
+        _draw_runs(runs, plan)
+        _draw_stops(stops, plan)
+        _draw_room(room, plan)
+        best = plan.candidates[0]
+        words = f": {best.news}" if best.news else ""
+        gap.suptitle(f"next: {best.trial.words}{words}", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
+        axes = brings.subplots(1, 2 if curve else 1, squeeze=False)[0]
+        _draw_tests(axes[0], plan)
         if curve is not None:
-            levels = curve.by_cycles()
-            learned = axes[1]
-            learned.plot([p.learned for p in curve.points], [p.rms for p in curve.points], ".", color="#bbbbbb")
-            learned.errorbar(
-                [x.learned for x in levels], [x.rms for x in levels], [x.error for x in levels], marker="o", capsize=2,
-                label=f"{curve.model}, mean and its standard error",
-            )  # fmt: skip
-            learned.axhline(curve.none, color="#999999", ls="--", lw=0.8, label="no compensation")
-            learned.set_ylim(bottom=0)
-            learned.set_xlabel("thermal cycles learned from")
-            learned.set_ylabel("error on an unseen cycle [um RMS]")
-            learned.set_title("how much is enough")
-            add_legend(learned)
+            _draw_curve(axes[1], curve)
         return svg(figure)
+
+
+def _draw_runs(ax: Axes, plan: Plan) -> None:
+    """Show at which speed was run for how long, and where the next test is."""
+    recorded = [(v, length / 3600) for v, length, _ in plan.covered.runs]
+    ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7, label="recorded")
+    others = {(c.trial.speed, _longest(c.trial)) for c in plan.candidates if c.trial.kind != "room"}
+    ax.plot(*np.array(sorted(others)).T, "o", color=NONE, mfc="none", ms=4, lw=0, label="tests compared")
+    best = plan.candidates[0].trial
+    if best.kind != "room":
+        ax.plot(best.speed, _longest(best), label="next test", **_STAR)
+    _finish(ax, plan, "runs", "run [h]", room=0.35)
+    add_legend(ax, loc="upper left", ncols=2, fontsize=7)
+
+
+def _draw_stops(ax: Axes, plan: Plan) -> None:
+    """Show how long was stopped after runs at which speed."""
+    recorded = [(v, stop / 3600) for v, _, stop in plan.covered.runs]
+    ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7)
+    best = plan.candidates[0].trial
+    if best.kind in ("repeated", "stop"):
+        ax.plot(best.speed, best.steps[2][1] / 3600, **_STAR)
+    _finish(ax, plan, "stops after a run", "stop after it [h]")
+
+
+def _draw_room(ax: Axes, plan: Plan) -> None:
+    """Show how far the room changed within each test."""
+    rooms = plan.covered.rooms
+    ax.bar(range(1, 1 + len(rooms)), rooms, color=MEASURED, width=0.6)
+    if not rooms:
+        ax.text(0.5, 0.5, "no temperature of\nthe room was recorded", transform=ax.transAxes, ha="center", fontsize=8)
+    if plan.swing:
+        ax.axhline(plan.swing, color=NONE, ls="--", lw=0.8, label=f"reckoned with: {plan.swing:g} degC")
+    if plan.candidates[0].trial.kind == "room":
+        ax.plot(len(rooms) + 1, plan.swing, label="next test", **_STAR)
+    ax.set_xticks(range(1, 1 + len(rooms)) if len(rooms) <= 12 else [1, len(rooms)])
+    ax.set_xlim(0, max(len(rooms), 3) + 2)
+    ax.set_ylim(0, 1.35 * max(*rooms, plan.swing, 1.0))
+    ax.set_axisbelow(True)
+    ax.set_xlabel("recording")
+    ax.set_ylabel("change of the room [degC]")
+    ax.set_title("room")
+    add_legend(ax, loc="upper right", fontsize=7)
+
+
+def _draw_tests(ax: Axes, plan: Plan) -> None:
+    """Show what each test would bring."""
+    ax.barh(range(len(plan.candidates)), [c.gain for c in plan.candidates], color=PREDICTED, height=0.7)
+    name_ticks(ax.yaxis, [c.trial.words for c in plan.candidates], fontsize=7)
+    ax.invert_yaxis()
+    ax.set_axisbelow(True)
+    ax.set_xlabel("expected to take off the error [um]")
+    ax.set_title(f"next test (expected error now {plan.expected:.2f} um)")
+
+
+def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
+    """Show how the error falls with what was learned from."""
+    levels = curve.by_cycles()
+    ax.plot([p.learned for p in curve.points], [p.rms for p in curve.points], ".", color="#bbbbbb")
+    learned, rms = [x.learned for x in levels], [x.rms for x in levels]
+    ax.plot(learned, rms, "o-", color=PREDICTED, label=f"{curve.model}, mean and its standard error")
+    ax.errorbar(learned, rms, [x.error for x in levels], fmt="none", ecolor=PREDICTED, capsize=2)
+    ax.axhline(curve.none, color="#999999", ls="--", lw=0.8, label="no compensation")
+    ax.set_ylim(bottom=0)
+    ax.set_xlabel("thermal cycles learned from")
+    ax.set_ylabel("error on an unseen cycle [um RMS]")
+    ax.set_title("how much is enough")
+    add_legend(ax)
+
+
+def _longest(trial: Trial) -> float:
+    return max(duration for speed, duration in trial.steps if speed) / 3600
+
+
+def _finish(ax: Axes, plan: Plan, title: str, what: str, room: float = 0.1) -> None:
+    """Shade what counts as the speed of the next test, name the axes, and leave room above the points."""
+    best = plan.candidates[0].trial
+    if best.kind != "room":
+        near = SAME * plan.top_speed
+        ax.axvspan(best.speed - near, best.speed + near, color=SHADE, lw=0, zorder=0, label="counts as its speed")
+    ax.axvline(plan.top_speed, color=NONE, ls=":", lw=0.8)
+    ax.set_xlim(0, (1.0 + SAME) * plan.top_speed)
+    ax.set_ylim(0, (1.0 + room) * ax.get_ylim()[1])
+    ax.set_xlabel("spindle speed [1/min]")
+    ax.set_ylabel(what)
+    ax.set_title(title)

@@ -1,8 +1,17 @@
-"""What probings did, in words."""
+"""What probings did: in words, and the section of a page with what was learned after each."""
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+from matplotlib.figure import Figure
+
 from thermocomp.assessment.results import Assessment
+from thermocomp.assessment.study import Judged
+from thermocomp.core.shown import shorten
+from thermocomp.recording.recording import Recording
+from thermocomp.report.drawing import Drawn, add_legend, drawing, svg
+from thermocomp.report.figures import LONGEST, MEASURED, NONE, POINTS, PREDICTED, clock
+from thermocomp.report.sections import Section, Shown
 
 
 def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
@@ -26,3 +35,49 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
         yield f"{a.target}, {probed.plan.words} ({int(probed.at.sum())} in all): RMS and mean in um {left}"
         if probed.refused:
             yield f"{a.target}: {len(probed.refused)} of them refused; the first: {probed.refused[0]}"
+
+
+def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
+    """Return what the page says of probings; None if there were none.
+
+    Parameters
+    ----------
+    judged : Judged
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    Section or None
+    """
+    probed = [a for a in judged.overall() if a.probed is not None and not a.failure]
+    if not probed:
+        return None
+    shown = Shown(
+        draw_shifts(probed, recordings), "What a probing said at its instant, and what was added from then on."
+    )
+    return Section("Probings", [shown, *describe_probings(probed)])
+
+
+def draw_shifts(probed: Sequence[Assessment], recordings: Sequence[Recording]) -> Drawn:
+    """Show, target by target, what models are wrong by without probings, and what was added after each."""
+    times = [r.time for r in recordings]
+    with drawing("probings"):
+        figure = Figure(figsize=(9.6, 0.6 + 1.7 * len(probed)), layout="constrained")
+        axes = figure.subplots(len(probed), 1, squeeze=False, sharex=True)[:, 0]
+        for ax, a in zip(axes, probed, strict=True):
+            assert a.probed is not None
+            hours, wrong = clock(a, times), a.measured - a.probed.without
+            rows = slice(None, None, max(1, len(hours) // POINTS))
+            ax.axhline(0.0, color=NONE, lw=0.8)
+            ax.plot(
+                hours[rows], wrong[rows], color=MEASURED, lw=0.9, label="measured minus predicted, without probings"
+            )
+            ax.step(hours[rows], a.probed.shift[rows], color=PREDICTED, lw=1.4, where="post", label="added")
+            ax.plot(hours[a.probed.at], wrong[a.probed.at], "o", ms=5, color="#222", mfc="white", label="probing")
+            ax.set_ylabel(f"{shorten(a.target.removesuffix('_um'), LONGEST)} [um]")
+            low, high = np.quantile(wrong, [0.001, 0.999])
+            room = 0.15 * max(high - low, 0.1)
+            ax.set_ylim(min(low, float(a.probed.shift.min())) - room, max(high, float(a.probed.shift.max())) + room)
+        axes[-1].set_xlabel("time [h]")
+        add_legend(axes[0], loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        return svg(figure)

@@ -45,6 +45,7 @@ def run(
     reference: Sequence[float] | FloatArray | None = None,
     resting: BoolArray | None = None,
     anew: int | None = None,
+    undriven: BoolArray | None = None,
     probed: FloatArray | None = None,
     repeatability: float = 0.5,
 ) -> ModelRun:
@@ -67,6 +68,8 @@ def run(
     anew : int, optional
         Row from which deviations count anew: from there it is the model minus what it says there, on average over the
         rows that a zero is taken of, and the correction begins at zero again.
+    undriven : ndarray of bool of shape (n_rows,), optional
+        The correction is not driven: sensors failed that the model must not lose. It is held, then fades.
     probed : ndarray of shape (n_rows,), optional
         Deviation that a probing says, nan where there was none: it counts from the next row on [um].
     repeatability : float
@@ -92,15 +95,14 @@ def run(
         counted, known = _counted(gated.deviation, model, time, gate.passed, stands, anew)
         gated = gated._replace(deviation=counted)
     turned = complete & ~gate.passed
-    moved = without = _moved(gated.deviation, gate.passed, time, limits, known)
+    drives = gate.passed if undriven is None else gate.passed & ~undriven
+    moved = without = _moved(gated.deviation, drives, time, limits, known)
     shift, refused = np.zeros(len(time)), tuple[str, ...]()
     if probed is not None:
         later = np.arange(len(time)) >= known
         alone, _, _ = _adapted(model, alone, time, np.where(complete & later, probed, np.nan), repeatability)
-        gated, shift, refused = _adapted(
-            model, gated, time, np.where(gate.passed & later, probed, np.nan), repeatability
-        )
-        moved = _moved(gated.deviation, gate.passed, time, limits, known)
+        gated, shift, refused = _adapted(model, gated, time, np.where(drives & later, probed, np.nan), repeatability)
+        moved = _moved(gated.deviation, drives, time, limits, known)
     return ModelRun(alone.deviation, moved, alone.outside, turned, gate.why, alone.half_width, shift, without, refused)
 
 

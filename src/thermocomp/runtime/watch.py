@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.watch import FASTER, LASTING, Watch
 from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.runtime.blame import USUAL, one_fails, weigh_swaps
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
 FloatArray = NDArray[np.float64]
@@ -22,15 +23,15 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
 #: what a sensor is, by `WatchState.fault`
-WORDS = ("good", "missing", "stepped", "stuck", "off")
-GOOD, MISSING, STEPPED, STUCK, OFF = range(len(WORDS))
+WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped")
+GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED = range(len(WORDS))
 
 #: between two looks at the differences, at least: temperatures are slow [s]
 TICK = 10.0
 #: how long a sensor that was missing has to read what is predicted until it is believed again [s]
 RETURN = 600.0
-#: how fast what stands in moves over to the prediction, and how slow what is usual of the difference [s]
-FADE, USUAL = 3600.0, 1800.0
+#: how fast what stands in moves over to the prediction [s]
+FADE = 3600.0
 #: after a failure, its traces in the predictions of the others have to fade before another one is found by them [s]
 REST = 3600.0
 
@@ -56,6 +57,7 @@ class WatchState(NamedTuple):
     then: FloatArray  #: what was predicted then [degC]
     moving: FloatArray  #: since when its prediction has moved too far for that; nan: it has not [s]
     back: FloatArray  #: since when one that was missing reads what is predicted; nan: it does not [s]
+    evidence: FloatArray  #: (..., n_pairs), low-passed, that two are swapped; -inf: once it spoke against it
     fast: FloatArray  #: (...,), when the spindle last turned faster than in the training [s]
 
 
@@ -79,6 +81,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     return WatchState(
         *(zero, Gathered(), np.nan, memory, traces, none, none, none, np.zeros(n, dtype=np.int8)),
         *(nan, none, nan, nan, nan, nan, none, nan, nan),
+        np.zeros((*runs, len(watch.pairs[0]))),
         np.full(runs, -np.inf),
     )
 
@@ -149,14 +152,11 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
         gathered = gathered.add(time, values, resting)
         if not gathered.complete(watch.zeroing):
             return state._replace(gathered=gathered)
-    zero = (
-        np.where(np.isnan(state.reference), robust_mean(gathered.values), state.reference)
-        if unknown
-        else state.reference
-    )
-    change = values - zero
-    if unknown:
-        change[..., heat] = 0.0
+    zero, begun = state.reference, values
+    if unknown:  # it rests in its zero, even if the spindle turns in the reading that ends that
+        begun = robust_mean(gathered.values)
+        zero = np.where(np.isnan(zero), begun, zero)
+    change = begun - zero
     memory, used = watch.bank.signals(change)[0], change[..., heat]
     direct, weights = watch.read_out
     return state._replace(
@@ -189,10 +189,10 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     """Look at all sensors; `x` is nan where a temperature is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
-    s = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
+    s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
     s = _missing(s, seen)
     bridged = s.usual + s.predicted
-    waiting = np.isfinite(s.jumped) & (s.fault == GOOD)
+    waiting = np.isfinite(s.jumped) & (s.fault == GOOD) & seen
     used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, np.nan_to_num(x)))
     change = values - s.reference
     change[..., watch.bank.temperatures] = used
@@ -207,12 +207,13 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     taus = np.repeat(watch.time_constants, len(watch.sensors))
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
-    s = _stuck(watch, s, x, calm)
-    s = _off(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
+    s, stuck = _stuck(watch, s, x, calm)
+    s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
+    s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting))
     return _returns(watch, s, difference)
 
 
-def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> WatchState:
+def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find jumps, those that were spikes, and those that last."""
     limit = watch.limits("jump") * max(1.0, dt / watch.pace)
     waiting = np.isfinite(s.jumped)
@@ -222,8 +223,7 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
     fresh = far & ~waiting
     lasts = far & waiting & (s.time - s.jumped >= LASTING)
     jumped = np.where(far, np.where(fresh, s.time, s.jumped), np.where(able, np.nan, s.jumped))
-    s = s._replace(jumped=jumped)
-    return _fail(watch, s, lasts, STEPPED, s.usual)
+    return s._replace(jumped=jumped), lasts
 
 
 def _missing(s: WatchState, seen: BoolArray) -> WatchState:
@@ -237,7 +237,7 @@ def _missing(s: WatchState, seen: BoolArray) -> WatchState:
     )
 
 
-def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> WatchState:
+def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find what reads the same though its prediction moves, or though all others have changed for long."""
     same = x == s.same
     with np.errstate(invalid="ignore"):
@@ -253,39 +253,45 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> Watch
     s = s._replace(moving=moving)
     lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all stand still: not the logger
     long = same & calm & lives & (s.time - s.still > watch.limits("still"))
-    found = (moves & (s.time - moving >= LASTING)) | long
-    return _fail(watch, s, found, STUCK, x - s.then)
+    return s, (moves & (s.time - moving >= LASTING)) | long
 
 
-def _off(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> WatchState:
-    """Find which sensor is off where differences are too large: the one whose failure explains them all."""
+def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
+    """Find the runs, (...,), in which a difference has been too large for long."""
     z = np.where(calm, difference, 0.0) / watch.limits("off")
     recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
     beyond = (np.abs(z) > 1.0) & (s.time - recent > REST) & (s.time - s.fast[..., None] > REST)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
-    s = s._replace(off=off)
     with np.errstate(invalid="ignore"):
-        lasting = (s.time - off >= LASTING).any(axis=-1)
-    if not lasting.any():
+        return s._replace(off=off), np.asarray((s.time - off >= LASTING).any(axis=-1))
+
+
+def _blame(
+    watch: Watch,
+    s: WatchState,
+    x: FloatArray,
+    able: BoolArray,
+    dt: float,
+    found: tuple[BoolArray, BoolArray, BoolArray],
+) -> WatchState:
+    """Take out of use what failed: two that are swapped if that explains all, and better than one; or each alone."""
+    stepped, stuck, lasting = found
+    counts = np.where(s.time - s.fast[..., None] > REST, dt, 0.0)
+    evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts)
+    s, wrong = s._replace(evidence=evidence), lasting | (stepped | stuck).any(axis=-1)
+    if not wrong.any():
         return s
-    weights, limits = watch.limits("unseen"), watch.limits("off")
-    scaled = np.where(calm, difference, 0.0) / weights
-    best, guilty = np.full(z.shape[:-1], np.inf), np.zeros(z.shape[:-1], dtype=np.intp)
-    worst = np.full(z.shape[:-1], np.inf)  # of what is left, in units of the limits
-    for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
-        amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
-        left = scaled[..., :, None] - shape * amount[..., None, :]
-        rest = (left**2).sum(axis=-2)
-        rest[~calm] = np.inf
-        place = rest.argmin(axis=-1)[..., None]
-        value = np.take_along_axis(rest, place, axis=-1)[..., 0]
-        most = np.take_along_axis(np.abs(left * (weights / limits)[:, None]).max(axis=-2), place, axis=-1)[..., 0]
-        better = value < best
-        best, guilty = np.where(better, value, best), np.where(better, place[..., 0], guilty)
-        worst = np.where(better, most, worst)
-    sure = lasting & (worst <= 1.0)  # else no single failure explains it: the machine is unlike its training
-    found = sure[..., None] & (np.arange(z.shape[-1]) == guilty[..., None])
-    return _fail(watch, s, found, OFF, np.zeros(z.shape))
+    direct, states = watch.read_out
+    one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able)
+    swapped = wrong & (both.worst <= 1.0) & (both.rest < one.rest)
+    s = _fail(watch, s, swapped[..., None] & both.sensors, SWAPPED, np.zeros(x.shape))
+    for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
+        s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
+    calm = able & np.isnan(s.jumped)
+    one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm)
+    # else no single failure explains it: the machine is unlike its training
+    sure = lasting & ~swapped & ~(stepped | stuck).any(axis=-1) & (one.worst <= 1.0)
+    return _fail(watch, s, sure[..., None] & one.sensors, OFF, np.zeros(x.shape))
 
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
@@ -327,5 +333,5 @@ def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: Flo
         bridge=np.where(found, offset, s.bridge),
         used=np.where(found, s.predicted + offset, s.used),
         jumped=np.where(found, np.nan, s.jumped),
-        off=np.where(found.any(axis=-1, keepdims=True) & (fault == OFF), np.nan, s.off),
+        off=np.where(found.any(axis=-1, keepdims=True) & (fault in (OFF, SWAPPED)), np.nan, s.off),
     )

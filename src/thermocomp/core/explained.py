@@ -1,0 +1,336 @@
+"""What a frozen model is, in plain words and numbers: what it is made of, how good it is, and what a failure does."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from thermocomp.core.bounds import GAP
+from thermocomp.core.contributions import gains
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.paceddynamic import PacedDynamic
+from thermocomp.core.watch import LASTING, Watched
+
+#: a sensor that may drift further than this before it is found off wants a spare beside it [degC]
+FAR = 3.0
+#: the same if what stands in for it leaves so many times the error with all
+DEAR = 2.0
+#: a time constant or a time step changes nothing of what is settled [s]
+_ANY = 60.0
+
+
+@dataclass(frozen=True)
+class SensorExplanation:
+    """An input of a model: how much it counts, how its failure is found, and what is done then.
+
+    Parameters
+    ----------
+    name, quantity, unit : str
+    low, high : float
+        Trained range, from its zero where it has one of its own [unit].
+    settled : float or None
+        Followed in the end: per degree, or a spindle speed at the top speed of the training [unit of the model]; None:
+        not known of this family.
+    bound : float or None
+        Most that it can add, whatever it reads [unit of the model].
+    watched : bool
+        It is predicted from the others and the spindle speed; a failure is found by that, and the prediction stands in.
+    jump, off, moved : float or None
+        Limits: change within `pace`, difference from its prediction, change of the prediction while it reads the same
+        [degC].
+    pace : float or None
+        [s]
+    still : float or None
+        It reads the same for longer, another one changing [s]; None: time alone says nothing.
+    unseen : float or None
+        RMS error of its prediction in cycles that were left out [degC].
+    undetected : float or None
+        What a drift up to `off` does to the model's answer, once settled [unit of the model].
+    lost : float or None
+        RMS error on unseen cycles without it [unit of the model]; None: never judged.
+    runs_on : bool
+        The correction goes on with the prediction in its place; otherwise it is held, then fades.
+    spare : str
+        Why a spare sensor beside it is recommended; empty if none is.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    low: float
+    high: float
+    settled: float | None
+    bound: float | None
+    watched: bool
+    jump: float | None
+    off: float | None
+    moved: float | None
+    pace: float | None
+    still: float | None
+    unseen: float | None
+    undetected: float | None
+    lost: float | None
+    runs_on: bool
+    spare: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a model is. Print it to read it.
+
+    Parameters
+    ----------
+    target, unit, method, family : str
+    remembers : bool
+        Its answer depends on earlier readings.
+    sensors : tuple of SensorExplanation
+        Inputs with an influence; those that can add most first where that is known.
+    zero : str
+        What its inputs count from.
+    word, reason : str
+        Verdict of the do-no-harm gate, and why.
+    rms, max_abs, none_rms : float or None
+        On unseen cycles; the last without compensation [unit]; None: never judged.
+    cycles : dict of str to float
+        RMS error per unseen cycle [unit].
+    band : str
+        In words; empty without one.
+    outside : str
+        What it does outside its trained range.
+    covered : str
+        What the judged cycles covered; empty if that is not known.
+    pairs : tuple of int
+        Pairs of sensors that were judged lost together, and those of them with which the correction runs on.
+    """
+
+    target: str
+    unit: str
+    method: str
+    family: str
+    remembers: bool
+    sensors: tuple[SensorExplanation, ...]
+    zero: str
+    word: str
+    reason: str
+    rms: float | None
+    max_abs: float | None
+    none_rms: float | None
+    cycles: dict[str, float]
+    band: str
+    outside: str
+    covered: str
+    pairs: tuple[int, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and words."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self))
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """What the models of several targets are. Print it to read it.
+
+    Parameters
+    ----------
+    models : tuple of Explanation
+    """
+
+    models: tuple[Explanation, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and words."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        return "\n\n".join(map(str, self.models))
+
+
+def explain(model: ErrorModel) -> Explanation:
+    """Return what a model is.
+
+    Parameters
+    ----------
+    model : ErrorModel
+
+    Returns
+    -------
+    Explanation
+    """
+    known = {g.name: g for g in gains(model, _ANY)} if isinstance(model, PacedDynamic) else {}
+    order = list(known) if known else [i.name for i in model.inputs]
+    found = model.honest_error
+    several = [rms for key, rms in found.lost.items() if key not in {i.name for i in model.inputs}] if found else []
+    return Explanation(
+        target=model.target,
+        unit=model.unit,
+        method=model.provenance.method if model.provenance else "",
+        family=model.family,
+        remembers=model.remembers,
+        sensors=tuple(
+            _sensor(model, name, *((known[name].settled, known[name].bound) if name in known else (None, None)))
+            for name in order
+            if name in model.sensors
+        ),
+        zero=_zero(model),
+        word=found.word if found else "unjudged",
+        reason=found.why if found else "never judged on cycles that it has not seen; it will not run",
+        rms=found.rms if found else None,
+        max_abs=found.max_abs if found else None,
+        none_rms=found.none_rms if found else None,
+        cycles=dict(found.cycles) if found else {},
+        band=model.band.tell(model.unit) if model.band else "",
+        outside=_outside(model),
+        covered=_covered(model),
+        pairs=(len(several), sum(rms <= found.none_rms for rms in several) if found else 0),
+    )
+
+
+def explain_all(models: Sequence[ErrorModel]) -> Explanations:
+    """Return what the models of several targets are.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+
+    Returns
+    -------
+    Explanations
+    """
+    return Explanations(tuple(map(explain, models)))
+
+
+def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
+    """Say why a spare sensor beside a temperature is recommended; the empty string if none is."""
+    if seen is None:
+        return "nothing predicts it"
+    if not model.may_lose([name]):
+        return "without it the correction is held, then fades"
+    if model.widening([name]) > DEAR:
+        return f"what stands in for it leaves {model.widening([name]):.1f} times the error"
+    return f"its slow drift is found only from {seen.off:.1f} degC on" if seen.off > FAR else ""
+
+
+def _sensor(model: ErrorModel, name: str, settled: float | None, bound: float | None) -> SensorExplanation:
+    own = next(i for i in model.inputs if i.name == name)
+    watch, found = model.watch, model.honest_error
+    seen = watch.sensors[watch.names.index(name)] if watch is not None and name in watch.names else None
+    return SensorExplanation(
+        name=name,
+        quantity=own.quantity,
+        unit=own.unit,
+        low=own.low,
+        high=own.high,
+        settled=settled,
+        bound=bound,
+        watched=seen is not None,
+        jump=seen.jump if seen else None,
+        off=seen.off if seen else None,
+        moved=seen.moved if seen else None,
+        pace=watch.pace if watch and seen else None,
+        still=seen.still if seen and seen.still < GAP else None,
+        unseen=seen.unseen if seen else None,
+        undetected=abs(settled) * seen.off if seen and settled is not None else None,
+        lost=found.lost.get(name) if found else None,
+        runs_on=seen is not None and model.may_lose([name]),
+        spare=_spare(model, name, seen) if own.quantity == "temperature" else "",
+    )
+
+
+def _zero(model: ErrorModel) -> str:
+    own = [i for i in model.inputs if i.rezero]
+    if not own:
+        return "nothing: its inputs are absolute"
+    zeroing = model.zeroing
+    if not zeroing.at_rest:
+        return "the first reading after a start"
+    what = "temperatures" if all(i.quantity == "temperature" for i in own) else ", ".join(i.name for i in own)
+    turning = f" ({_span(zeroing.otherwise)} if it turns)" if zeroing.speed else ""
+    rest = " while the spindle stands" if zeroing.speed else ""
+    return f"{what} from their mean over the first {_span(zeroing.at_rest)} after a start{rest}{turning}"
+
+
+def _outside(model: ErrorModel) -> str:
+    support = model.support
+    kept = f"inputs are clipped to their trained range, widened by {100 * support.margin:.0f} %"
+    if support.policy == "clip":
+        return kept
+    more = {"hold": "the last answer from inside is held", "fade": "the answer fades to zero"}[support.policy]
+    together = ", also where the inputs together are unlike the training" if model.joint else ""
+    return f"{kept}, and {more}{together}"
+
+
+def _covered(model: ErrorModel) -> str:
+    v = model.validity
+    if v is None:
+        return ""
+    parts = [f"{v.hours:.1f} h, {v.units} cycles or tests, {v.independent} of them not alike"]
+    if v.speeds:
+        parts.append(f"{len(v.speeds)} spindle speeds of {v.speeds[0]:.0f} to {v.speeds[-1]:.0f} 1/min")
+    if v.ambient:
+        parts.append(f"{v.ambient_channel} {v.ambient[0]:.1f} to {v.ambient[1]:.1f} degC")
+    if v.start:
+        parts.append(f"started at {v.start[0]:.1f} to {v.start[1]:.1f} degC")
+    return "; ".join(parts)
+
+
+def _lines(e: Explanation) -> list[str]:
+    heat = [s for s in e.sensors if s.quantity == "temperature"]
+    other = [s.name for s in e.sensors if s.quantity != "temperature"]
+    past = "these and their past" if e.remembers else "these alone, without a memory"
+    what = [f"{len(heat)} temperature{'s' if len(heat) > 1 else ''}"] if heat else []
+    lines = [
+        f"{e.target}: {e.method or e.family} predicts it [{e.unit}] from {' and '.join([*what, *other]) or 'nothing'}: "
+        f"{past}.",
+    ]
+    if any(s.bound is not None for s in e.sensors):
+        each = ", ".join(f"{s.name} {s.bound:.1f}" for s in e.sensors if s.bound is not None)
+        lines.append(f"Adds at most [{e.unit}]: {each}.")
+    lines.append(f"Zero: {e.zero}.")
+    if e.rms is not None and e.none_rms is not None:
+        lines.append(
+            f"Honest error: {e.rms:.2f} {e.unit} RMS, largest {e.max_abs:.2f}, on unseen cycles; without compensation "
+            f"{e.none_rms:.2f} RMS."
+        )
+    lines.append(f"Verdict: {e.word}, {e.reason}.")
+    lines.append(f"Band: {e.band or 'none'}.")
+    lines.append(f"Judged over: {e.covered or 'not known'}.")
+    lines.append(f"Outside its range: {e.outside}.")
+    watched = [s for s in e.sensors if s.watched]
+    if watched:
+        lines.append(
+            f"A temperature that is missing is found at once, one that jumped, drifted or is stuck {_span(LASTING)} "
+            "after it is beyond its limit; its prediction from the others and the speed stands in:"
+        )
+    else:
+        lines.append("No watch: a reading with a value missing is turned away; nothing finds one that is wrong:")
+    lines += [f"  {_sensor_line(s, e.unit)}" for s in e.sensors]
+    if e.pairs[0]:
+        lines.append(f"Two lost at once: judged for {e.pairs[0]} pairs, {e.pairs[1]} of which it may lose.")
+    return lines
+
+
+def _sensor_line(s: SensorExplanation, unit: str) -> str:
+    if s.quantity != "temperature":
+        left = f" ({s.lost:.2f} {unit} if it read zero)" if s.lost is not None else ""
+        return f"{s.name}: not watched; without it the correction is held, then fades{left}"
+    lost = f"{s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
+    parts = []
+    if s.watched and s.off is not None and s.jump is not None and s.moved is not None and s.pace is not None:
+        shift = f" (a drift up to there shifts the answer by {s.undetected:.2f} {unit})" if s.undetected else ""
+        still = f" or for {_span(s.still)}" if s.still is not None else ""
+        parts.append(
+            f"jump over {s.jump:.1f} degC in {_span(s.pace)}; off by {s.off:.1f} degC{shift}; stuck while its "
+            f"prediction moves {s.moved:.1f} degC{still}"
+        )
+    parts.append(lost if s.runs_on else f"{lost}: held, then fades")
+    return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
+
+
+def _span(seconds: float) -> str:
+    """Return a time in words."""
+    if seconds < 60.0 or not math.isfinite(seconds):
+        return f"{seconds:g} s"
+    return f"{seconds / 60:g} min" if seconds < 7200.0 else f"{seconds / 3600:g} h"

@@ -1,0 +1,99 @@
+"""How models of a file did on recordings, as one offline page.
+
+A section of it is a function that makes one of what was judged, and a line in `SECTIONS`.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from thermocomp.assessment import coverage
+from thermocomp.assessment.diagnostics import Collinearity
+from thermocomp.assessment.results import Assessment, Comparison
+from thermocomp.assessment.study import Judged
+from thermocomp.core.draft import write_text
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.splits import Judging
+from thermocomp.report import faults, figures, probings
+from thermocomp.report.html import draw_runs, page
+from thermocomp.report.layout import laid_out
+from thermocomp.report.sections import Section
+from thermocomp.report.summary import summarise
+
+
+def render(judged: Judged, recordings: Sequence[Recording]) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    judged : Judged
+    recordings : sequence of Recording
+        On which the models were judged, in their order.
+
+    Returns
+    -------
+    str
+    """
+    nothing = Collinearity((), math.nan, ())
+    seen = Comparison(Judging("all cycles", ()), judged.assessments, nothing, starts=judged.starts)
+    overall = judged.overall()
+    content = summarise(seen, recordings)
+    sections = [section for make in SECTIONS if (section := make(judged, recordings)) is not None]
+    return page(
+        "assessed.html",
+        **content
+        | {
+            "verdict": "; ".join(map(_verdict, overall)) + ".",
+            "good": all(a.accepted for a in overall),
+            "predictions": draw_runs(seen, recordings),
+            "cautions": [*_fitted_badly(judged), *content["cautions"], *(c for s in sections for c in s.cautions)],
+            "sections": sections,
+            "measured": [figures.measured(r) for r in recordings],
+        },
+    )
+
+
+def write(judged: Judged, recordings: Sequence[Recording], path: Path, *, overwrite: bool = False) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    judged, recordings
+        See `render`.
+    path, overwrite
+        See `thermocomp.core.draft.drafts`.
+    """
+    write_text(render(judged, recordings), path, overwrite=overwrite)
+
+
+def _verdict(a: Assessment) -> str:
+    if a.failure:
+        return f"{a.target}: {a.reason}"
+    return f"{a.target}: {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um"
+
+
+def _fitted_badly(judged: Judged) -> Iterator[str]:
+    """Yield what was found when models were fitted, if that was not good."""
+    for m in judged.models:
+        if m.honest_error is None:
+            yield f"{m.target}: never judged on cycles it had not seen when it was fitted; it does not run."
+        elif not m.accepted:
+            yield f"{m.target}: {m.honest_error.word} when it was fitted: {m.honest_error.why}."
+
+
+def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
+    fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
+    known = {name: v for name, v in fitted.items() if v is not None}
+    if not known:
+        return None
+    table = coverage.table(known)
+    return Section(table.title, [laid_out(replace(table, title=""))])
+
+
+#: of the page, in their order: each makes one of what was judged, or none where it has nothing to say
+SECTIONS: tuple[Callable[[Judged, Sequence[Recording]], Section | None], ...] = (
+    faults.section,
+    probings.section,
+    _covered,
+)

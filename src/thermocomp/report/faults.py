@@ -1,0 +1,230 @@
+"""Which sensors fell out in recordings, what stood in, and what it cost: figures, tables and their section."""
+
+import math
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from thermocomp.assessment.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
+from thermocomp.assessment.study import Judged
+from thermocomp.core.correction import Limits
+from thermocomp.core.shown import shorten
+from thermocomp.recording.recording import Recording
+from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, svg
+from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE, FloatArray
+from thermocomp.report.layout import Column, Layout
+from thermocomp.report.sections import Section, Shown
+
+#: how a failure is drawn
+TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00"}
+#: sensors of a recording whose stand-in is drawn, and failures in a table
+MOST, ROWS = 6, 40
+#: beyond what stands in, a reading that is further off is not drawn [degC]
+AROUND = 5.0
+
+TITLE = "Sensors"
+
+
+def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
+    """Return what the page says of sensors that failed.
+
+    Parameters
+    ----------
+    judged : Judged
+    recordings : sequence of Recording
+
+    Returns
+    -------
+    Section
+    """
+    logs = find_faults(judged, recordings)
+    if not logs:
+        known = any(m.watch is not None for m in judged.models)
+        why = "the recordings have not got what it needs" if known else "the model file holds none; fit it anew"
+        return Section(TITLE, [f"No watch over the temperatures was asked: {why}."])
+    if not any(log.faults for log in logs):
+        watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
+        return Section(TITLE, [f"None of the {len(watched)} temperatures failed: {', '.join(watched)}."])
+    parts: list[str | Layout | Shown] = [
+        "The recordings were gone through as the machine would have read them: nothing is known before it is found. "
+        "What check finds afterwards is left out of the verdict above, not here."
+    ]
+    for log in (log for log in logs if log.faults):
+        recording = recordings[log.recording]
+        parts.append(Shown(draw_timeline(log, recording), _timeline_words(log, logs)))
+        parts.append(Shown(draw_stand_ins(log), _stand_in_words(log)))
+        parts.append(_fault_table(log, recording))
+    cautions = []
+    for model, a in zip(judged.models, judged.overall(), strict=True):
+        if costs := find_costs(model, a, logs):
+            parts.append(_cost_table(f"{a.target}: what it cost", model.unit, costs))
+        cautions += [
+            f"{a.target}: with {', '.join(c.failed)} failed its correction is held, then fades at the machine: "
+            f"{c.rms:.2f} {model.unit} RMS in {c.hours:.1f} h (see {TITLE})."
+            for c in costs
+            if not c.runs_on
+        ]
+    if cautions:
+        limits = judged.overall()[0].limits or Limits()
+        parts.append(
+            "Held, then fades: without these sensors the model was never judged, or does harm. The correction stays "
+            f"for {limits.hold / 60:g} min, then goes to zero with a time constant of {limits.fade / 3600:g} h: that "
+            "is what is judged here and above."
+        )
+    return Section(TITLE, parts, cautions)
+
+
+def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
+    """Show which sensor was not believed when, and why; above it the spindle speed.
+
+    Parameters
+    ----------
+    log : FaultLog
+    recording : Recording
+        Of it.
+
+    Returns
+    -------
+    Drawn
+    """
+    names, hours = log.watch.names, log.time / 3600
+    speed = recording.speed
+    with drawing("timeline" + log.name):
+        height = 0.26 * len(names)
+        figure = Figure(figsize=(9.6, 1.3 + height + (0.7 if speed else 0.0)), layout="constrained")
+        ratios = [0.7, height] if speed else [height]
+        axes: list[Axes] = list(figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0])
+        if speed is not None:
+            rows = slice(None, None, max(1, len(hours) // POINTS))
+            turning = recording.table[speed.name].to_numpy()
+            axes[0].plot(hours[rows], turning[rows], color=MEASURED, drawstyle="steps-post")
+            axes[0].set_ylabel("1/min")
+        ax = axes[-1]
+        ax.grid(visible=False, axis="y")
+        ax.set_axisbelow(True)
+        for k in range(len(names)):
+            ax.plot([hours[0], hours[-1]], [k, k], color="#c8c8c8", lw=1.0, zorder=1)
+        room = float(hours[-1] - hours[0]) / LETTERS
+        free: dict[str, float] = {}
+        for f in log.faults:
+            k, begin, end = names.index(f.sensor), f.begin / 3600, f.end / 3600
+            ax.broken_barh([(begin, end - begin)], (k - 0.31, 0.62), color=TINTS[f.word], lw=0.5, label=f.word)
+            words = f"{f.word} {begin:.1f} h"
+            needed = room * (len(words) + 1)
+            late = begin + needed > hours[-1]
+            start = begin - needed if late else begin
+            if start >= free.get(f.sensor, -math.inf):  # what would run into the words before it is left out
+                ax.annotate(
+                    words, (begin, k), (-3 if late else 3, 0), textcoords="offset points", fontsize=7, zorder=3,
+                    ha="right" if late else "left", va="center",
+                )  # fmt: skip
+                free[f.sensor] = max(start + needed, begin)
+        name_ticks(ax.yaxis, names, LONGEST, fontsize=7)
+        ax.set_ylim(len(names) - 0.4, -0.6)
+        ax.set_xlim(float(hours[0]), float(hours[-1]))
+        ax.set_xlabel("time [h]")
+        add_legend(figure, loc="outside upper left", ncols=len(TINTS))
+        return svg(figure)
+
+
+def draw_stand_ins(log: FaultLog) -> Drawn:
+    """Show what sensors that failed read, and the temperature that stood in.
+
+    Parameters
+    ----------
+    log : FaultLog
+
+    Returns
+    -------
+    Drawn
+    """
+    shown = log.failed[:MOST]
+    columns = min(len(shown), 3)
+    rows = -(-len(shown) // columns)
+    step = slice(None, None, max(1, len(log.time) // (POINTS // columns)))
+    hours = log.time[step] / 3600
+    with drawing("stand-ins" + log.name):
+        figure = Figure(figsize=(9.6, 0.5 + 2.3 * rows), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False)
+        for ax in panels.flat[len(shown) :]:
+            ax.set_visible(False)
+        for ax, name in zip(panels.flat, shown, strict=False):
+            k = log.watch.names.index(name)
+            for f in (f for f in log.faults if f.sensor == name):
+                ax.axvspan(f.begin / 3600, f.end / 3600, color=SHADE, lw=0, zorder=0)
+            ax.plot(hours, log.read[step, k], color=MEASURED, lw=1.4, label="reading")
+            ax.plot(hours, log.stood_in[step, k], color=PREDICTED, ls="--", lw=1.6, label="what stood in")
+            ax.set_title(shorten(name, LONGEST), fontsize=8)
+            ax.set_ylim(*_around(log.read[:, k], log.stood_in[:, k]))
+            ax.set_xlim(float(log.time[0]) / 3600, float(log.time[-1]) / 3600)
+            ax.set_xlabel("time [h]")
+        for ax in panels[:, 0]:
+            ax.set_ylabel("degC")
+        add_legend(figure, loc="outside upper left", ncols=2)
+        return svg(figure)
+
+
+def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
+    """Return a range that holds what stood in and what was believed, and readings that are not far from these."""
+    sure = np.where(np.isfinite(stood_in), stood_in, read)
+    low, high = float(np.nanmin(sure)), float(np.nanmax(sure))
+    far = AROUND + (high - low)
+    near = read[(read >= low - far) & (read <= high + far)]  # nan is not
+    low, high = min(low, float(near.min(initial=low))), max(high, float(near.max(initial=high)))
+    room = 0.05 * max(high - low, 0.5)
+    return low - room, high + room
+
+
+def _timeline_words(log: FaultLog, logs: Sequence[FaultLog]) -> str:
+    good = len(log.watch.names) - len(log.failed)
+    others = [other.name for other in logs if not other.faults]
+    more = f" In {', '.join(others)} none did." if others else ""
+    return (
+        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperatures failed, {good} did not; coloured where "
+        f"one was not believed, from the instant on at which that was found.{more}"
+    )
+
+
+def _stand_in_words(log: FaultLog) -> str:
+    more = f" Not drawn: {', '.join(log.failed[MOST:])}." if len(log.failed) > MOST else ""
+    return (
+        "What stood in begins where the sensor was, and moves over to its prediction from the others and the speed "
+        f"with a time constant of an hour.{more}"
+    )
+
+
+def _fault_table(log: FaultLog, recording: Recording) -> Layout:
+    columns = (
+        Column("sensor", lambda f: f.sensor),
+        Column("it was", lambda f: f.word),
+        Column("found", lambda f: _when(f.begin, recording), ">"),
+        Column("until", lambda f: _when(f.end, recording) if f.returned else "the end", ">"),
+        Column("reading minus what stood in, mean", lambda f: f.beside, "um", "degC"),
+    )
+    more = len(log.faults) - ROWS
+    note = f"{more} more are not listed." if more > 0 else ""
+    rows: Sequence[Fault] = log.faults[:ROWS]
+    return Layout(columns, rows, note=note)
+
+
+def _cost_table(title: str, unit: str, costs: Sequence[Cost]) -> Layout:
+    columns = (
+        Column("sensors that had failed", lambda c: ", ".join(c.failed) or "none"),
+        Column("judged", lambda c: c.hours, ".1f", "h"),
+        Column("RMS", lambda c: c.rms, "um", unit),
+        Column("without compensation", lambda c: c.none_rms, "um", unit),
+        Column("honest error with these lost", lambda c: c.honest, "um", unit),
+        Column("at the machine", lambda c: "runs on" if c.runs_on else "held, then fades"),
+    )
+    return Layout(columns, costs, title=title)
+
+
+def _when(seconds: float, recording: Recording) -> str:
+    """Return an instant, with the clock of the wall where that is known."""
+    if not recording.start:
+        return f"{seconds / 3600:.2f} h"
+    clock = datetime.fromisoformat(recording.start) + timedelta(seconds=seconds - float(recording.time[0]))
+    return f"{seconds / 3600:.2f} h ({clock:%Y-%m-%d %H:%M})"

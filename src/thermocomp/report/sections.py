@@ -1,0 +1,22 @@
+"""A section of a page: paragraphs, tables and figures below a heading, in any order."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from thermocomp.report.drawing import Drawn
+from thermocomp.report.layout import Layout
+
+
+class Shown(NamedTuple):
+    """A figure, and what it shows."""
+
+    figure: Drawn
+    caption: str
+
+
+class Section(NamedTuple):
+    """What stands below a heading: a text is a paragraph."""
+
+    title: str
+    parts: Sequence[str | Layout | Shown]
+    cautions: Sequence[str] = ()  #: what the verdict at the top of the page has to be read with

@@ -1,0 +1,172 @@
+"""Which sensors fell out in a recording, when, what stood in and what it cost: as the compensator would have had it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from watchedmachine import LOST, failing, watched_model
+
+from thermocomp.assessment import study
+from thermocomp.assessment.faultlog import find_costs, find_faults
+from thermocomp.assessment.metrics import rms
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.reading import Reading
+from thermocomp.recording.cycles import find_cycles
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.starts import Start
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.watch import GOOD
+
+
+@pytest.fixture(scope="module")
+def model() -> ErrorModel:
+    return watched_model()
+
+
+def live(model: ErrorModel, recording: Recording) -> tuple[list[dict[str, str]], np.ndarray, list[str]]:
+    """Return what a compensator says failed, minus its correction, and why it held, row by row."""
+    compensator = Compensator.of([model])
+    state = compensator.start()
+    failed, said, held = list[dict[str, str]](), list[float](), list[str]()
+    for time, row in zip(recording.time.tolist(), recording.table.to_dict("records"), strict=True):
+        state, told = compensator.step(state, Reading(time, {str(k): v for k, v in row.items()}), time)
+        failed.append(told.failed)
+        said.append(-told.corrections[model.target].offset)
+        held.append(told.held.get(model.target, ""))
+    return failed, np.array(said), held
+
+
+@pytest.mark.parametrize("cuts", [{"t1_C": (4.0, 4.0)}, {"t2_C": (5.0, None), "t1_C": (8.0, 5.0)}, {}])
+def test_it_is_what_the_compensator_says_live(model: ErrorModel, cuts: dict[str, tuple[float, float | None]]) -> None:
+    recording = failing(**cuts)
+    judged = study.assess([model], [recording], starts=Start())
+    (log,) = find_faults(judged, [recording])
+    failed, said, _ = live(model, recording)
+    assert set(log.failed) == set(cuts)
+    for row, told in enumerate(failed):
+        assert {n for n, f in zip(log.watch.names, log.fault[row], strict=True) if f != GOOD} == set(told)
+    for f in log.faults:
+        began = next(k for k, told in enumerate(failed) if told.get(f.sensor) == f.word)
+        assert f.begin == recording.time[began]
+        assert (f.end, f.returned) == (recording.time[-1], False)
+        hour, step = cuts[f.sensor]
+        assert hour * 3600 <= f.begin <= hour * 3600 + (420.0 if step else 0.0)
+        assert f.beside == pytest.approx(step, abs=0.7) if step else math.isnan(f.beside)
+    (whole,) = judged.overall()
+    costs = find_costs(model, whole, [log])
+    assert costs[0].failed == ()
+    assert sum(c.hours for c in costs) == pytest.approx(recording.time[-1] / 3600)
+    left = np.sqrt(sum(c.rms**2 * c.hours for c in costs) / sum(c.hours for c in costs))
+    assert left == pytest.approx(rms(recording.table["z_um"].to_numpy(), said), rel=0.02)
+
+
+def test_what_stands_in_is_given_where_the_sensor_is_not_believed(model: ErrorModel) -> None:
+    recording = failing(t1_C=(4.0, 4.0))
+    (log,) = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    place = log.watch.names.index("t1_C")
+    bad = log.fault[:, place] != GOOD
+    truth = failing().table["t1_C"].to_numpy()
+    assert np.isfinite(log.stood_in[bad, place]).all()
+    assert not np.isfinite(log.stood_in[~bad, place]).any()
+    assert np.abs(log.stood_in[bad, place] - truth[bad]).max() < 1.5  # 4 degC off is what was recorded
+    assert not np.isfinite(np.delete(log.stood_in, place, axis=1)).any()
+    assert (log.read[:, place] == recording.table["t1_C"]).all()
+
+
+def test_a_correction_that_does_harm_is_held_then_fades(model: ErrorModel) -> None:
+    recording = failing(t3_C=(4.0, None))
+    judged = study.assess([model], [recording], starts=Start())
+    before, after = find_costs(model, judged.overall()[0], find_faults(judged, [recording]))
+    _, said, held = live(model, recording)
+    later = np.array([bool(why) for why in held])
+    measured = recording.table["z_um"].to_numpy()
+    assert (before.failed, before.runs_on, before.honest) == ((), True, 1.25)
+    assert (after.failed, after.runs_on, after.honest) == (("t3_C",), False, 9.0)
+    assert after.rms == pytest.approx(rms(measured[later], said[later]), rel=0.02)
+    (whole,) = judged.overall()
+    assert whole.predicted == pytest.approx(said, abs=0.1)
+    assert whole.alone is not None
+    assert after.rms > 2 * rms(measured[later], whole.alone[later])  # it would have gone on with what stands in
+    assert after.none_rms == pytest.approx(rms(measured[later], np.zeros(later.sum())))
+
+
+def test_several_lost_are_told_apart(model: ErrorModel) -> None:
+    recording = failing(t2_C=(3.0, None), t1_C=(6.0, None))
+    judged = study.assess([model], [recording], starts=Start())
+    found = find_costs(model, judged.overall()[0], find_faults(judged, [recording]))
+    assert [(c.failed, c.honest) for c in found] == [
+        ((), 1.25), (("t2_C",), 2.5), (("t1_C", "t2_C"), LOST["t1_C, t2_C"])
+    ]  # fmt: skip
+    assert [c.hours for c in found] == pytest.approx([3 - 1 / 60, 3.0, 800 / 60 - 6], abs=0.02)
+
+
+def test_one_that_comes_back_is_believed_again(model: ErrorModel) -> None:
+    recording = failing()
+    gone = (recording.time >= 4 * 3600) & (recording.time < 5 * 3600)
+    table = recording.table.assign(t1_C=recording.table["t1_C"].where(~gone))
+    recording = replace(recording, table=table)
+    (log,) = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    (fault,) = log.faults
+    assert (fault.word, fault.begin, fault.returned) == ("missing", 4 * 3600, True)
+    assert 5 * 3600 + 540 <= fault.end <= 5 * 3600 + 720
+
+
+def test_a_sensor_that_the_recording_lacks_is_missing_from_the_start(model: ErrorModel) -> None:
+    day = failing()
+    lacking = replace(
+        day, table=day.table.drop(columns="t2_C"), channels=tuple(c for c in day.channels if c.name != "t2_C")
+    )
+    other = replace(model, watch=None)  # judged as if t2_C were not one of its own: assess needs those
+    judged = study.assess([other], [day], starts=Start())
+    (log,) = find_faults(replace(judged, models=(model,)), [lacking])
+    (fault,) = log.faults
+    assert (fault.sensor, fault.word) == ("t2_C", "missing")
+    assert fault.begin <= 600.0
+    no_speed = replace(
+        day,
+        table=day.table.drop(columns="spindle_rpm"),
+        channels=tuple(c for c in day.channels if c.name != "spindle_rpm"),
+    )
+    assert find_faults(replace(judged, models=(model,)), [no_speed]) == ()
+
+
+def test_without_a_watch_there_is_no_log(model: ErrorModel) -> None:
+    recording = failing(t1_C=(4.0, 4.0))
+    bare = replace(model, watch=None)
+    judged = study.assess([bare], [recording], starts=Start())
+    assert find_faults(judged, [recording]) == ()
+    assert find_costs(bare, judged.overall()[0], ()) == ()
+
+
+def test_models_of_two_files_have_a_watch_each(model: ErrorModel) -> None:
+    assert model.watch is not None
+    deaf = replace(model.watch, sensors=tuple(replace(s, off=80.0, jump=80.0) for s in model.watch.sensors))
+    other = replace(model, watch=deaf)
+    recording = failing(t1_C=(4.0, 4.0))
+    judged = study.assess([model, other], [recording], starts=Start())
+    logs = find_faults(judged, [recording])
+    assert [log.failed for log in logs] == [("t1_C",), ()]
+    first, second = judged.overall()
+    assert [c.failed for c in find_costs(model, first, logs)] == [(), ("t1_C",)]
+    assert [c.failed for c in find_costs(other, second, logs)] == [()]
+
+
+def test_rows_of_an_earlier_file_are_gone_through_and_not_counted(model: ErrorModel) -> None:
+    whole = failing(t1_C=(6.0, 4.0), t2_C=(9.0, None))
+    parts = []
+    for rows in (slice(0, 420), slice(420, None)):
+        time = whole.time[rows] - whole.time[rows][0]
+        table = whole.table.iloc[rows].reset_index(drop=True)
+        cycles = find_cycles(time, table["spindle_rpm"].to_numpy())
+        parts.append(replace(whole, name=f"from {rows.start}", time=time, table=table, cycles=cycles))
+    first, second = parts
+    judged = study.assess([model], [second], starts=Start("continued", earlier=(first,)))
+    (log,) = find_faults(judged, [second])
+    assert [(f.sensor, f.word, f.begin) for f in log.faults] == [
+        ("t1_C", "stepped", 0.0),  # found before, in the first file
+        ("t2_C", "missing", 2 * 3600.0),
+    ]
+    assert len(log.time) == len(second)
+    costs = find_costs(model, judged.overall()[0], [log])
+    assert [c.failed for c in costs] == [("t1_C",), ("t1_C", "t2_C")]
