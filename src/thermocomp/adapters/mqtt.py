@@ -22,9 +22,9 @@ class Broker:
 
     Parameters
     ----------
+    topic : str
     host : str
     port : int
-    topic : str
     """
 
     topic: str

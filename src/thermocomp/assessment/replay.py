@@ -138,6 +138,19 @@ def believe(
     """Return samples as a model's watch lets them through, and where its correction is held, in the tests of `rows`.
 
     They are the same, and nothing is held, without a watch or its speeds. Rows without a speed are passed on unchanged.
+
+    Parameters
+    ----------
+    model : ErrorModel
+    samples : Samples
+    rows : ndarray of bool of shape (n_rows,)
+    watched : Samples, optional
+        See `replay_compensated`.
+
+    Returns
+    -------
+    samples : Samples
+    undriven : ndarray of bool of shape (n_rows,)
     """
     undriven, watch, seen = np.zeros(len(samples), dtype=np.bool_), model.watch, watched or samples
     if watch is None or not can_look(watch, seen):

@@ -121,6 +121,14 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
     """Write a state over the one before: a kill leaves one of them, whole.
 
+    Parameters
+    ----------
+    state, compensator
+        See `dumps`.
+    path : str or Path
+    written : datetime
+        Now, with its time zone.
+
     Raises
     ------
     InputError
@@ -131,6 +139,12 @@ def write(state: CompensatorState, compensator: Compensator, path: str | Path, w
 
 def read(path: str | Path, compensator: Compensator) -> Saved:
     """Read a state file.
+
+    Parameters
+    ----------
+    path : str or Path
+    compensator : Compensator
+        Whose state it must be.
 
     Raises
     ------

@@ -58,7 +58,16 @@ def decode(kind: Any, value: Any, place: str) -> Any:
 
 
 def want(right: bool, value: Any, place: str, what: str) -> None:
-    """Raise `ValueError` unless something is right."""
+    """Raise `ValueError` unless something is right.
+
+    Parameters
+    ----------
+    right : bool
+    value : Any
+        What was found; None is not repeated.
+    place, what : str
+        Where, and what is wanted.
+    """
     if not right:
         raise ValueError(f"{place}: want {what}" + ("" if value is None else f", found {value!r:.40}"))
 

@@ -22,7 +22,17 @@ def _check_broker(topic: str, port: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class MqttIn:
-    """Readings from an MQTT topic."""
+    """Readings from an MQTT topic.
+
+    Parameters
+    ----------
+    kind : {'mqtt'}
+    topic : str
+    host, port : str, int
+        Of the broker.
+    names : dict of str to str
+        Channel by the name in the message, for those that are called otherwise there.
+    """
 
     kind: Literal["mqtt"]
     topic: str
@@ -36,7 +46,16 @@ class MqttIn:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedIn:
-    """The virtual machine."""
+    """The virtual machine.
+
+    Parameters
+    ----------
+    kind : {'simulated'}
+    experiment : str
+        What it does: one that comes with the package, or a protocol (.toml).
+    seed : int
+        Of weather and noise.
+    """
 
     kind: Literal["simulated"]
     experiment: str = "demo"
@@ -45,7 +64,14 @@ class SimulatedIn:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayIn:
-    """A recording played back."""
+    """A recording played back.
+
+    Parameters
+    ----------
+    kind : {'replay'}
+    file : str
+        In thermocomp's own CSV.
+    """
 
     kind: Literal["replay"]
     file: str
@@ -53,7 +79,15 @@ class ReplayIn:
 
 @dataclass(frozen=True, kw_only=True)
 class MqttOut:
-    """Corrections to an MQTT topic."""
+    """Corrections to an MQTT topic.
+
+    Parameters
+    ----------
+    kind : {'mqtt'}
+    topic : str
+    host, port : str, int
+        Of the broker.
+    """
 
     kind: Literal["mqtt"]
     topic: str
@@ -66,7 +100,14 @@ class MqttOut:
 
 @dataclass(frozen=True, kw_only=True)
 class FileOut:
-    """Corrections to a file."""
+    """Corrections to a file.
+
+    Parameters
+    ----------
+    kind : {'file'}
+    file : str
+        Replaced as a whole each time.
+    """
 
     kind: Literal["file"]
     file: str
