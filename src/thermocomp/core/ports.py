@@ -40,6 +40,15 @@ class Source(Protocol):
 
 
 @runtime_checkable
+class Confirming(Protocol):
+    """A sink that knows what is in force at the controller."""
+
+    async def confirmed(self) -> Mapping[str, Correction] | None:
+        """Return the correction in force per axis or target; None if that is not known."""
+        ...
+
+
+@runtime_checkable
 class Sink(Protocol):
     """Where corrections go."""
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Sink, Source
+from thermocomp.core.ports import Confirming, Sink, Source
 from thermocomp.core.reading import Reading
 from thermocomp.files import statefile
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.service.clock import Clock
-from thermocomp.service.links import Outlet, read_from, within
+from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
 
 #: events that are kept to be shown
 EVENTS = 200
@@ -83,6 +83,8 @@ class Service:
 
     async def run(self) -> None:
         """Run until it is cancelled; then save the state and leave the corrections as they are."""
+        for sink in self.sinks:
+            await self._adopt(sink)
         try:
             async with asyncio.TaskGroup() as group:
                 for source in self.sources:
@@ -159,6 +161,23 @@ class Service:
         how = "goes on" if state.references else "begins anew, with the corrections that are in force"
         self._say("service", f"start after {age:.0f} s: {how}")
         return state
+
+    async def _adopt(self, sink: Sink) -> None:
+        """Begin at what the controller says is in force: what was saved may be a second older."""
+        if not isinstance(sink, Confirming):
+            return
+        found: Mapping[str, Correction] | None = None
+        with contextlib.suppress(ThermocompError, OSError, TimeoutError):
+            async with asyncio.timeout(TIMEOUT):
+                await sink.connect(TIMEOUT)
+                found = await sink.confirmed()
+        allowed = {t: c for t, c in (found or {}).items() if t in self.state.corrections and self._allowed(t, c)}
+        if allowed:
+            self.state = self.state._replace(corrections=self.state.corrections | allowed)
+
+    def _allowed(self, target: str, correction: Correction) -> bool:
+        ends = self.compensator.lines[target].travel
+        return max(abs(correction.at(p)) for p in ends) <= self.compensator.limits.magnitude
 
     async def _watch(self) -> None:
         """Look after what no reading does: time goes by, the state is saved."""
