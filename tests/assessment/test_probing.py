@@ -84,6 +84,13 @@ def test_they_lower_the_error_of_another_day(day: Recording, fitted: tc.ErrorMod
     assert sum(int(a.probed.at.sum()) for a in cycles if a.probed) == int(two.probed.at.sum()) if two.probed else False
 
 
+def test_too_short_for_a_probing_it_is_as_without(day: Recording, fitted: tc.ErrorModel) -> None:
+    (found,) = tc.assess(fitted, day, probing="every 100 h").judged.overall()
+    assert found.probed is not None
+    assert not found.probed.at.any()
+    assert (found.predicted == found.probed.without).all()
+
+
 def test_probings_alone_are_held_until_the_next() -> None:
     at = np.array([False, True, False, True, False, False])
     probed = Probed(Probings(1.0), at, np.zeros(6), np.zeros(6))

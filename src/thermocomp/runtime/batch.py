@@ -248,7 +248,7 @@ def _adapted(
     learned = adaptation.begin(size, answers.directions.shape[1])
     shift, narrower, refused = np.zeros(len(time)), np.ones(len(time)), list[str]()
     rows = np.flatnonzero(np.isfinite(probed)).tolist()
-    for row, following in zip(rows, [*rows[1:], len(time)], strict=True):
+    for row, following in zip(rows, [*rows, len(time)][1:], strict=True):
         error = float(probed[row] - answers.deviation[row])
         learned, why = adaptation.take(learned, answers.directions[row], float(time[row]), error, repeatability)
         refused += [why] if why else []
