@@ -19,7 +19,12 @@ FEW = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "sp
 
 @pytest.mark.parametrize(
     ("text", "every", "um"),
-    [("every 2 h", 7200.0, 0.5), ("every 30 min, 0.3 um", 1800.0, 0.3), ("every 1.5h", 5400.0, 0.5)],
+    [
+        ("every 2 h", 7200.0, 0.5),
+        ("every 30 min, 0.3 um", 1800.0, 0.3),
+        ("every 1.5h", 5400.0, 0.5),
+        ("every 2 hours", 7200.0, 0.5),
+    ],
 )
 def test_written(text: str, every: float, um: float) -> None:
     assert Probings.parse(text) == Probings(every, um)

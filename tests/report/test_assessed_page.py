@@ -21,6 +21,7 @@ from thermocomp.recording.starts import Start
 from thermocomp.report import assessed, faults
 from thermocomp.report.layout import in_um
 from thermocomp.report.sections import Section
+from thermocomp.runtime.watch import WORDS
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +91,10 @@ def test_the_timeline_is_coloured_where_a_sensor_is_not_believed(log: FaultLog, 
     assert [t.get_text() for t in ax.get_yticklabels()] == list(log.watch.names)
     speed = np.asarray(figure.axes[0].lines[0].get_ydata())
     assert speed == pytest.approx(recording.table["spindle_rpm"].to_numpy())
+
+
+def test_every_failure_has_a_colour() -> None:
+    assert set(faults.TINTS) == set(WORDS) - {"good"}
 
 
 def test_what_stood_in_is_drawn_beside_the_reading(log: FaultLog) -> None:

@@ -11,8 +11,8 @@ from thermocomp.core.exceptions import InputError
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-_WRITTEN = re.compile(r"every (?P<n>\d*\.?\d+) ?(?P<unit>h|min)(, ?(?P<um>\d*\.?\d+) ?um)?")
-_SECONDS = {"h": 3600.0, "min": 60.0}
+_WRITTEN = re.compile(r"every (?P<n>\d*\.?\d+) ?(?P<unit>h|hours?|min|minutes?)(, ?(?P<um>\d*\.?\d+) ?um)?")
+_SECONDS = {"h": 3600.0, "m": 60.0}
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,10 @@ class Probings:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.every < np.inf or not 0.0 <= self.repeatability < np.inf:
-            raise InputError(f"probings every {self.every} s, repeatability {self.repeatability} um: want finite times")
+            raise InputError(
+                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: want a time above 0 "
+                "and at least 0 um"
+            )
 
     @classmethod
     def parse(cls, text: str) -> "Probings":
@@ -57,10 +60,10 @@ class Probings:
         found = _WRITTEN.fullmatch(text.strip())
         if found is None:
             raise InputError(
-                f"probing {text!r}: write how often, and the probe's repeatability (standard deviation) if it is not "
-                f"{cls.repeatability:g} um, such as 'every 2 h' or 'every 30 min, 0.3 um'"
+                f"probing {text!r}: write how often in h or min, and the probe's repeatability (standard deviation) "
+                f"if it is not {cls.repeatability:g} um, such as 'every 2 h' or 'every 30 min, 0.3 um'"
             )
-        every = float(found["n"]) * _SECONDS[found["unit"]]
+        every = float(found["n"]) * _SECONDS[found["unit"][0]]
         return cls(every) if found["um"] is None else cls(every, float(found["um"]))
 
     def find_rows(self, time: FloatArray, usable: BoolArray) -> NDArray[np.intp]:

@@ -19,7 +19,7 @@ from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
 
 #: how a failure is drawn
-TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00"}
+TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00", "swapped": "#009E73"}
 #: sensors of a recording whose stand-in is drawn, and failures in a table
 MOST, ROWS = 6, 40
 #: beyond what stands in, a reading that is further off is not drawn [degC]
