@@ -135,11 +135,12 @@ def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recordi
     (whole,) = judged.overall()
     refused = replace(judged, assessments=(replace(whole, caveat="no honest test"),))
     assert '<p class="verdict">z_um: refused' in assessed.render(refused, [recording])
+    sound = failing()  # a correction that is held for want of sensors is not accepted
+    judged = study.assess([watched_model()], [sound], starts=Start())
+    (whole,) = judged.overall()
     fine = replace(whole, verdict=replace(whole.verdict, caps=()), robustness=None)
     assert fine.accepted
-    assert '<p class="verdict good">z_um: accepted' in assessed.render(
-        replace(judged, assessments=(fine,)), [recording]
-    )
+    assert '<p class="verdict good">z_um: accepted' in assessed.render(replace(judged, assessments=(fine,)), [sound])
 
 
 def test_what_was_bad_when_it_was_fitted_is_told_first(judged: Judged, recording: Recording) -> None:

@@ -4,7 +4,6 @@ import asyncio
 import csv
 import json
 import math
-import os
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from pathlib import Path
 from thermocomp.adapters.connection import Connection
 from thermocomp.adapters.messages import write_message
 from thermocomp.core.correction import Correction
+from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status
 from thermocomp.core.reading import Reading
@@ -140,13 +140,12 @@ class FileSink:
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
         """Replace the file, or raise `ThermocompError` with the reason."""
-        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}.part")
+        text = write_message(corrections, time.time()) + "\n"
         try:
-            draft.write_text(write_message(corrections, time.time()) + "\n", encoding="utf-8")
-            draft.replace(self.path)
-        except OSError as e:
+            await asyncio.to_thread(write_text, text, self.path, overwrite=True)
+        except (OSError, ThermocompError) as e:
             self._connection.to("failed", str(e))
-            raise ThermocompError(f"{self.path}: {e.strerror}") from e
+            raise ThermocompError(str(e)) from e
 
     async def confirmed(self) -> dict[str, Correction] | None:
         """Return what stands in the file; None if there is none yet."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.terminal import console, words
+from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def _demo(folder: Path) -> Path:
         fit(simulate("demo"), _TARGETS, inputs=_INPUTS, jobs=-1).save(model)
     if not config.exists():
         text = _CONFIG.format(speed=_SPEED)
-        config.write_text(text, encoding="utf-8")
+        write_text(text, config, overwrite=False)
     return config
 
 
