@@ -15,8 +15,8 @@ from thermocomp.core.reading import Reading
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
-from thermocomp.runtime.compensator import Compensator
 from thermocomp.report.faults import describe_faults
+from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.watch import GOOD
 
 
