@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Mapping
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.reading import Reading
+from thermocomp.core.reading import Measurement, Reading
 
 
 class Status(NamedTuple):
@@ -28,6 +28,27 @@ class Source(Protocol):
 
     def readings(self) -> AsyncIterator[Reading]:
         """Return readings as they come, oldest first, until the source ends or fails."""
+        ...
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        ...
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing."""
+        ...
+
+
+@runtime_checkable
+class Probe(Protocol):
+    """Where measurements of the tool point come from while the machine runs."""
+
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        ...
+
+    def measurements(self) -> AsyncIterator[Measurement]:
+        """Return measurements as they come, until the probe ends or fails."""
         ...
 
     def status(self) -> Status:

@@ -78,6 +78,49 @@ class ReplayIn:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MqttProbing:
+    """Measurements of the tool point from an MQTT topic.
+
+    Parameters
+    ----------
+    kind : {'mqtt'}
+    topic : str
+    host, port : str, int
+        Of the broker.
+    """
+
+    kind: Literal["mqtt"]
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+    def __post_init__(self) -> None:
+        _check_broker(self.topic, self.port)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedProbing:
+    """Probings of the virtual machine.
+
+    Parameters
+    ----------
+    kind : {'simulated'}
+    every : float
+        Time of the machine between two [s].
+    repeatability : float
+        Of the probe, standard deviation [um].
+    """
+
+    kind: Literal["simulated"]
+    every: float = 7200.0
+    repeatability: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.every > 0 or not self.repeatability >= 0:
+            raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
+
+
+@dataclass(frozen=True, kw_only=True)
 class MqttOut:
     """Corrections to an MQTT topic.
 
@@ -123,19 +166,25 @@ class Page:
         Where it is served; loopback unless it is stated otherwise.
     token_file : str
         File with the token that buttons want; without one the page only shows.
+    settled : float
+        A drift below this in ten minutes counts as settled [um].
     """
 
     host: str = "127.0.0.1"
     port: int = 8731
     token_file: str = ""
+    settled: float = 1.0
 
     def __post_init__(self) -> None:
+        if not self.settled > 0.0:
+            raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
         if not 0 <= self.port <= 65535:
             raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
 
 
 In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
 Out = Annotated[MqttOut | FileOut, Discriminator("kind")]
+Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +197,8 @@ class Config:
         Model files.
     sources, sinks : tuple
         Where readings come from, where corrections go.
+    probes : tuple
+        Where measurements of the tool point come from.
     state : str
         File that the state is kept in; without one every start is a cold one.
     limits : Limits
@@ -161,6 +212,7 @@ class Config:
     models: tuple[str, ...]
     sources: tuple[In, ...]
     sinks: tuple[Out, ...] = ()
+    probes: tuple[Probings, ...] = ()
     state: str = ""
     limits: Limits = Limits()
     shadow: bool = False
@@ -174,6 +226,9 @@ class Config:
             raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
         if not 0.0 < self.speed <= 10_000.0:
             raise SettingError(f"speed = {self.speed:g}: want more than 0, at most 10000")
+        machine = any(isinstance(s, SimulatedIn) for s in self.sources)
+        if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
+            raise SettingError('a probe of kind = "simulated" wants a source of kind = "simulated"')
         if self.speed != 1.0 and any(isinstance(s, MqttIn) for s in self.sources):
             raise SettingError(
                 f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1"

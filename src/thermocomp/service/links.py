@@ -2,12 +2,15 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from typing import TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Sink, Source
-from thermocomp.core.reading import Reading
+from thermocomp.core.ports import Probe, Sink, Source
+from thermocomp.core.reading import Measurement, Reading
+
+_Said = TypeVar("_Said", Reading, Measurement)
 
 #: a connection that takes longer, or a sink that does not answer for so long, has failed [s]
 TIMEOUT = 5.0
@@ -15,21 +18,25 @@ TIMEOUT = 5.0
 FIRST, LONGEST = 0.5, 30.0
 
 
-async def read_from(source: Source, take: Callable[[Reading], None]) -> None:
+async def read_from(
+    source: Source | Probe, said: Callable[[], AsyncIterator[_Said]], take: Callable[[_Said], None]
+) -> None:
     """Take what a source says for ever; one that is played to its end stays closed.
 
     Parameters
     ----------
-    source : Source
+    source : Source or Probe
+    said : callable
+        Its readings, or measurements.
     take : callable
-        Called with each reading.
+        Called with each of them.
     """
     wait = FIRST
     while True:
         try:
             await source.connect(TIMEOUT)
-            async for reading in source.readings():
-                take(reading)
+            async for one in said():
+                take(one)
                 wait = FIRST
             if source.status().state == "closed":
                 return

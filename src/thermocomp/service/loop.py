@@ -11,14 +11,15 @@ from pathlib import Path
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, Sink, Source
-from thermocomp.core.reading import Reading
+from thermocomp.core.ports import Confirming, Probe, Sink, Source
+from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
-from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
+from thermocomp.service.probe import KEPT, Checked, check, find_deviation
 
 #: events that are kept to be shown
 EVENTS = 200
@@ -56,6 +57,7 @@ class Service:
     clock : Clock
     state_path : Path or None
         Where the state is kept.
+    probes : sequence of Probe
     """
 
     compensator: Compensator
@@ -63,6 +65,7 @@ class Service:
     sinks: Sequence[Sink]
     clock: Clock = field(default_factory=Clock)
     state_path: Path | None = None
+    probes: Sequence[Probe] = ()
     state: CompensatorState = field(init=False)
     said: Compensated | None = field(default=None, init=False)
     events: deque[Event] = field(init=False)
@@ -71,9 +74,11 @@ class Service:
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
     listeners: set[Callable[[], None]] = field(default_factory=set, init=False)
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
+    checked: deque[Checked] = field(init=False)  #: what probings said
+    before: dict[str, Adaptation | None] = field(default_factory=dict, init=False)  #: the last one was taken
 
     def __post_init__(self) -> None:
-        self.events, self.curves = deque(maxlen=EVENTS), deque(maxlen=POINTS)
+        self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
         self.outlets = [Outlet(sink) for sink in self.sinks]
         self.state = self._begin()
         self._saved, self._dirty = -1e9, False
@@ -88,15 +93,18 @@ class Service:
         try:
             async with asyncio.TaskGroup() as group:
                 for source in self.sources:
-                    group.create_task(read_from(source, self.take))
+                    group.create_task(read_from(source, source.readings, self.take))
+                for probe in self.probes:
+                    group.create_task(read_from(probe, probe.measurements, self.measure))
                 for outlet in self.outlets:
                     group.create_task(outlet.run())
                 group.create_task(self._watch())
         finally:
             for outlet in self.outlets:
                 await outlet.flush()
-            for close in [*(s.close for s in self.sources), *(s.close for s in self.sinks)]:
-                await within(2.0, close())
+            links: list[Source | Probe | Sink] = [*self.sources, *self.probes, *self.sinks]
+            for link in links:
+                await within(2.0, link.close())
             self._save()
 
     def take(self, reading: Reading) -> None:
@@ -111,12 +119,13 @@ class Service:
         if len(self.latest) > 10_000:  # names that nobody knows, without end
             self.latest = {n: v for n, v in self.latest.items() if tick - v[1] <= most}
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
-        probings, self.probings = self.probings, {}
+        (probings, self.probings), learned = (self.probings, {}), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
         self._heard = tick
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
         self._tell(said, probings)
+        self._chart(said, probings, learned)
 
     def order(self, target: str, status: Status | None) -> None:
         """Take a target out, or let it run again; see `Compensator.order`."""
@@ -138,6 +147,29 @@ class Service:
     def probe(self, target: str, probing: Probing) -> None:
         """Use a probing with the next reading."""
         self.probings[target] = probing
+
+    def measure(self, found: Measurement) -> None:
+        """Take a measurement of the tool point as a probing, with the next reading."""
+        line = self.compensator.lines.get(found.target)
+        now, stamp = self.clock.now(), self.clock.of(found.time)
+        if line is None or now - stamp > self.compensator.limits.reading_age:
+            why = f"no target is named {found.target}" if line is None else f"it is {now - stamp:.0f} s old"
+            self._say("probing", f"{found.target} refused: {why}")
+            return
+        in_force = self.state.corrections[found.target] if found.left else None
+        deviation = find_deviation(found.measured, found.position, in_force)
+        self.probe(found.target, Probing(deviation, found.repeatability, found.position))
+
+    def roll_back(self, target: str) -> str:
+        """Forget the last probing of a target that was taken; return why not, or the empty string."""
+        if target not in self.before:
+            return "no probing was taken since the start, or it was taken back before"
+        learned, before = dict(self.state.learned), self.before.pop(target)
+        learned.pop(target, None)
+        self.state = self.state._replace(learned=learned if before is None else learned | {target: before})
+        self._say("probing", f"{target}: the last probing is taken back")
+        self._dirty = True
+        return ""
 
     # -- inside --------------------------------------------------------------------------------------------------------
 
@@ -214,6 +246,19 @@ class Service:
         self._dirty = True
         for listener in list(self.listeners):
             listener()
+
+    def _chart(self, said: Compensated, probings: Mapping[str, Probing], learned: Mapping[str, Adaptation]) -> None:
+        for target, probing in probings.items():
+            if target not in said.deviations:
+                continue
+            refused, after = said.refused.get(target, ""), self.state.learned.get(target)
+            found = check(self.clock.now(), target, probing, said.deviations[target], after, refused)
+            self.checked.append(found)
+            if not refused:
+                self.before[target] = learned.get(target)
+            if found.beyond:
+                limit = f"where {found.limit:.1f} um ask for action"
+                self._say("probing", f"{target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
 
     def _numbers(self, said: Compensated) -> dict[str, float]:
         heat = {i.name for m in self.compensator.models for i in m.inputs if i.quantity == "temperature"}
