@@ -261,6 +261,9 @@ def _checked(value: Any) -> Start:
     want(0.0 < start.confirm_within < math.inf, start.confirm_within, "confirm_within", "a positive number")
     for names in ([t.name for t in start.targets], [c.name for c in start.channels]):
         want(len(set(names)) == len(names) <= _MOST and all(names), None, "start", "names, each once, at most 10,000")
+    known = {c.name: (c.quantity, c.unit) for c in start.channels}
+    for t in start.targets:
+        want(known.get(t.name, t[1:3]) == t[1:3], None, t.name, f"a channel of {t.quantity} in {t.unit}, as the target")
     return start
 
 
