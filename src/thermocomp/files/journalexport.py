@@ -99,8 +99,10 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
     table = {c.name: columns[c.name] for c in listed}
     told: list[ExportedTarget] = []
     notes: list[str] = []
+    in_force = False
     for target in targets:
         residual, correction, deviation = _parted(target, found, reader.starts, columns.get(target.name), notes)
+        in_force |= bool(np.isfinite(correction).any())
         measured = np.isfinite(residual) | np.isfinite(deviation)
         told.append(ExportedTarget(target.name, int(measured.sum()), int(np.isfinite(deviation).sum())))
         named = zip(beside(target.name), ("residual", "correction"), (residual, correction), strict=True)
@@ -126,6 +128,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
         notes.append(f"{left_out:,} work offsets and tool lengths are not in it: workpiece and tool are new each time")
     if lost := reader.summary().lost:
         notes.append(f"{lost:,} rows were lost while the disk did not take them")
+    known = any(t.known for t in told) or (in_force and not any(t.measured for t in told))
     time = found.time - found.time[0]
     speed = next((table[c.name] for c in listed if c.quantity == "spindle_speed"), None)
     recording = Recording(
@@ -136,7 +139,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
         cycles=tuple(make_single_cycle(len(time)) if speed is None else find_cycles(time, speed)),
         start=_stamp(float(found.time[0])),
         notes=tuple(notes),
-        compensation="known" if any(t.known for t in told) else "unknown",
+        compensation="known" if known else "unknown",
     )
     return Exported(recording, tuple(told), tuple(notes))
 
