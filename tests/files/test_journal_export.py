@@ -29,8 +29,8 @@ HEAT = Channel("t1_C", "temperature", "degC")
 
 def start_of(test: Recording, targets: Sequence[str], *, measured: bool = True, **how: Any) -> Start:
     kept = [c for c in test.channels if c.quantity != "displacement" or (measured and c.name in targets)]
-    how = {"own_compensation": "off", "confirm_within": 100.0} | how
-    return Start(BEGIN, tuple(Target(t) for t in targets), tuple(kept), **how)
+    start = Start(BEGIN, tuple(Target(t) for t in targets), tuple(kept), "off", 100.0)
+    return start._replace(**how)
 
 
 def fake_correction(time: FloatArray, k: int = 0) -> FloatArray:
@@ -125,7 +125,7 @@ def test_beside_another_compensation_nothing_is_known(own: str, tmp_path: Path) 
     assert again.table["z_residual_um"].notna().all()
     for verb in (tc.fit, tc.compare):
         with pytest.raises(RecordingError, match=r"out\.csv: compensation: unknown: .* temperature compensation off"):
-            verb(tmp_path / "out.csv", "z_um", jobs=1)  # type: ignore[operator]
+            verb(tmp_path / "out.csv", "z_um", jobs=1)
 
 
 def test_without_a_fresh_confirmation_a_cell_is_empty(tmp_path: Path) -> None:
@@ -159,7 +159,7 @@ def test_a_confirmation_is_of_its_run(tmp_path: Path) -> None:
 
 def test_a_correction_along_the_axis_is_taken_where_it_is_measured(tmp_path: Path) -> None:
     start = Start(BEGIN, (Target("z_um", position=300.0),), (HEAT, Z), "off", 10.0)
-    rows = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0, 20.0, 100.0)), ReadingRow(BEGIN, {"z_um": 3.0})]
+    rows: list[Row] = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0, 20.0, 100.0)), ReadingRow(BEGIN, {"z_um": 3.0})]
     table = export(journal_of(tmp_path / "live.db", start, rows)).recording.table
     assert table["z_correction_um"].tolist() == [-1.0]
     assert table["z_um"].tolist() == [4.0]
@@ -181,7 +181,7 @@ def test_probings_by_either_frame_say_the_same(
         rows.append(ReadingRow(BEGIN + 10.0 * k, {"t1_C": 20.0 + k}))
     rows.append(MeasurementRow(BEGIN + 503.0, "Z", seen, "probing", includes_offset, 250.0, in_force))
     for kind in ("work_offset", "tool_length"):
-        rows.append(MeasurementRow(BEGIN + 600.0, "Z", 77.0, kind, includes_offset, 250.0, in_force))  # type: ignore[arg-type]
+        rows.append(MeasurementRow(BEGIN + 600.0, "Z", 77.0, kind, includes_offset, 250.0, in_force))
     start = Start(BEGIN, (Target("Z"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.targets == (("Z", 1, 1),)
@@ -195,7 +195,10 @@ def test_probings_by_either_frame_say_the_same(
 
 @pytest.mark.parametrize(("includes_offset", "known"), [(True, 1), (False, 0)])
 def test_a_probing_without_a_confirmation(includes_offset: bool, known: int, tmp_path: Path) -> None:
-    rows = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN, "z_um", 3.0, "probing", includes_offset)]
+    rows: list[Row] = [
+        ReadingRow(BEGIN, {"t1_C": 20.0}),
+        MeasurementRow(BEGIN, "z_um", 3.0, "probing", includes_offset),
+    ]
     start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.targets == (("z_um", 1, known),)
@@ -206,7 +209,7 @@ def test_a_probing_without_a_confirmation(includes_offset: bool, known: int, tmp
 
 
 def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
-    rows = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
+    rows: list[Row] = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
     start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, rows))
     assert found.notes == ("z_um: 1 probings are not in it: there is no reading within 60 s",)
@@ -216,7 +219,7 @@ def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
 
 
 def test_readings_of_one_time_and_those_between(tmp_path: Path) -> None:
-    rows = [ReadingRow(BEGIN + t, {"t1_C": 20.0 + t}) for t in (0.0, 0.0, 2.0, 1.0, 5.0, 9.0, 10.0)]
+    rows: list[Row] = [ReadingRow(BEGIN + t, {"t1_C": 20.0 + t}) for t in (0.0, 0.0, 2.0, 1.0, 5.0, 9.0, 10.0)]
     start = Start(BEGIN, (), (HEAT,), "off", 15.0)
     reader = journal_of(tmp_path / "live.db", start, rows)
     assert export(reader).recording.time.tolist() == [0.0, 1.0, 2.0, 5.0, 9.0, 10.0]
@@ -226,7 +229,10 @@ def test_readings_of_one_time_and_those_between(tmp_path: Path) -> None:
 def test_an_angle_has_its_deviation_alone(tmp_path: Path) -> None:
     tilt = Channel("a_urad", "angle", "urad")
     start = Start(BEGIN, (Target("a_urad", "angle", "urad"),), (HEAT, tilt), "off", 15.0)
-    rows = [ConfirmationRow(BEGIN, "a_urad", Correction(-5.0)), ReadingRow(BEGIN, {"a_urad": 3.0, "t1_C": 20.0})]
+    rows: list[Row] = [
+        ConfirmationRow(BEGIN, "a_urad", Correction(-5.0)),
+        ReadingRow(BEGIN, {"a_urad": 3.0, "t1_C": 20.0}),
+    ]
     again = saved(export(journal_of(tmp_path / "live.db", start, rows)), tmp_path)
     assert [c.name for c in again.channels] == ["t1_C", "a_urad"]
     assert again.table["a_urad"].tolist() == [8.0]
@@ -234,7 +240,7 @@ def test_an_angle_has_its_deviation_alone(tmp_path: Path) -> None:
 
 def test_what_was_never_measured_has_its_correction(tmp_path: Path) -> None:
     start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
-    rows = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0)), ReadingRow(BEGIN, {"t1_C": 20.0})]
+    rows: list[Row] = [ConfirmationRow(BEGIN, "z_um", Correction(-5.0)), ReadingRow(BEGIN, {"t1_C": 20.0})]
     again = saved(export(journal_of(tmp_path / "live.db", start, rows)), tmp_path)
     assert [c.name for c in again.channels] == ["t1_C", "z_correction_um"]
     with pytest.raises(InputError, match="no channel is named 'z_um'"):
@@ -246,10 +252,12 @@ def test_journals_that_are_no_recording(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"live\.000001\.db: the journal holds no reading yet"):
         export(journal_of(tmp_path / "live.db", start, []))
     other = start._replace(channels=(Channel("t1_C", "displacement", "um"),))
-    with pytest.raises(InputError, match="t1_C is a displacement in um in one run and a temperature in degC in another"):
+    with pytest.raises(
+        InputError, match="t1_C is a displacement in um in one run and a temperature in degC in another"
+    ):
         export(journal_of(tmp_path / "live.db", other, [ReadingRow(BEGIN, {"t1_C": 1.0})]))
     twice = start._replace(channels=(Channel("z_residual_um", "residual", "um"), Z))
-    rows = [ReadingRow(BEGIN, {"z_um": 1.0, "z_residual_um": 1.0})]
+    rows: list[Row] = [ReadingRow(BEGIN, {"z_um": 1.0, "z_residual_um": 1.0})]
     with pytest.raises(InputError, match="z_residual_um would be there twice"):
         export(journal_of(tmp_path / "twice.db", twice, rows))
 

@@ -23,7 +23,7 @@ def compensated(drop: str = "", **columns: float) -> Recording:
     plain = small_machine()
     c = -5.0 * np.sin(plain.time / 9000.0)
     more = {"z_residual_um": plain.table["z_um"] + c, "z_correction_um": c}
-    table = plain.table.assign(**(more | columns)).drop(columns=drop.split())
+    table = pd.DataFrame({**plain.table, **more, **columns}).drop(columns=drop.split())
     kinds = {"z_residual_um": "residual", "z_correction_um": "correction"}
     every = (*plain.channels, *(Channel(n, q, "um") for n, q in kinds.items()))
     channels = tuple(next(c for c in every if c.name == n) for n in table.columns)
@@ -68,7 +68,11 @@ def test_targets_are_what_a_model_can_learn() -> None:
 @pytest.mark.parametrize(
     ("recording", "target", "text"),
     [
-        (replace(compensated(), compensation="unknown"), "x_um", 'small: compensation: unknown: .* compensation = "off"'),
+        (
+            replace(compensated(), compensation="unknown"),
+            "x_um",
+            'small: compensation: unknown: .* compensation = "off"',
+        ),
         (compensated(), "z_residual_um", "z_residual_um is a residual, .* as the target, z_um"),
         (compensated(), "z_correction_um", "z_correction_um is a correction, .* as the target, z_um"),
         (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um, which is z_residual_um - z_corr"),
@@ -81,7 +85,7 @@ def test_what_is_refused(recording: Recording, target: str, text: str) -> None:
         refuse_compensated([recording], [target])
     for verb in (tc.fit, tc.compare):
         with pytest.raises(RecordingError, match=text):
-            verb(recording, target, jobs=1)  # type: ignore[operator]
+            verb(recording, target, jobs=1)
 
 
 def test_a_sum_of_the_wrong_sign_is_found() -> None:

@@ -77,19 +77,13 @@ def _export(path: Path, output: Path, every: float, overwrite: bool, *, as_json:
     if as_json:
         targets = [{"target": t.name, "measured": t.measured, "known": t.known} for t in found.targets]
         rows, state = len(found.recording), found.recording.compensation
-        print_json(
-            {
-                "file": str(output),
-                "rows": rows,
-                "compensation": state,
-                "targets": targets,
-                "notes": list(found.notes),
-            }
-        )
+        content = {"file": str(output), "rows": rows, "compensation": state, "targets": targets}
+        print_json({**content, "notes": list(found.notes)})
         return
-    console.print(words(f"{output}: {len(found.recording):,} rows, compensation: {found.recording.compensation}"))
-    for t in found.targets:
-        console.print(words(f"{t.name}: measured in {t.measured:,} rows, uncompensated deviation known in {t.known:,}"))
+    lines = [f"{output}: {len(found.recording):,} rows, compensation: {found.recording.compensation}"]
+    lines += [f"{t.name}: measured in {t.measured:,} rows, deviation known in {t.known:,}" for t in found.targets]
+    for line in lines:
+        console.print(words(line), soft_wrap=True)
     for note in found.notes:
         console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
 
@@ -111,14 +105,14 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
         }
         print_json(content)
         return
-    console.print(words(f"{len(summary.files)} file(s), {summary.size_bytes / 2**20:.1f} MiB, {summary.files[-1]}"))
+    lines = [f"{len(summary.files)} file(s), {summary.size_bytes / 2**20:.1f} MiB, the newest {summary.files[-1]}"]
     if summary.first is not None:
-        console.print(words(f"from {_stamp(summary.first)} to {_stamp(summary.last)}"))
-    console.print(words(", ".join(f"{n:,} {kind}" for kind, n in summary.counts.items() if n) or "nothing yet"))
+        lines.append(f"from {_stamp(summary.first)} to {_stamp(summary.last)}")
+    lines.append(", ".join(f"{n:,} {kind}" for kind, n in summary.counts.items() if n) or "nothing yet")
     if summary.lost:
-        console.print(f"[yellow]note[/] {summary.lost:,} rows were lost while the disk did not take them")
-    for time, kind, text in events:
-        console.print(words(f"{_stamp(time)}  {kind}  {text}"), soft_wrap=True)
+        lines.append(f"{summary.lost:,} rows were lost while the disk did not take them")
+    for line in (*lines, *(f"{_stamp(time)}  {kind}  {text}" for time, kind, text in events)):
+        console.print(words(line), soft_wrap=True)
 
 
 def told(stored: "Stored", reader: "JournalReader") -> tuple[str, str]:
