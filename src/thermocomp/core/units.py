@@ -47,6 +47,9 @@ HOUSE_UNITS: dict[str, str] = {
     "feed": "mm/min",
     "acceleration": "mm/s2",
     "dimensionless": "1",
+    # of a machine under compensation: what is left of a displacement, and what the controller adds
+    "residual": "um",
+    "correction": "um",
 }
 
 _UNITS = [
@@ -80,6 +83,7 @@ _UNITS = [
     Unit("m/s2", "acceleration", "mm/s2", 1e3),
     Unit("1", "dimensionless", "1", 1.0),
 ]
+_UNITS += [replace(u, quantity=q) for q in ("residual", "correction") for u in _UNITS if u.quantity == "displacement"]
 
 #: spellings met in files
 _ALIASES = {
