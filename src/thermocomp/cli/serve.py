@@ -122,6 +122,7 @@ _CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fa
 models = ["model.json"]
 state = "state.json"
 speed = {speed}.0
+own_compensation = "off"
 
 [[sources]]
 kind = "simulated"
@@ -135,6 +136,9 @@ file = "corrections.json"
 [[probes]]
 kind = "simulated"
 every = 7200.0
+
+[journal]
+file = "live.db"
 
 [page]
 port = 8731

@@ -70,6 +70,15 @@ class Confirming(Protocol):
 
 
 @runtime_checkable
+class Suspending(Protocol):
+    """A sink that knows when the controller can have no correction in force, such as before homing."""
+
+    def suspended(self) -> Mapping[str, str]:
+        """Return axes or targets without a correction in force, and why, as it was told last."""
+        ...
+
+
+@runtime_checkable
 class Sink(Protocol):
     """Where corrections go."""
 

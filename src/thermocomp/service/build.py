@@ -10,11 +10,13 @@ from thermocomp.adapters.probes import MqttProbe, SimulatedProbe
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.ports import Probe, Sink, Source
 from thermocomp.files import modelfile
+from thermocomp.files.journal import JournalLimits
 from thermocomp.files.protocols import read_protocol
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.clock import Clock
 from thermocomp.service.config import FileOut, In, MqttIn, MqttProbing, Out, Probings, ReplayIn, Settings
 from thermocomp.service.loop import Service
+from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
 
 
@@ -42,6 +44,10 @@ def build(settings: Settings) -> Service:
         folder / config.state if config.state else None,
         [_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
     )
+    if (kept := config.journal) is not None:
+        room = JournalLimits(size_bytes=round(kept.size_mb * 2**20), files=kept.files)
+        begun = service.clock.now()
+        service.recorder = Recorder(folder / kept.file, compensator, config.own_compensation, begun, room)
     if config.shadow:
         for target in compensator.lines.keys() - compensator.shadow.keys():
             service.watch_only(target)

@@ -182,6 +182,29 @@ class Page:
             raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
 
 
+@dataclass(frozen=True, kw_only=True)
+class JournalOut:
+    """Where it is written down what happens.
+
+    Parameters
+    ----------
+    file : str
+        Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
+    size_mb : float
+        A file that has become larger is followed by a new one.
+    files : int
+        So many at most: the oldest is removed.
+    """
+
+    file: str
+    size_mb: float = 64.0
+    files: int = 8
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
+            raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
+
+
 In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
 Out = Annotated[MqttOut | FileOut, Discriminator("kind")]
 Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
@@ -207,6 +230,9 @@ class Config:
     speed : float
         Seconds of the machine in a second of the world: for the virtual machine and recordings alone.
     page : Page or None
+    journal : JournalOut or None
+    own_compensation : {'on', 'off', 'unknown'}
+        Whether the controller compensates for temperature by itself.
     """
 
     models: tuple[str, ...]
@@ -218,6 +244,8 @@ class Config:
     shadow: bool = False
     speed: float = 1.0
     page: Page | None = None
+    journal: JournalOut | None = None
+    own_compensation: Literal["on", "off", "unknown"] = "unknown"
 
     def __post_init__(self) -> None:
         if not self.models:
@@ -226,6 +254,16 @@ class Config:
             raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
         if not 0.0 < self.speed <= 10_000.0:
             raise SettingError(f"speed = {self.speed:g}: want more than 0, at most 10000")
+        if self.own_compensation == "on" and not self.shadow:
+            raise SettingError(
+                'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
+                "or let the models run in shadow (shadow = true)"
+            )
+        if self.own_compensation == "unknown" and (self.journal or self.probes):
+            raise SettingError(
+                'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
+                "unless it is known whether the controller compensates for temperature by itself"
+            )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             raise SettingError('a probe of kind = "simulated" wants a source of kind = "simulated"')

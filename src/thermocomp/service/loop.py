@@ -11,7 +11,7 @@ from pathlib import Path
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, Probe, Sink, Source
+from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
 from thermocomp.runtime.adaptation import Adaptation, Probing
@@ -20,6 +20,7 @@ from thermocomp.runtime.state import Compensated, CompensatorState, Status, resu
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
 from thermocomp.service.probe import KEPT, Checked, check, find_deviation
+from thermocomp.service.recorder import Recorder
 
 #: events that are kept to be shown
 EVENTS = 200
@@ -58,6 +59,8 @@ class Service:
     state_path : Path or None
         Where the state is kept.
     probes : sequence of Probe
+    recorder : Recorder or None
+        Of the journal.
     """
 
     compensator: Compensator
@@ -66,6 +69,7 @@ class Service:
     clock: Clock = field(default_factory=Clock)
     state_path: Path | None = None
     probes: Sequence[Probe] = ()
+    recorder: Recorder | None = None
     state: CompensatorState = field(init=False)
     said: Compensated | None = field(default=None, init=False)
     events: deque[Event] = field(init=False)
@@ -76,10 +80,11 @@ class Service:
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
     checked: deque[Checked] = field(init=False)  #: what probings said
     before: dict[str, Adaptation | None] = field(default_factory=dict, init=False)  #: the last one was taken
+    confirmed: dict[str, Correction] = field(default_factory=dict, init=False)  #: by the controller
 
     def __post_init__(self) -> None:
         self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
-        self.outlets = [Outlet(sink) for sink in self.sinks]
+        self.outlets = [Outlet(sink, self._hear) for sink in self.sinks]
         self.state = self._begin()
         self._saved, self._dirty = -1e9, False
         self._heard = self.clock.tick()
@@ -106,6 +111,8 @@ class Service:
             for link in links:
                 await within(2.0, link.close())
             self._save()
+            if self.recorder is not None:
+                self.recorder.journal.close()
 
     def take(self, reading: Reading) -> None:
         """Take a reading of a source in: with it goes the latest of the others."""
@@ -125,6 +132,9 @@ class Service:
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
         self._tell(said, probings)
+        if self.recorder is not None:
+            self.recorder.take(now, fresh, said)
+            self.recorder.count(now, self.state.references)
         self._chart(said, probings, learned)
 
     def order(self, target: str, status: Status | None) -> None:
@@ -156,7 +166,10 @@ class Service:
             why = f"no target is named {found.target}" if line is None else f"it is {now - stamp:.0f} s old"
             self._say("probing", f"{found.target} refused: {why}")
             return
-        in_force = self.state.corrections[found.target] if found.left else None
+        confirmed = self.confirmed.get(found.target)
+        if self.recorder is not None:
+            self.recorder.measure(now, found, confirmed)
+        in_force = (confirmed or self.state.corrections[found.target]) if found.left else None
         deviation = find_deviation(found.measured, found.position, in_force)
         self.probe(found.target, Probing(deviation, found.repeatability, found.position))
 
@@ -221,9 +234,13 @@ class Service:
                 why = f"no reading for {silent:.0f} s"
                 self.state, said = self.compensator.wait(self.state, tick, why)
                 self._tell(said, {})
+                if self.recorder is not None:
+                    self.recorder.tell(self.clock.now(), said)
             if self._dirty and time.monotonic() - self._saved >= 1.0:
                 self._dirty, self._saved = False, time.monotonic()
                 await asyncio.to_thread(self._save)
+            if self.recorder is not None:
+                await asyncio.to_thread(self.recorder.journal.flush)
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -254,11 +271,30 @@ class Service:
             refused, after = said.refused.get(target, ""), self.state.learned.get(target)
             found = check(self.clock.now(), target, probing, said.deviations[target], after, refused)
             self.checked.append(found)
+            if self.recorder is not None:
+                added = said.deviations[target].offset + (0.0 if refused else found.residual)
+                self.recorder.update(found, added)
             if not refused:
                 self.before[target] = learned.get(target)
             if found.beyond:
                 limit = f"where {found.limit:.1f} um ask for action"
                 self._say("probing", f"{target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
+
+    def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
+        """Take what a controller says is in force, and why it has none."""
+        known = {t: c for t, c in in_force.items() if t in self.state.corrections}
+        self.confirmed |= known
+        if self.recorder is not None:
+            self.recorder.confirm(self.clock.now(), known)
+        if not isinstance(sink, Suspending):
+            return
+        away = sink.suspended()
+        for target in self.compensator.lines.keys() & in_force.keys() | away.keys() & self.compensator.lines.keys():
+            order = self.state.orders.get(target)
+            if target in away and (order is None or order.word not in ("suspended", "shadow", "holding")):
+                self.order(target, Status("suspended", away[target]))
+            elif target not in away and order is not None and order.word == "suspended":
+                self.order(target, None)
 
     def _numbers(self, said: Compensated) -> dict[str, float]:
         heat = {i.name for m in self.compensator.models for i in m.inputs if i.quantity == "temperature"}
@@ -271,6 +307,8 @@ class Service:
 
     def _say(self, kind: str, text: str) -> None:
         self.events.append(Event(self.clock.now(), kind, text))
+        if self.recorder is not None and kind != "state":
+            self.recorder.alarm(self.clock.now(), kind, text)
 
     def _save(self) -> None:
         if self.state_path is None:

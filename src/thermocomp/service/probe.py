@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from thermocomp.core.correction import Correction, Deviation
+from thermocomp.core.correction import Correction, Deviation, uncompensated
 from thermocomp.runtime.adaptation import Adaptation, Probing
 
 #: standard deviations at which the chart asks for action
@@ -17,6 +17,7 @@ class Checked(NamedTuple):
 
     time: float  #: of the machine, seconds since 1970
     target: str
+    predicted: float  #: where it was probed, without it [um]
     residual: float  #: measured minus predicted [um]
     limit: float  #: beyond it the cause has to be looked for [um]
     refused: str  #: why it was not used; empty if it was
@@ -46,7 +47,8 @@ def check(
     """
     size = math.nan if learned is None else learned.size
     limit = ACTION * math.hypot(size, probing.repeatability)
-    return Checked(time, target, probing.deviation - predicted.at(probing.position), limit, refused)
+    said = predicted.at(probing.position)
+    return Checked(time, target, said, probing.deviation - said, limit, refused)
 
 
 def find_deviation(measured: float, position: float, in_force: Correction | None) -> float:
@@ -62,4 +64,4 @@ def find_deviation(measured: float, position: float, in_force: Correction | None
         Where the measurement shows what the correction left; None where it does not contain it (LinuxCNC's ``#5063``
         is a position of the motor: the offset is in it already).
     """
-    return measured if in_force is None else measured - in_force.at(position)
+    return measured if in_force is None else uncompensated(measured, in_force.at(position))
