@@ -8,13 +8,14 @@ import sqlite3
 import subprocess
 import sys
 import textwrap
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.correction import Correction, Deviation
@@ -137,6 +138,7 @@ def test_every_row_comes_back_from_its_text(row: Row) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(_rows, max_size=30), st.integers(1, 5))
+@example([AlarmRow(-0.0, "", ""), DemandRow(-0.0, "", Correction(-0.0))], 1)
 def test_all_rows_come_back_from_the_file(rows: list[Row], every: int) -> None:
     import tempfile
 
@@ -327,6 +329,49 @@ def test_what_was_confirmed_outlasts_200_kills(tmp_path: Path) -> None:
     check_kills(tmp_path, 200)
 
 
+def test_rows_are_added_while_others_are_flushed(tmp_path: Path) -> None:
+    journal = opened(tmp_path, JournalLimits(size_bytes=2**16, files=1000))
+    done = threading.Event()
+
+    def flush() -> None:
+        while not done.is_set():
+            assert journal.flush()
+            journal.status()
+
+    def add(first: int) -> None:
+        for k in range(first, first + 3000):
+            journal.add(alarm(k))
+
+    flushing = [threading.Thread(target=flush) for _ in range(2)]
+    adding = [threading.Thread(target=add, args=(k * 3000,)) for k in range(3)]
+    for thread in flushing + adding:
+        thread.start()
+    for thread in adding:
+        thread.join()
+    done.set()
+    for thread in flushing:
+        thread.join()
+    journal.close()
+    assert journal.status().confirmed == 9000
+    assert numbers(read(tmp_path)) == list(range(9000))
+    assert JournalReader(tmp_path / "live.db").summary().lost == 0
+
+
+def test_two_services_in_one_journal_lose_nothing(tmp_path: Path) -> None:
+    one, two = opened(tmp_path), opened(tmp_path, start=START._replace(channels=CHANNELS[:1]))
+    for k in range(200):
+        (one if k % 2 else two).add(alarm(k))
+        (one if k % 2 else two).add(ReadingRow(5000.0 + k, {"t1_C": float(k), "spindle_rpm": 1.0}))
+        assert one.flush()
+        assert two.flush()
+    one.close()
+    two.close()
+    found = read(tmp_path)
+    assert numbers(found) == list(range(200))
+    readings = [r.values for r in found if isinstance(r, ReadingRow)]
+    assert readings == [{"t1_C": float(k)} | ({"spindle_rpm": 1.0} if k % 2 else {}) for k in range(200)]
+
+
 # -- bounds ------------------------------------------------------------------------------------------------------------
 
 
@@ -338,7 +383,7 @@ def test_files_are_turned_over_and_the_oldest_goes(tmp_path: Path) -> None:
             assert journal.flush()
             status = journal.status()
             assert status.files <= SMALL.files
-            assert status.size_bytes <= SMALL.files * (SMALL.size_bytes + 2**16)
+            assert status.size_bytes <= SMALL.files * (SMALL.size_bytes + 2**17)
     journal.close()
     found = numbers(read(tmp_path))
     assert found == list(range(found[0], 6000))  # the newest, without a gap, also across files

@@ -148,8 +148,7 @@ class Journal:
                     self._shed()
                 return False
             try:
-                if self._file is not None and size(self._file) > self.limits.size_bytes:
-                    self._rotate()
+                self._rotate_if_full()
             except (sqlite3.Error, OSError) as e:
                 self._fail(e)
             return True
@@ -242,8 +241,11 @@ class Journal:
         taken = [int(m[1]) for p in self.path.parent.iterdir() if (m := pattern.match(p.name))]
         return self.path.with_name(f"{self.path.stem}.{max(taken, default=0) + 1:06d}{self.path.suffix}")
 
-    def _rotate(self) -> None:
+    def _rotate_if_full(self) -> None:
         assert self._connection is not None
+        (pages,), (page,) = (self._connection.execute(f"PRAGMA page_{k}").fetchone() for k in ("count", "size"))
+        if pages * page <= self.limits.size_bytes:
+            return
         self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
         self._disconnect()
         files = list(numbered(self.path).values())

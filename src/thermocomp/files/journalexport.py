@@ -24,7 +24,7 @@ _KINDS = ("reading", "confirmation", "measurement")
 #: a probing is put to the reading nearest to it, if that is not further away [s]
 NEAR = 60.0
 #: readings that are closer have one time [s]
-_AT_ONCE = 1e-3
+_AT_ONCE = 1e-5
 
 
 class ExportedTarget(NamedTuple):
@@ -129,7 +129,7 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
     if lost := reader.summary().lost:
         notes.append(f"{lost:,} rows were lost while the disk did not take them")
     known = any(t.known for t in told) or (in_force and not any(t.measured for t in told))
-    time = found.time - found.time[0]
+    time = np.round(found.time - found.time[0], 6)
     speed = next((table[c.name] for c in listed if c.quantity == "spindle_speed"), None)
     recording = Recording(
         name=reader.paths[-1].name,

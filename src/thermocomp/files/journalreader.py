@@ -185,7 +185,8 @@ def checksum(run: int, seq: int, time: float, kind: str, text: str) -> int:
     run, seq, time, kind, text
         As the columns of `SCHEMA`.
     """
-    return zlib.crc32(f"{run} {seq} {time!r} {kind} {text}".encode())
+    # SQLite knows no -0.0
+    return zlib.crc32(f"{run} {seq} {time + 0.0!r} {kind} {text}".encode())
 
 
 def find_version(connection: sqlite3.Connection) -> int | None:
