@@ -46,8 +46,7 @@ def build(settings: Settings) -> Service:
     )
     if (kept := config.journal) is not None:
         room = JournalLimits(size_bytes=round(kept.size_mb * 2**20), files=kept.files)
-        begun = service.clock.now()
-        service.recorder = Recorder(folder / kept.file, compensator, config.own_compensation, begun, room)
+        service.recorder = Recorder(folder / kept.file, compensator, config.own_compensation, service.clock, room)
     if config.shadow:
         for target in compensator.lines.keys() - compensator.shadow.keys():
             service.watch_only(target)

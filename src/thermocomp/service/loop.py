@@ -86,7 +86,7 @@ class Service:
         self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
         self.outlets = [Outlet(sink, self._hear) for sink in self.sinks]
         self.state = self._begin()
-        self._saved, self._dirty = -1e9, False
+        self._saved, self._dirty, self._trouble = -1e9, False, ""
         self._heard = self.clock.tick()
 
     # -- what happens --------------------------------------------------------------------------------------------------
@@ -241,6 +241,9 @@ class Service:
                 await asyncio.to_thread(self._save)
             if self.recorder is not None:
                 await asyncio.to_thread(self.recorder.journal.flush)
+                if (trouble := self.recorder.journal.status().reason) != self._trouble:
+                    self._trouble = trouble
+                    self._say("service", f"journal: {trouble or 'all is written again'}")
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said

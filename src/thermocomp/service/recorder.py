@@ -24,9 +24,10 @@ from thermocomp.files.journalrows import (
 )
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, Reference
+from thermocomp.service.clock import Clock
 from thermocomp.service.probe import Checked
 
-#: so long after a confirmation the correction in force counts as known [s]
+#: so long after a confirmation the correction in force counts as known [s of the world]
 CONFIRM_WITHIN = 10.0
 
 
@@ -39,18 +40,15 @@ class Recorder:
     compensator : Compensator
     own : {'on', 'off', 'unknown'}
         Whether the controller compensates by itself.
-    time : float
-        Now, of the machine: seconds since 1970.
+    clock : Clock
     limits : JournalLimits
     """
 
-    def __init__(
-        self, path: Path, compensator: Compensator, own: Own, time: float, limits: JournalLimits = JournalLimits()
-    ) -> None:
+    def __init__(self, path: Path, compensator: Compensator, own: Own, clock: Clock, limits: JournalLimits) -> None:
         inputs = [i for m in compensator.models for i in (*m.inputs, *(m.watch.inputs if m.watch else ()))]
         channels = {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
         targets = tuple(Target(name) for name in compensator.lines)
-        start = Start(time, targets, tuple(channels.values()), own, CONFIRM_WITHIN)
+        start = Start(clock.now(), targets, tuple(channels.values()), own, CONFIRM_WITHIN * clock.speed)
         self.journal = Journal.open(path, limits, start)
         self._before: Compensated | None = None
         self._references: dict[str, Reference] = {}
