@@ -33,7 +33,9 @@ net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net change iocontrol.0.tool-change => iocontrol.0.tool-changed
 """
 #: what is traced of each axis: what the drive is told, what is commanded, and offset and slope in force
-TRACED = ("{drive}", "tc-axis-{a}-pos-cmd", "tc-{a}-offset-now", "tc-{a}-slope-now")
+TRACED = ("{drive}", "tc-axis-{a}-pos-cmd", "tc-{a}-offset-now", "traced-{a}-slope")
+#: the planner's positions reach a drive through a cubic spline, which is late: shares of the last three periods but one
+SPLINE = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
 class Trace(NamedTuple):
@@ -47,8 +49,19 @@ class Trace(NamedTuple):
     slope: dict[str, NDArray[np.float64]]  #: [um/m]
 
     def added(self, axis: str) -> NDArray[np.float64]:
-        """Return what the drive is told more than commanded [um]."""
-        return 1e3 * (self.drive[axis] - self.commanded[axis])
+        """Return what the drive is told more than commanded [um]; the first periods, that nothing is known of, are 0."""
+        commanded = self.commanded[axis]
+        late = sum(share * commanded[3 - k : -k] for k, share in enumerate(SPLINE, 1))
+        return np.concatenate([np.zeros(3), 1e3 * (self.drive[axis][3:] - late)])
+
+    def demanded(self, axis: str) -> NDArray[np.float64]:
+        """Return the correction that the line in force has at the commanded position [um]."""
+        return self.offset[axis] + 1e-3 * self.slope[axis] * self.commanded[axis]
+
+    def steps(self, axis: str) -> NDArray[np.float64]:
+        """Return by how much the line in force moves within each period, at the end of the travel that moves more [um]."""
+        ends = [self.offset[axis] + 1e-3 * self.slope[axis] * p for p in (-LIMIT, LIMIT)]
+        return np.abs(np.diff(ends)).max(axis=0)
 
 
 class Live:
@@ -75,12 +88,15 @@ class Live:
                 )
             end = time.monotonic() + 30.0
             while self._process.poll() is None and time.monotonic() < end:
-                with contextlib.suppress(OSError):
-                    self._display = socket.socket(socket.AF_UNIX)
-                    self._display.connect(str(self.folder / "display.sock"))
-                    self._file = self._display.makefile("rw")
-                    return
-                time.sleep(0.02)
+                display = socket.socket(socket.AF_UNIX)
+                try:
+                    display.connect(str(self.folder / "display.sock"))
+                except OSError:
+                    display.close()
+                    time.sleep(0.02)
+                    continue
+                self._display, self._file = display, display.makefile("rw")
+                return
             if "could not open shared memory" not in self.told():
                 break
             time.sleep(1.0)  # an interpreter of another user is just running: they share memory
@@ -151,7 +167,7 @@ class Live:
 
     def trace(self, file: str = "trace") -> Trace:
         """Return what was traced, without a gap."""
-        rows = np.loadtxt(self.folder / file, comments="overrun", ndmin=2)
+        rows = np.loadtxt(self.folder / file, ndmin=2)
         period = rows[:, 0].astype(np.int64)
         if np.any(np.diff(period) != 1):
             raise RuntimeError("the sampler lost rows")
@@ -159,7 +175,7 @@ class Live:
         named = [dict(zip(AXES, part, strict=True)) for part in parts.transpose(1, 0, 2)]
         drive, commanded, offset, slope = named
         um = {a: 1e3 * v for a, v in offset.items()}
-        return Trace(period, rows[:, 1] != 0, drive, commanded, um, {a: 1e6 * v for a, v in slope.items()})
+        return Trace(period, rows[:, 1] != 0, drive, commanded, um, slope)
 
 
 @contextlib.contextmanager
@@ -217,7 +233,18 @@ def _lay_out(folder: Path, settings: HalSettings, ratio: str, programs: Mapping[
 
 def _tracing(pattern: Pattern) -> str:
     lines = [f"loadrt sampler depth=8000 cfg=b{'f' * (len(TRACED) * len(AXES))}", "net tc-on => sampler.0.pin.0"]
+    lines.append("setp sampler.0.enable 0")
     pins = iter(range(1, 100))
+    lines.append(f"loadrt scale names={','.join(f'traced.{a.lower()}' for a in AXES)}")  # it is written with six decimals
+    for a in AXES.lower():
+        lines += [f"net tc-{a}-slope-now => traced.{a}.in", f"net traced-{a}-slope traced.{a}.out"]
+        lines += [f"setp traced.{a}.gain 1e6", f"addf traced.{a} servo-thread"]
+    # a probe that touches when the drive of Z is told to go below -300.5
+    lines += ["loadrt comp names=traced.touch", "loadrt not names=traced.touched", "setp traced.touch.in0 -300.5"]
+    lines += ["setp traced.touch.hyst 0", "net traced-touch traced.touch.out => traced.touched.in"]
+    lines += ["net traced-touched traced.touched.out => motion.probe-input"]
+    lines += ["addf traced.touch servo-thread", "addf traced.touched servo-thread"]
+    lines.append(f"net {'drive-2' if pattern == 'offset' else 'tc-z-drive'} => traced.touch.in1")
     for axis in AXES:
         drive = f"drive-{'XYZ'.index(axis)}" if pattern == "offset" else f"tc-{axis.lower()}-drive"
         for signal_name in TRACED:

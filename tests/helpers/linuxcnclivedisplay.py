@@ -78,6 +78,17 @@ def start(program: str) -> None:
     wait(lambda: status.interp_state != linuxcnc.INTERP_IDLE)
 
 
+def probe(text: str) -> "list[float]":
+    """Probe, and return where it touched by the controller, and by the program, Z."""
+    status.poll()
+    mdi(text)
+    mdi("#31=#5063")
+    mdi("#32=#<_z>")
+    mdi("G4 P0.01")
+    status.poll()
+    return [status.probed_position[2], status.actual_position[2], float(status.probe_tripped)]
+
+
 def ended() -> None:
     wait(idle, 900.0)
 
@@ -88,7 +99,10 @@ def running() -> bool:
 
 
 def halcmd(*words: str) -> str:
-    return subprocess.run(["halcmd", *words], check=True, capture_output=True, text=True).stdout
+    with open("halcmd.out", "w+", encoding="utf-8") as out:  # noqa: PTH123 - what it starts keeps a pipe open
+        subprocess.run(["halcmd", *words], check=True, stdout=out)
+        out.seek(0)
+        return out.read()
 
 
 def get(*names: str) -> "list[object]":
@@ -105,10 +119,12 @@ def told() -> "list[str]":
 def trace(file: str) -> None:
     global tracer  # noqa: PLW0603
     tracer = subprocess.Popen(["halsampler", "-t", file])
+    hal.set_p("sampler.0.enable", "1")
 
 
 def stop() -> None:
     assert tracer is not None
+    hal.set_p("sampler.0.enable", "0")
     time.sleep(0.2)  # what is left is written
     tracer.terminate()
     tracer.wait()

@@ -14,6 +14,7 @@ All but ``beat`` may be left out. Who says nothing for the timeout is dropped; t
 
 import argparse
 import contextlib
+import itertools
 import json
 import math
 import os
@@ -33,6 +34,8 @@ import hal  # type: ignore[import-not-found]
 NAME = "thermocomp"
 #: between two looks at the controller [s]
 TICK = 0.01
+#: components that were killed, at most: then LinuxCNC has to be started anew
+MOST = 1000
 #: bytes of a line; connections at a time, of which one is listened to
 LONGEST, WAITING = 4096, 4
 #: a correction that is not where it shall be by more than this [um], for so long [s], does not follow
@@ -57,6 +60,16 @@ class Axis:
         """Return a value of its HAL."""
         return float(hal.get_value(f"tc.{self.letter}.{name}"))
 
+    def put(self, name: str, value: float) -> None:
+        """Set a value of its HAL, which stays when this process dies."""
+        hal.set_p(f"tc.{self.letter}.{name}", repr(value))
+
+    def stay(self) -> None:
+        """Let it stay where it is."""
+        for k, part in enumerate(("offset", "slope")):
+            self.put(f"{part}.maxv", 0.0)
+            self.put(f"from{k}.in1", self.get(f"{part}.out"))
+
     def now(self) -> list[float]:
         """Return what the servo thread demands at both ends."""
         offset, slope = self.get("offset.out"), self.get("slope.out")
@@ -77,25 +90,14 @@ class Server:
         self.axes = {a.letter.upper(): a for a in (Axis(t, options.pattern, self.unit) for t in options.axis)}
         self.magnitude, self.rate = options.magnitude, options.rate
         self.heard = time.monotonic()  # when the service spoke last; a new process gives it the whole time
-        self.ticks, self.echoed, self.sent = 0, time.monotonic(), False
+        self.ticks, self.echoed = 0, time.monotonic()
         self.client: socket.socket | None = None
         self.since, self.buffer = 0.0, b""
         self.selector = selectors.DefaultSelector()
-        self.component = hal.component(NAME)
-        pins = [("heartbeat", hal.HAL_BIT), ("ticks", hal.HAL_U32), ("alive", hal.HAL_BIT)]
-        pins += [(f"{a.letter}.{p}", hal.HAL_FLOAT) for a in self.axes.values() for p in ("offset", "slope")]
-        pins += [(f"{a.letter}.{p}-rate", hal.HAL_FLOAT) for a in self.axes.values() for p in ("offset", "slope")]
-        for pin, kind in pins:
-            self.component.newpin(pin, kind, hal.HAL_OUT)
-        for axis in self.axes.values():  # the rates are zero still: nothing moves until all is connected
-            for part in ("offset", "slope"):
-                self.component[f"{axis.letter}.{part}"] = axis.get(f"{part}.out")
-        for pin, _ in pins:
-            if pin not in ("ticks", "alive"):
-                hal.connect(f"{NAME}.{pin}", f"tc-{pin.replace('.', '-')}")
+        self.component = join()
+        self.sent = bool(hal.get_value("tc.beat.in-0"))  # by the one that was there before
         for axis in self.axes.values():
-            for part in ("offset", "slope"):
-                self.component[f"{axis.letter}.{part}"] = axis.get(f"{part}.out")
+            axis.stay()
         self.listener = listen(options.socket, options.group)
         self.selector.register(self.listener, selectors.EVENT_READ)
         self.component.ready()
@@ -120,14 +122,13 @@ class Server:
 
     def tick(self, now: float) -> None:
         """Look at the controller, and say where the lines shall go and how fast."""
-        if hal.get_value("tc.beat.out") == self.sent:
+        if bool(hal.get_value("tc.beat.out")) == self.sent:
             self.echoed, self.sent = now, not self.sent
-            self.component["heartbeat"] = self.sent
-        self.ticks = (self.ticks + 1) & 0x7FFFFFFF
-        self.component["ticks"] = self.ticks
+            hal.set_p("tc.beat.in-0", str(int(self.sent)))
+        self.ticks += 1
         silent = now - self.heard
         alive = silent <= self.options.timeout
-        self.component["alive"] = alive
+        hal.set_p("tc.alive.in-0", str(int(alive)))
         if now - max(self.heard, self.since) > self.options.timeout:
             self.drop()
         fading = silent > self.options.timeout + self.options.hold
@@ -148,11 +149,11 @@ class Server:
         rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
         now = axis.now()
         seconds = max(abs(low - now[0]), abs(high - now[1])) / rate
-        pin = axis.letter
         if seconds > 0.0:
-            self.component[f"{pin}.offset-rate"] = abs(offset - axis.get("offset.out")) / seconds
-            self.component[f"{pin}.slope-rate"] = abs(slope - axis.get("slope.out")) / seconds
-        self.component[f"{pin}.offset"], self.component[f"{pin}.slope"] = offset, slope
+            axis.put("offset.maxv", abs(offset - axis.get("offset.out")) / seconds)
+            axis.put("slope.maxv", abs(slope - axis.get("slope.out")) / seconds)
+        axis.put("from0.in1", offset)
+        axis.put("from1.in1", slope)
 
     def why(self, now: float) -> str:
         """Return why nothing is in force; empty if something can be."""
@@ -251,6 +252,17 @@ class Server:
         return self.report(beat)
 
 
+def join() -> Any:
+    """Return a component under a name that HAL does not know yet: those of components that were killed stay there."""
+    for k in itertools.count():
+        try:
+            return hal.component(NAME if k == 0 else f"{NAME}-{k}")
+        except hal.error:
+            if k >= MOST:
+                raise
+    return None
+
+
 def listen(path: str, group: str) -> socket.socket:
     """Return a socket that listens, for this user, and for the members of a group if one is named."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -274,11 +286,12 @@ def ending(child: "subprocess.Popen[bytes]") -> Callable[..., None]:
 
 
 def keep(arguments: list[str]) -> None:
-    """Run the component in a process of its own, and anew whenever it is killed."""
-    while True:
-        child = subprocess.Popen([sys.executable, str(Path(__file__).resolve()), *arguments, "--once"])
+    """Run the component in a process of its own, and anew whenever it dies."""
+    here = Path(__file__).resolve()
+    while here.exists():
+        child = subprocess.Popen([sys.executable, str(here), *arguments, "--once"])
         signal.signal(signal.SIGTERM, ending(child))
-        if child.wait() == 0:
+        if child.wait() in (0, -signal.SIGTERM):
             return
         time.sleep(0.2)
 
@@ -299,7 +312,12 @@ def main() -> None:
         keep(sys.argv[1:])
         return
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC ends
-    Server(options).run()
+    try:
+        server = Server(options)
+    except RuntimeError as e:  # it would be started anew without end
+        print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
+        return
+    server.run()
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     letters = [a.letter for a in axes]
     homed = ["tc.homed" if k == 0 else f"tc.homed-{k}" for k in range(-(-joints // _INPUTS))]
     wanted = {
-        "lut5": ["tc.on", "tc.off", "tc.was", "tc.beat", *homed],
+        "lut5": ["tc.on", "tc.off", "tc.was", "tc.beat", "tc.alive", *homed],
         "mux2": [f"tc.{a}.{n}" for a in letters for n in ("from0", "from1")],
         "limit2": [f"tc.{a}.{n}" for a in letters for n in ("offset", "slope", "clip")],
         "mult2": [f"tc.{a}.times" for a in letters],
@@ -90,8 +90,8 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
     lines += ["net tc-was tc.was.out => tc.on.in-4 tc.off.in-4", f"setp tc.was.function {table:#x}"]
     lines += [f"setp tc.on.function {table << 16:#x}", f"setp tc.off.function {0xFFFFFFFF ^ table << 16:#x}"]
     lines += ["net tc-on tc.on.out", "net tc-off tc.off.out"]
-    lines += ["setp tc.beat.function 0x2", "net tc-heartbeat => tc.beat.in-0"]
-    return lines + [f"addf {n} servo-thread" for n in ("tc.on", "tc.off", "tc.was", "tc.beat")]
+    lines += ["setp tc.beat.function 0x2", "setp tc.alive.function 0x2"]  # what comes in goes out
+    return lines + [f"addf {n} servo-thread" for n in ("tc.on", "tc.off", "tc.was", "tc.beat", "tc.alive")]
 
 
 def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -> list[str]:
@@ -104,11 +104,9 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
     for k, part in enumerate(("offset", "slope")):
         lines += [
             f"net tc-on => tc.{a}.from{k}.sel",
-            f"net tc-{a}-{part} => tc.{a}.from{k}.in1",
             f"net tc-{a}-{part}-gated tc.{a}.from{k}.out => tc.{a}.{part}.in",
             f"net tc-off => tc.{a}.{part}.load",
             f"setp tc.{a}.{part}.maxv 0",
-            f"net tc-{a}-{part}-rate => tc.{a}.{part}.maxv",
         ]
     lines += [
         f"net tc-{a}-slope-now tc.{a}.slope.out => tc.{a}.times.in0",
