@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from linuxcnclive import AXES, PERIOD, Live, Trace, live
+from linuxcnclive import AXES, LIMIT, PERIOD, Live, Trace, live
 
 from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern
 from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
@@ -51,7 +51,7 @@ async def correct(machine: Live) -> dict[str, Correction]:
     found = await sink.confirmed()
     assert found is not None
     for target, correction in found.items():
-        for at in (-500.0, 0.0, 500.0):
+        for at in (-LIMIT, 0.0, LIMIT):
             assert correction.at(at) == pytest.approx(said[target].at(at), abs=0.1)
     await sink.close()
     machine.do("stop")
@@ -73,7 +73,7 @@ def check(trace: Trace) -> None:
     ("pattern", "seconds"),
     [
         ("offset", 30.0),
-        ("drive", 10.0),
+        ("drive", 5.0),
         pytest.param("offset", 600.0, marks=pytest.mark.long),
         pytest.param("drive", 600.0, marks=pytest.mark.long),
     ],
@@ -89,7 +89,7 @@ def test_in_every_period(pattern: Pattern, seconds: float) -> None:
     check(trace)
 
 
-@pytest.mark.parametrize("pattern", ["offset", "drive"])
+@pytest.mark.parametrize("pattern", ["offset", pytest.param("drive", marks=pytest.mark.long)])
 def test_never_beyond_the_magnitude(pattern: Pattern) -> None:
     async def work() -> None:
         sink = LinuxCncSink(path=machine.socket, axes={"x_um": "X", "z_um": "Z"}, magnitude=20.0)

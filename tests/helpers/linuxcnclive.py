@@ -22,7 +22,7 @@ from thermocomp.adapters.linuxcnc.halsetup import HalSettings, Pattern, set_up
 #: of the servo thread [s]
 PERIOD = 0.001
 AXES = "XZ"
-LIMIT = 500.0  # of the travel, both ways [mm]
+LIMIT = 120.0  # of the travel, both ways [mm]
 
 HAL = """loadrt trivkins coordinates=XYZ
 loadrt motmod servo_period_nsec=1000000 num_joints=3
@@ -235,12 +235,14 @@ def _tracing(pattern: Pattern) -> str:
     lines = [f"loadrt sampler depth=8000 cfg=b{'f' * (len(TRACED) * len(AXES))}", "net tc-on => sampler.0.pin.0"]
     lines.append("setp sampler.0.enable 0")
     pins = iter(range(1, 100))
-    lines.append(f"loadrt scale names={','.join(f'traced.{a.lower()}' for a in AXES)}")  # it is written with six decimals
+    lines.append(
+        f"loadrt scale names={','.join(f'traced.{a.lower()}' for a in AXES)}"
+    )  # it is written with six decimals
     for a in AXES.lower():
         lines += [f"net tc-{a}-slope-now => traced.{a}.in", f"net traced-{a}-slope traced.{a}.out"]
         lines += [f"setp traced.{a}.gain 1e6", f"addf traced.{a} servo-thread"]
-    # a probe that touches when the drive of Z is told to go below -300.5
-    lines += ["loadrt comp names=traced.touch", "loadrt not names=traced.touched", "setp traced.touch.in0 -300.5"]
+    # a probe that touches when the drive of Z is told to go below -100.5
+    lines += ["loadrt comp names=traced.touch", "loadrt not names=traced.touched", "setp traced.touch.in0 -100.5"]
     lines += ["setp traced.touch.hyst 0", "net traced-touch traced.touch.out => traced.touched.in"]
     lines += ["net traced-touched traced.touched.out => motion.probe-input"]
     lines += ["addf traced.touch servo-thread", "addf traced.touched servo-thread"]

@@ -78,15 +78,11 @@ def start(program: str) -> None:
     wait(lambda: status.interp_state != linuxcnc.INTERP_IDLE)
 
 
-def probe(text: str) -> "list[float]":
-    """Probe, and return where it touched by the controller, and by the program, Z."""
-    status.poll()
+def probe(text: str) -> float:
+    """Probe along Z, and return where it touched, as #5063 has it."""
     mdi(text)
-    mdi("#31=#5063")
-    mdi("#32=#<_z>")
-    mdi("G4 P0.01")
     status.poll()
-    return [status.probed_position[2], status.actual_position[2], float(status.probe_tripped)]
+    return float(status.probed_position[2])
 
 
 def ended() -> None:

@@ -20,7 +20,9 @@ async def main() -> None:
             while True:
                 await sink.apply(
                     {
-                        "x_um": Correction(rng.uniform(-60.0, 60.0), rng.uniform(-50.0, 50.0), rng.uniform(-99.0, 99.0)),
+                        "x_um": Correction(
+                            rng.uniform(-60.0, 60.0), rng.uniform(-50.0, 50.0), rng.uniform(-99.0, 99.0)
+                        ),
                         "z_um": Correction(rng.uniform(-60.0, 60.0)),
                     }
                 )

@@ -5,7 +5,7 @@
 its rate and its magnitude are kept by HAL in the servo thread; this process only says where each line shall go. So it
 may die at any time: HAL goes on with what it was told last, and a new process begins at what is in force.
 
-It listens on a Unix socket for JSON lines and answers each:
+It listens on a Unix socket, says what is in force, and answers JSON lines:
 
     {"beat": 1, "axes": {"Z": [offset um, slope um/m, reference position mm]}, "magnitude": um, "rate": um/s}
 
@@ -192,9 +192,10 @@ class Server:
     def accept(self) -> None:
         """Let the service in; another one is told that there is one."""
         connection, _ = self.listener.accept()
+        greeting = {"error": "another service is connected"} if self.client is not None else self.report(0)
+        with contextlib.suppress(OSError):
+            connection.sendall(json.dumps(greeting).encode() + b"\n")
         if self.client is not None:
-            with contextlib.suppress(OSError):
-                connection.sendall(b'{"error": "another service is connected"}\n')
             connection.close()
             return
         connection.setblocking(False)

@@ -84,8 +84,8 @@ class LinuxCncSink:
             raise self._fail("this user may not connect: set it up with --group, and be a member of that") from e
         except (OSError, TimeoutError, ValueError) as e:
             raise self._fail(str(e) or "no answer") from e
-        async with asyncio.timeout(timeout):
-            await self._ask({})
+        self._beat = 0
+        await self._hear(b"")
         if missing := {a.upper() for a in self.axes.values()} - self._reports.keys():
             raise self._fail(f"axis {', '.join(sorted(missing))} is not corrected there; set it up with --axes")
         self._connection.to("connected")
@@ -159,28 +159,31 @@ class LinuxCncSink:
     async def _ask(self, message: dict[str, Any]) -> None:
         """Say something, and take in what is answered."""
         async with self._lock:
-            if self._streams is None:
-                raise self._fail("not connected")
-            reader, writer = self._streams
             self._beat += 1
             limits = {n: v for n in ("magnitude", "rate") if (v := getattr(self, n)) is not None}
-            try:
-                async with asyncio.timeout(ANSWER):
-                    writer.write(json.dumps({"beat": self._beat, **limits, **message}).encode() + b"\n")
-                    await writer.drain()
-                    answer = json.loads(await reader.readline() or b"null")
-            except (OSError, TimeoutError, ValueError) as e:
-                await self._hang_up()
-                raise self._fail(str(e) or "no answer") from e
-            except asyncio.CancelledError:  # an answer would be taken for that of the next question
-                await self._hang_up()
-                raise
-            if not isinstance(answer, dict) or answer.get("beat") != self._beat:
-                await self._hang_up()
-                error = answer.get("error", "not the answer") if isinstance(answer, dict) else "lost"
-                raise self._fail(str(error))
+            await self._hear(json.dumps({"beat": self._beat, **limits, **message}).encode() + b"\n")
+
+    async def _hear(self, line: bytes) -> None:
+        """Say a line, and take in the answer: only a connection that answers in turn is kept."""
+        if self._streams is None:
+            raise self._fail("not connected")
+        reader, writer = self._streams
+        heard = False
+        try:
+            async with asyncio.timeout(ANSWER):
+                writer.write(line)
+                await writer.drain()
+                answer = json.loads(await reader.readline() or b'{"error": "lost"}')
+            if answer.get("beat") != self._beat:
+                raise ValueError(answer.get("error", "not the answer"))
             self._why, self.ticks = str(answer["suspended"]), int(answer["ticks"])
             self._reports = {letter: _read(one) for letter, one in answer["axes"].items()}
+            heard = True
+        except (OSError, TimeoutError, ValueError, KeyError, AttributeError, TypeError) as e:
+            raise self._fail(str(e) or "no answer") from e
+        finally:  # also if it is cancelled: the answer would be taken for that of the next question
+            if not heard:
+                await self._hang_up()
 
 
 def _read(one: Mapping[str, Any]) -> AxisReport:
