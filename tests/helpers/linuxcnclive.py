@@ -49,7 +49,7 @@ class Trace(NamedTuple):
     slope: dict[str, NDArray[np.float64]]  #: [um/m]
 
     def added(self, axis: str) -> NDArray[np.float64]:
-        """Return what the drive is told more than commanded [um]; the first periods, that nothing is known of, are 0."""
+        """Return what the drive is told more than commanded [um]; 0 in the first periods, of which nothing is known."""
         commanded = self.commanded[axis]
         late = sum(share * commanded[3 - k : -k] for k, share in enumerate(SPLINE, 1))
         return np.concatenate([np.zeros(3), 1e3 * (self.drive[axis][3:] - late)])
@@ -59,9 +59,10 @@ class Trace(NamedTuple):
         return self.offset[axis] + 1e-3 * self.slope[axis] * self.commanded[axis]
 
     def steps(self, axis: str) -> NDArray[np.float64]:
-        """Return by how much the line in force moves within each period, at the end of the travel that moves more [um]."""
+        """Return by how much the line in force moves within each period, at the end that moves more [um]."""
         ends = [self.offset[axis] + 1e-3 * self.slope[axis] * p for p in (-LIMIT, LIMIT)]
-        return np.abs(np.diff(ends)).max(axis=0)
+        found: NDArray[np.float64] = np.abs(np.diff(ends)).max(axis=0)
+        return found
 
 
 class Live:

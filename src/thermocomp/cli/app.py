@@ -45,6 +45,7 @@ COMMANDS = {
     "leave of it.",
     "revise": "Correct an NC program by the drift it will cause, before it is run.",
     "serve": "Run the compensator live: sensors in, corrections out, with a page to watch.",
+    "linuxcnc": "Write what a LinuxCNC needs to be corrected, and say what to change in its configuration.",
     "papers": "Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds "
     "here.",
 }

@@ -1,6 +1,5 @@
 """The HAL of a machine that is corrected: what is added to its configuration, and what has to be changed by hand."""
 
-import grp
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +60,8 @@ class HalSettings:
         if not self.axes or set(self.axes.upper()) - set("XYZUVW") or len(set(self.axes.upper())) != len(self.axes):
             raise SettingError(f"axes = {self.axes!r}: want letters of straight axes, each once, such as XZ")
         if self.group:
+            import grp  # not on every system
+
             try:
                 grp.getgrnam(self.group)
             except KeyError as e:
@@ -74,6 +75,7 @@ class Prepared(NamedTuple):
     component: str  #: text of the component
     todo: tuple[str, ...]  #: what is to be changed by hand, in words
     socket: Path  #: where the service connects
+    files: tuple[Path, ...]  #: what is written
 
 
 def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
@@ -101,7 +103,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
     if len(str(socket).encode()) > _LONGEST or any(c.isspace() or c in "\"'#[]$()" for c in str(socket)):
         raise InputError(f"{folder}: HAL and a socket want a short path without spaces: choose another folder with -o")
     todo: list[str] = []
-    joints = int(ini.number("KINS", "JOINTS"))
+    joints = round(ini.number("KINS", "JOINTS"))
     lines = ["# written by thermocomp linuxcnc setup; write it anew rather than change it"]
     lines += haltext.load_modules(axes, joints, settings.pattern, files, todo)
     lines += haltext.make_gate(joints, settings.pattern, files)
@@ -114,8 +116,8 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
             if settings.pattern == "offset"
             else haltext.make_drive(axis, files)
         )
-    ends = " ".join(f"--axis {a.letter},{a.low:g},{a.high:g}" for a in axes)
-    numbers = " ".join(f"--{n} {getattr(settings, n):g}" for n in ("magnitude", "rate", "timeout", "hold", "fade"))
+    ends = " ".join(f"--axis {a.letter},{a.low!r},{a.high!r}" for a in axes)
+    numbers = " ".join(f"--{n} {getattr(settings, n)!r}" for n in ("magnitude", "rate", "timeout", "hold", "fade"))
     lines.append(
         f"loadusr -Wn thermocomp /usr/bin/python3 {folder / COMPONENT_NAME} --pattern {settings.pattern} {ends} "
         f"--unit {'inch' if inch else 'mm'} {numbers} --socket {socket}"
@@ -129,7 +131,9 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
             f"{name}: cannot be seen through; a pin that it uses, or a module that it loads, can be used once only"
         )
     component = Path(__file__).with_name("_hal_component.py").read_text(encoding="utf-8")
-    return Prepared("\n".join(lines) + "\n", component, tuple(todo), socket)
+    return Prepared(
+        "\n".join(lines) + "\n", component, tuple(todo), socket, (folder / COMPONENT_NAME, folder / HAL_NAME)
+    )
 
 
 def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> Prepared:
@@ -153,7 +157,7 @@ def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool =
         See `prepare`, or a file is there already.
     """
     prepared = prepare(path, folder, settings)
-    with drafts([folder / COMPONENT_NAME, folder / HAL_NAME], overwrite=overwrite) as started:
+    with drafts(prepared.files, overwrite=overwrite) as started:
         for draft, text in zip(started.values(), (prepared.component, prepared.hal), strict=True):
             draft.write_text(text, encoding="utf-8", newline="\n")
         started.publish()
@@ -175,11 +179,10 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
         raise InputError(f"{ini.path}: [{section}] MIN_LIMIT = {low:g} must be below MAX_LIMIT = {high:g}")
     joint = -1
     if pattern == "offset":
-        ratio = ini.get(section, "OFFSET_AV_RATIO", "0")
-        if not 0.0 < float(ratio or 0) <= 0.9:
+        if not 0.0 < ini.number(section, "OFFSET_AV_RATIO", 0.0) <= 0.9:
             raise InputError(
-                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO: LinuxCNC would take external offsets and do nothing; "
-                f"add OFFSET_AV_RATIO = 0.1 to [{section}] (up to 0.9; that share of the axis' speed and acceleration "
+                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9: LinuxCNC takes external offsets and does nothing; "
+                f"add OFFSET_AV_RATIO = 0.1 to [{section}] (that share of the axis' speed and acceleration "
                 "goes to the correction, the rest to programs), or use --pattern drive"
             )
     else:
@@ -210,6 +213,8 @@ def _check_free(ini: Ini, files: HalFiles, axes: Sequence[HalAxis], pattern: Pat
                 f"{ini.path}: HAL in {files.unread[0]} cannot be seen through (Tcl, or old commands); on the drive "
                 "side it must be known what hangs on the drive: use --pattern offset"
             )
+        if not {"motion-command-handler", "motion-controller"} <= set(files.functions):
+            raise InputError(f"{ini.path}: no HAL file adds motion-command-handler and motion-controller to a thread")
         for axis in axes:
             for end in ("cmd", "fb"):
                 if f"joint.{axis.joint}.motor-pos-{end}" not in files.signals:

@@ -47,7 +47,11 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
             continue
         file, line, arguments = files.modules[module]
         key, _, value = arguments.partition("=")
-        before = value.split(",") if key == "names" else [f"{module}.{k}" for k in range(int(value or 1))]
+        before = (
+            value.split(",")
+            if key == "names"
+            else [f"{module}.{k}" for k in range(int(value) if value.isdigit() else 1)]
+        )
         if not set(names) <= set(before):
             todo.append(
                 f"{file}: line {line} loads {module} already, and LinuxCNC loads a module once; make it: "

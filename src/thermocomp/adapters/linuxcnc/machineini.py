@@ -1,5 +1,6 @@
 """What a LinuxCNC configuration says of its axes, and what its HAL files already use."""
 
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,23 +44,27 @@ class Ini:
             raise InputError(f"{self.path}: there is no {key} in [{section}]; is this the INI of the machine?")
         return default
 
-    def number(self, section: str, key: str) -> float:
+    def number(self, section: str, key: str, default: float | None = None) -> float:
         """Return a value that is a number.
 
         Parameters
         ----------
         section, key : str
+        default : float, optional
 
         Raises
         ------
         InputError
             There is none, or it is none.
         """
-        text = self.get(section, key)
+        text = self.get(section, key, None if default is None else str(default))
         try:
-            return float(text)
-        except ValueError as e:
-            raise InputError(f"{self.path}: [{section}] {key} = {text}: want a number") from e
+            found = float(text)
+        except ValueError:
+            found = math.nan
+        if not math.isfinite(found):
+            raise InputError(f"{self.path}: [{section}] {key} = {text}: want a number")
+        return found
 
 
 @dataclass
@@ -77,7 +82,9 @@ class HalFiles:
     functions : list of str
         In the order in which the servo thread calls them.
     unread : list of str
-        Files that cannot be seen through.
+        What cannot be seen through.
+    read : set of Path
+        Files that were read.
     """
 
     signals: dict[str, str] = field(default_factory=dict)
@@ -85,6 +92,7 @@ class HalFiles:
     modules: dict[str, tuple[str, int, str]] = field(default_factory=dict)
     functions: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
+    read: set[Path] = field(default_factory=set)
 
 
 def read_ini(path: Path) -> Ini:
@@ -143,6 +151,9 @@ def read_hal(ini: Ini, leave: str) -> HalFiles:
 
 
 def _read_one(path: Path, ini: Ini, found: HalFiles) -> None:
+    if path in found.read:
+        return
+    found.read.add(path)
     whole = ""
     for k, raw in enumerate(_lines(path), 1):
         whole += raw.split("#", 1)[0].strip()
@@ -159,7 +170,7 @@ def _read_one(path: Path, ini: Ini, found: HalFiles) -> None:
         elif verb == "loadrt" and rest:
             found.modules[rest[0]] = (path.name, k, " ".join(rest[1:]))
         elif verb == "addf" and len(rest) > 1:
-            place = int(rest[2]) if len(rest) > 2 else -1
+            place = int(rest[2]) if len(rest) > 2 and rest[2].lstrip("+-").isdigit() else -1
             at = place - 1 if place > 0 else len(found.functions) + place + 1
             found.functions.insert(at, rest[0])
         elif verb == "source" and rest:
