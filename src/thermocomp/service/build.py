@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
 
+from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.adapters.mqtt import MqttSink, MqttSource
 from thermocomp.adapters.plain import FileSink, ReplaySource, SimulatedSource
 from thermocomp.adapters.probes import MqttProbe, SimulatedProbe
@@ -14,7 +15,7 @@ from thermocomp.files.journal import JournalLimits
 from thermocomp.files.protocols import read_protocol
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.clock import Clock
-from thermocomp.service.config import FileOut, In, MqttIn, MqttProbing, Out, Probings, ReplayIn, Settings
+from thermocomp.service.config import FileOut, In, LinuxCncOut, MqttIn, MqttProbing, Out, Probings, ReplayIn, Settings
 from thermocomp.service.loop import Service
 from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
@@ -89,4 +90,6 @@ def _probe(one: Probings, sources: Sequence[Source], targets: tuple[str, ...]) -
 def _sink(one: Out, folder: Path) -> Sink:
     if isinstance(one, FileOut):
         return FileSink(path=folder / one.file)
+    if isinstance(one, LinuxCncOut):
+        return LinuxCncSink(path=folder / one.socket, axes=dict(one.axes))
     return MqttSink(topic=one.topic, host=one.host, port=one.port)

@@ -142,6 +142,29 @@ class MqttOut:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LinuxCncOut:
+    """Corrections to a LinuxCNC on this computer.
+
+    Parameters
+    ----------
+    kind : {'linuxcnc'}
+    socket : str
+        Of the HAL component that ``thermocomp linuxcnc setup`` puts there.
+    axes : dict of str to str
+        Axis by target, such as ``{z_um = "Z"}``.
+    """
+
+    kind: Literal["linuxcnc"]
+    socket: str
+    axes: Names
+
+    def __post_init__(self) -> None:
+        letters = [a.upper() for a in self.axes.values()]
+        if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
+            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{z_um = "Z"}}')
+
+
+@dataclass(frozen=True, kw_only=True)
 class FileOut:
     """Corrections to a file.
 
@@ -206,7 +229,7 @@ class JournalOut:
 
 
 In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
-Out = Annotated[MqttOut | FileOut, Discriminator("kind")]
+Out = Annotated[MqttOut | FileOut | LinuxCncOut, Discriminator("kind")]
 Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 
@@ -259,7 +282,8 @@ class Config:
                 'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
                 "or let the models run in shadow (shadow = true)"
             )
-        if self.own_compensation == "unknown" and (self.journal or self.probes):
+        controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
+        if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
             raise SettingError(
                 'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
                 "unless it is known whether the controller compensates for temperature by itself"
@@ -317,7 +341,7 @@ def read_config(path: str | Path) -> Settings:
 
 
 def _tell(error: dict[str, Any]) -> str:
-    kinds = ("mqtt", "simulated", "replay", "file")
+    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
     place = ".".join(f"{k + 1}" if isinstance(k, int) else str(k) for k in error["loc"] if k not in kinds) or "file"
     context = error.get("ctx", {})
     if error["type"] == "value_error":
