@@ -72,14 +72,10 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     return lines
 
 
-def _on(files: HalFiles, pin: str) -> str:
-    """Return the signal that a pin drives: its own, if the machine has none."""
-    return files.signals.get(pin) or "tc-" + pin.replace(".", "-")
-
-
 def _net(files: HalFiles, source: str, *sinks: str) -> str:
-    drives = [] if source in files.signals else [source]
-    return f"net {_on(files, source)} {' '.join([*drives, '=>', *sinks] if drives else ['=>', *sinks])}"
+    """Return the line that hangs pins on the signal of a source: its own, if the machine has none."""
+    own = "tc-" + source.replace(".", "-")
+    return f"net {files.signals.get(source, own)} {source} => {' '.join(sinks)}"
 
 
 def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
