@@ -63,7 +63,6 @@ async def lost(sink: LinuxCncSink) -> None:
     ("pattern", "kills"),
     [
         ("offset", 10),
-        ("drive", 4),
         pytest.param("offset", 100, marks=pytest.mark.long),
         pytest.param("drive", 100, marks=pytest.mark.long),
     ],

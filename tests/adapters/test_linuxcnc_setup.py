@@ -28,7 +28,7 @@ def test_it_is_written_beside_the_ini_and_what_is_to_do_is_told(
     assert "names=a,b,tc.x.from0" in said["todo"][1]
     text = (tmp_path / HAL_NAME).read_text(encoding="ascii")
     assert "loadrt sum2" not in text
-    assert "net enabled => tc.on.in-0" in text  # the machine's own signal
+    assert "net enabled motion.motion-enabled => tc.on.in-0" in text  # the machine's own signal
     assert "setp tc.z.away.offset 50.0" in text
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.name in before} == before
     assert run(["linuxcnc", "setup", str(ini)]) == 2
@@ -93,13 +93,13 @@ def test_more_joints_than_a_table_takes(tmp_path: Path) -> None:
         ("MAX_LIMIT = 100", "MAX_LIMIT = -300", HalSettings(), "must be below"),
         ("MAX_LIMIT = 100", "MAX_LIMIT = much", HalSettings(), "want a number"),
         ("MAX_LIMIT = 100\n", "", HalSettings(), "there is no MAX_LIMIT"),
-        ("[AXIS_Z]", "[AXIS_W]", HalSettings(), "there is no [AXIS_Z]; there are AXIS_X"),
+        ("[AXIS_", "[", HalSettings(), "there is no [AXIS_Z]; there are no axes"),
+        ("MAX_LIMIT = 100", "MAX_LIMIT = \\\n -300", HalSettings(), "MAX_LIMIT = -300"),
         ("trivkins", "5axiskins", HalSettings(pattern="drive"), "must be a joint"),
         ("coordinates=XYZ", "coordinates=XZZ", HalSettings(pattern="drive"), "has 2 joints"),
         ("HALFILE = mill.hal", "HALFILE = mill.tcl", HalSettings(pattern="drive"), "cannot be seen through"),
         ("HALFILE = mill.hal", "HALFILE = none.hal", HalSettings(), "cannot be read"),
-        ("[EMC]", "nonsense", HalSettings(), "neither a [SECTION] nor KEY = value"),
-        ("# a mill\n", "x", HalSettings(pattern="drive", axes="Y"), "neither"),
+        ("[AXIS_Z]", "nonsense", HalSettings(), "there is no [AXIS_Z]; there are AXIS_X, AXIS_Y"),
     ],
 )
 def test_refused(tmp_path: Path, old: str, new: str, settings: HalSettings, told: str) -> None:

@@ -30,6 +30,7 @@ addf motion-command-handler servo-thread
 addf motion-controller servo-thread
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
+net powered motion.motion-enabled
 net change iocontrol.0.tool-change => iocontrol.0.tool-changed
 """
 #: what is traced of each axis: what the drive is told, what is commanded, and offset and slope in force

@@ -75,10 +75,10 @@ class Axis:
         offset, slope = self.get("offset.out"), self.get("slope.out")
         return [offset - slope * self.half, offset + slope * self.half]
 
-    def demand(self, offset: float, slope: float, reference: float) -> None:
-        """Take a line: um, um/m, mm."""
-        micron = 1e-3 * self.unit
-        self.ends = [micron * (offset + 1e-3 * slope * (p / self.unit - reference)) for p in (self.low, self.high)]
+    def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
+        """Take a line: um, um/m, mm, and what it may be at most, um."""
+        wanted = (offset + 1e-3 * slope * (p / self.unit - reference) for p in (self.low, self.high))
+        self.ends = [1e-3 * self.unit * max(-magnitude, min(magnitude, v)) for v in wanted]
 
 
 class Server:
@@ -234,7 +234,7 @@ class Server:
         """Take a message: all of it or nothing."""
         limits = {}
         for name in ("magnitude", "rate"):
-            value = float(message.get(name, getattr(self, name)))
+            value = float(message.get(name, getattr(self.options, name)))
             if not 0.0 < value < math.inf:
                 raise ValueError(name)
             limits[name] = min(value, getattr(self.options, name))
@@ -247,8 +247,8 @@ class Server:
         beat = int(message["beat"])
         self.heard = time.monotonic()
         self.magnitude, self.rate = limits["magnitude"], limits["rate"]
-        for letter, line in lines.items():
-            self.axes[letter].demand(*line)
+        for letter, (offset, slope, reference) in lines.items():
+            self.axes[letter].demand(offset, slope, reference, self.magnitude)
             self.move(self.axes[letter], False)  # at once, rather than with the next tick
         return self.report(beat)
 

@@ -181,9 +181,9 @@ def _axis(ini: Ini, letter: str, pattern: Pattern) -> HalAxis:
     if pattern == "offset":
         if not 0.0 < ini.number(section, "OFFSET_AV_RATIO", 0.0) <= 0.9:
             raise InputError(
-                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9: LinuxCNC takes external offsets and does nothing; "
-                f"add OFFSET_AV_RATIO = 0.1 to [{section}] (that share of the axis' speed and acceleration "
-                "goes to the correction, the rest to programs), or use --pattern drive"
+                f"{ini.path}: [{section}] has no OFFSET_AV_RATIO from 0 to 0.9, and without it LinuxCNC takes external "
+                f"offsets and does nothing; add OFFSET_AV_RATIO = 0.1 to [{section}] (the correction's share of the "
+                "axis' speed and acceleration, the rest is for programs), or use --pattern drive"
             )
     else:
         joint = _joint(ini, letter)

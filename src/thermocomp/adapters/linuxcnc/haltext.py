@@ -23,7 +23,19 @@ class HalAxis(NamedTuple):
 
 
 def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalFiles, todo: list[str]) -> list[str]:
-    """Return the lines that load modules; what the machine loads itself is told: LinuxCNC loads each once."""
+    """Return the lines that load modules; LinuxCNC loads each once.
+
+    Parameters
+    ----------
+    axes : sequence of HalAxis
+    joints : int
+        How many the machine has.
+    pattern : {'offset', 'drive'}
+    files : HalFiles
+        Of the machine.
+    todo : list of str
+        Gets what has to be done where the machine loads a module itself.
+    """
     letters = [a.letter for a in axes]
     homed = ["tc.homed" if k == 0 else f"tc.homed-{k}" for k in range(-(-joints // _INPUTS))]
     wanted = {
@@ -60,18 +72,23 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     return lines
 
 
-def _on(files: HalFiles, pin: str) -> str:
-    """Return the signal that a pin drives: its own, if the machine has none."""
-    return files.signals.get(pin) or "tc-" + pin.replace(".", "-")
-
-
 def _net(files: HalFiles, source: str, *sinks: str) -> str:
-    drives = [] if source in files.signals else [source]
-    return f"net {_on(files, source)} {' '.join([*drives, '=>', *sinks] if drives else ['=>', *sinks])}"
+    """Return the line that hangs pins on the signal of a source: its own, if the machine has none."""
+    own = "tc-" + source.replace(".", "-")
+    return f"net {files.signals.get(source, own)} {source} => {' '.join(sinks)}"
 
 
 def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
-    """Return the HAL that knows whether a correction can be in force."""
+    """Return the HAL that knows whether a correction can be in force.
+
+    Parameters
+    ----------
+    joints : int
+        How many the machine has.
+    pattern : {'offset', 'drive'}
+    files : HalFiles
+        Of the machine.
+    """
     lines, before = [], ""
     for k in range(-(-joints // _INPUTS)):
         name = "tc.homed" if k == 0 else f"tc.homed-{k}"
@@ -99,7 +116,18 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
 
 
 def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -> list[str]:
-    """Return the HAL that moves offset and slope of an axis to where they shall be, and works out the correction."""
+    """Return the HAL that moves offset and slope of an axis to where they shall be, and works out the correction.
+
+    Parameters
+    ----------
+    axis : HalAxis
+    files : HalFiles
+        Of the machine.
+    magnitude : float
+        Largest correction [um].
+    micron : float
+        In units of the machine.
+    """
     a, most = axis.letter, magnitude * micron
     lines = [
         _net(files, f"axis.{a}.pos-cmd", f"tc.{a}.away.in0"),
@@ -130,6 +158,14 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
     Only changes of the counts add up, and some are lost: so what is added is what the controller's own request lacks.
     While nothing can be in force the line begins at that request, so nothing is lacking.
+
+    Parameters
+    ----------
+    axis : HalAxis
+    files : HalFiles
+        Of the machine.
+    micron : float
+        In units of the machine.
     """
     a, scale = axis.letter, RESOLUTION * 1e3 * micron
     request = f"axis.{a}.eoffset-request"
@@ -149,7 +185,14 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
 
 
 def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
-    """Return the HAL that adds a correction to what the drive is told, and takes it off what it answers."""
+    """Return the HAL that adds a correction to what the drive is told, and takes it off what it answers.
+
+    Parameters
+    ----------
+    axis : HalAxis
+    files : HalFiles
+        Of the machine; functions that are added stand in it afterwards.
+    """
     a, command, feedback = axis.letter, f"joint.{axis.joint}.motor-pos-cmd", f"joint.{axis.joint}.motor-pos-fb"
     told, answered = files.signals[command], files.signals[feedback]
     drives = [p for p in files.pins[told] if not p.startswith("joint.")]

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from thermocomp.core.exceptions import InputError
 
+#: HAL files that come with LinuxCNC
+LIBRARY = Path("/usr/share/linuxcnc/hallib")
 _ARROWS = ("=>", "<=", "<=>")
 
 
@@ -105,21 +107,23 @@ def read_ini(path: Path) -> Ini:
     Raises
     ------
     InputError
-        It cannot be read, or a line in it is none of an INI.
+        It cannot be read.
     """
     sections: dict[str, dict[str, list[str]]] = {}
-    keys: dict[str, list[str]] | None = None
-    for k, raw in enumerate(_lines(path), 1):
-        line = raw.strip()
-        if not line or line[0] in "#;":
+    keys: dict[str, list[str]] = {}
+    whole = ""
+    for raw in _lines(path):
+        whole += raw.strip()
+        if whole.endswith("\\") and whole[0] not in "#;":
+            whole = whole[:-1]
             continue
+        line, whole = whole, ""
         if line.startswith("[") and line.endswith("]"):
             keys = sections.setdefault(line[1:-1].strip(), {})
             continue
         key, equals, value = line.partition("=")
-        if keys is None or not equals:
-            raise InputError(f"{path}: line {k}: {line!r:.60} is neither a [SECTION] nor KEY = value")
-        keys.setdefault(key.strip(), []).append(value.strip())
+        if equals and key[0] not in "#;":  # LinuxCNC, too, takes no notice of the rest
+            keys.setdefault(key.strip(), []).append(value.strip())
     return Ini(path, sections)
 
 
@@ -137,17 +141,25 @@ def read_hal(ini: Ini, leave: str) -> HalFiles:
     InputError
         One cannot be read.
     """
-    found = HalFiles()
-    for name in ini.sections.get("HAL", {}).get("HALFILE", []):
-        parts = name.split()
-        path = ini.path.parent / parts[0]
-        if path.name == leave:
-            continue
-        if path.suffix != ".hal" or len(parts) > 1 or name.startswith("LIB:"):
-            found.unread.append(name)
-            continue
-        _read_one(path, ini, found)
+    found, later = HalFiles(), HalFiles()
+    for key, into in (("HALFILE", found), ("POSTGUI_HALFILE", later)):
+        for name in ini.sections.get("HAL", {}).get(key, []):
+            path = _find(ini, name)
+            if path.name == leave:
+                continue
+            if path.suffix != ".hal" or len(name.split()) > 1:
+                into.unread.append(name)
+                continue
+            _read_one(path, ini, into)
+    found.signals = later.signals | found.signals  # a pin can be on one signal only, whoever puts it there
     return found
+
+
+def _find(ini: Ini, name: str) -> Path:
+    """Return the path of a HAL file: beside the INI, or one that comes with LinuxCNC."""
+    first = (name.split() or [""])[0]
+    path = ini.path.parent / Path(first.removeprefix("LIB:")).expanduser()
+    return LIBRARY / path.name if first.startswith("LIB:") or not path.exists() else path
 
 
 def _read_one(path: Path, ini: Ini, found: HalFiles) -> None:

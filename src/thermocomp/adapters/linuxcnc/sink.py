@@ -87,6 +87,7 @@ class LinuxCncSink:
         self._beat = 0
         await self._hear(b"")
         if missing := {a.upper() for a in self.axes.values()} - self._reports.keys():
+            await self._hang_up()
             raise self._fail(f"axis {', '.join(sorted(missing))} is not corrected there; set it up with --axes")
         self._connection.to("connected")
         self._beating = asyncio.create_task(self._live())
