@@ -36,6 +36,10 @@ def build(settings: Settings) -> Service:
     config, folder = settings
     models = [model for path in config.models for model in modelfile.read(folder / path)]
     compensator = Compensator.of(models, config.limits, watching=config.shadow)
+    for one in config.sinks:
+        if isinstance(one, LinuxCncOut) and (unknown := one.axes.keys() - compensator.lines.keys()):
+            known = ", ".join(compensator.lines)
+            raise InputError(f"axes of LinuxCNC: no model for {', '.join(sorted(unknown))}; there are {known}")
     sources = [_source(one, folder, config.speed) for one in config.sources]
     service = Service(
         compensator,

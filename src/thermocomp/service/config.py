@@ -32,12 +32,15 @@ class MqttIn:
         Of the broker.
     names : dict of str to str
         Channel by the name in the message, for those that are called otherwise there.
+    virtual : bool
+        It is a virtual machine that talks there, and may run faster than the world (`Config.speed`).
     """
 
     kind: Literal["mqtt"]
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883
+    virtual: bool = False
     names: Names = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -291,9 +294,10 @@ class Config:
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             raise SettingError('a probe of kind = "simulated" wants a source of kind = "simulated"')
-        if self.speed != 1.0 and any(isinstance(s, MqttIn) for s in self.sources):
+        if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
             raise SettingError(
-                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1"
+                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
+                "a virtual one (virtual = true)"
             )
 
 
