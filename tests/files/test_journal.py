@@ -285,7 +285,7 @@ def killed(folder: Path, first: int, seconds: float, seed: int) -> int:
     with os.fdopen(out) as pipe:
         said = pipe.read()
     assert os.WTERMSIG(status) == signal.SIGKILL, said
-    return int((said.split() or [first])[-1])
+    return int((said.split() or [str(first)])[-1])
 
 
 def check_kills(folder: Path, n: int) -> None:
@@ -414,8 +414,8 @@ def test_rows_are_read_in_the_order_of_their_times(tmp_path: Path) -> None:
     journal = opened(tmp_path)
     draw = random.Random(3)
     times = [draw.uniform(1000.0, 2000.0) for _ in range(3000)]
-    for k, time in enumerate(times):
-        journal.add(AlarmRow(time, "count", "x" * 100))
+    for k, at in enumerate(times):
+        journal.add(AlarmRow(at, "count", "x" * 100))
         assert k % 100 or journal.flush()
     journal.close()
     assert len(list(tmp_path.iterdir())) == 3
