@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 #: take hours, or judge the verdict and no speed: run when they are named
-BY_HAND = ("verdict", "stable", "bands", "plan", "watch")
+BY_HAND = ("verdict", "stable", "bands", "plan", "watch", "linuxcnc")
 
 
 def main() -> int:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from driftmodels import lags
+from linuxcncmill import write_linuxcnc_mill
 from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
 from smallmill import write_mill
@@ -146,6 +147,10 @@ def test_positions_and_volume(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     machine, recording = write_mill(tmp_path)
     assert held("volumetric", capsys, str(machine), "--recording", str(recording))["states"]
     assert held("iso230", capsys, "--positioning", str(DOCS / "files" / "positioning.csv"))["positioning"]
+
+
+def test_a_linuxcnc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert held("linuxcnc", capsys, "setup", str(write_linuxcnc_mill(tmp_path)))["todo"]
 
 
 def test_a_revision(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

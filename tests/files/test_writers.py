@@ -37,6 +37,7 @@ GIVEN = {
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {
+    "adapters/linuxcnc/halsetup.py",
     "adapters/linuxcnc/expansion/expand.py",
     "api/revision/job.py",
     "cli/map.py",

@@ -13,9 +13,12 @@ from typing import NamedTuple
 from unittest import mock
 
 from driftmodels import lags
+from linuxcncmill import write_linuxcnc_mill
 from reviseruns import PLATE, judged
 from smallmachine import small_machine
 
+from thermocomp.adapters.linuxcnc import halsetup
+from thermocomp.adapters.linuxcnc.halsetup import COMPONENT_NAME, HAL_NAME, HalSettings
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -109,6 +112,19 @@ def _mapping(folder: Path, version: int) -> None:
         raise InputError(told.getvalue())
 
 
+def _linuxcnc(folder: Path, version: int) -> None:
+    """The HAL of a mill that `_inputs` has beside the program."""
+    ini = write_linuxcnc_mill(_inputs(PLATE, version))
+
+    def prepare(path: Path, folder: Path, settings: HalSettings) -> halsetup.Prepared:
+        names = (folder / COMPONENT_NAME, folder / HAL_NAME)
+        return found(path, Path("/tmp"), settings)._replace(files=names)  # it names its folder
+
+    found = halsetup.prepare
+    with mock.patch.object(halsetup, "prepare", prepare):
+        halsetup.set_up(ini, folder, HalSettings(rate=1.0 + version), overwrite=True)
+
+
 def _test(folder: Path, version: int) -> None:
     speed = 1000.0 + version
     trial = Trial("run", speed, ((0.0, 900.0), (speed, 7200.0)))
@@ -125,6 +141,11 @@ WRITERS: dict[str, Writer] = {
         lambda f, v: positionfile.write([_position_model(v)], f / "position.json", overwrite=True),
         ("position.json",),
         "position.json",
+    ),
+    "linuxcnc": Writer(
+        _linuxcnc,
+        (COMPONENT_NAME, HAL_NAME),
+        HAL_NAME,
     ),
     "mapping": Writer(_mapping, ("raw.toml",), "raw.toml"),
     "csv": _recording("csv"),

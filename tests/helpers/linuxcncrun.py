@@ -1,5 +1,6 @@
 """A real controller for tests: LinuxCNC with simulated drives, without a display, in a folder of its own."""
 
+import contextlib
 import fcntl
 import os
 import shutil
@@ -7,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +21,8 @@ ACCELERATIONS = (1000.0, 800.0, 500.0)
 TURNING, TURNING_UP = 100.0, 1000.0
 #: of the servo thread [s]
 PERIOD = 0.001
+#: the user that LinuxCNC runs as where the tests run as root
+NOBODY = 65534
 
 INI = """[EMC]
 VERSION = 1.1
@@ -109,15 +112,38 @@ def run(programs: Mapping[str, str], seconds: float, rotary: bool = False) -> di
     -------
     dict of str to Run
     """
+    with only_one() as folder:
+        return _run(programs, seconds, folder, rotary)
+
+
+@contextlib.contextmanager
+def only_one() -> Iterator[Path]:
+    """Give a folder to run in, while no other test runs a LinuxCNC: there can be only one on a computer."""
     if shutil.which("linuxcnc") is None:
         pytest.skip("LinuxCNC is not installed (Debian package linuxcnc-uspace)")
     folder = Path(tempfile.mkdtemp(prefix="linuxcnc-"))
     try:
         with (Path(tempfile.gettempdir()) / f"linuxcnc-test-{os.getuid()}.lock").open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)  # there can be only one on a computer
-            return _run(programs, seconds, folder, rotary)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def hand_over(folder: Path) -> None:
+    """Give a folder to the user that `command` runs LinuxCNC as."""
+    if os.getuid() == 0:
+        for path in (folder, *folder.iterdir()):
+            os.chown(path, NOBODY, NOBODY)
+
+
+def command(folder: Path) -> list[str]:
+    """Return what runs the LinuxCNC of a folder, where it has its home."""
+    words = ["env", "-i", "PATH=/usr/bin:/bin:/usr/sbin:/sbin", f"HOME={folder}", "USER=nobody", "LANG=C.UTF-8"]
+    words += ["TERM=dumb", "linuxcnc", "-r", "test.ini"]
+    if os.getuid() == 0:  # LinuxCNC refuses to run as root
+        return ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", *words]
+    return words
 
 
 def _run(programs: Mapping[str, str], seconds: float, folder: Path, rotary: bool) -> dict[str, Run]:
@@ -150,15 +176,9 @@ def _run(programs: Mapping[str, str], seconds: float, folder: Path, rotary: bool
     files = " ".join(f'"{folder / name}.ngc"' for name in programs)
     display.write_text(f"#!/bin/sh\nexec /usr/bin/python3 linuxcncdisplay.py {seconds} {files}\n", encoding="ascii")
     display.chmod(0o755)
-    command = ["env", "-i", "PATH=/usr/bin:/bin:/usr/sbin:/sbin", f"HOME={folder}", "USER=nobody", "LANG=C.UTF-8"]
-    command += ["TERM=dumb", "linuxcnc", "-r", "test.ini"]
-    if os.getuid() == 0:  # LinuxCNC refuses to run as root
-        nobody = 65534
-        for path in (folder, *folder.iterdir()):
-            os.chown(path, nobody, nobody)
-        command = ["setpriv", f"--reuid={nobody}", f"--regid={nobody}", "--clear-groups", *command]
+    hand_over(folder)
     for _ in range(20):
-        told = _start(command, folder, seconds)
+        told = _start(command(folder), folder, seconds)
         if "could not open shared memory" not in told:
             break
         time.sleep(1.0)  # an interpreter of another user is just running: they share memory
@@ -168,10 +188,10 @@ def _run(programs: Mapping[str, str], seconds: float, folder: Path, rotary: bool
     return dict(zip(programs, found, strict=True))
 
 
-def _start(command: list[str], folder: Path, seconds: float) -> str:
+def _start(words: list[str], folder: Path, seconds: float) -> str:
     """Run LinuxCNC, and return what it told."""
     with (folder / "log").open("w+", encoding="utf-8", errors="replace") as log:
-        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        process = subprocess.Popen(words, cwd=folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
         try:
             process.wait(seconds + 30.0)
         finally:

@@ -1,0 +1,325 @@
+#!/usr/bin/python3
+"""The end of thermocomp inside LinuxCNC: a HAL component that needs Debian's Python and nothing else.
+
+``thermocomp linuxcnc setup`` copies this file beside the machine's configuration. What a correction is at a position,
+its rate and its magnitude are kept by HAL in the servo thread; this process only says where each line shall go. So it
+may die at any time: HAL goes on with what it was told last, and a new process begins at what is in force.
+
+It listens on a Unix socket, says what is in force, and answers JSON lines:
+
+    {"beat": 1, "axes": {"Z": [offset um, slope um/m, reference position mm]}, "magnitude": um, "rate": um/s}
+
+All but ``beat`` may be left out. Who says nothing for the timeout is dropped; the correction is held, then fades.
+"""
+
+import argparse
+import contextlib
+import itertools
+import json
+import math
+import os
+import selectors
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hal  # type: ignore[import-not-found]
+
+NAME = "thermocomp"
+#: between two looks at the controller [s]
+TICK = 0.01
+#: components that were killed, at most: then LinuxCNC has to be started anew
+MOST = 1000
+#: bytes of a line; connections at a time, of which one is listened to
+LONGEST, WAITING = 4096, 4
+#: a correction that is not where it shall be by more than this [um], for so long [s], does not follow
+ASIDE, PATIENCE = 1.0, 2.0
+#: the servo thread stands still when it has not answered for so long; then LinuxCNC is gone [s]
+STILL, GONE = 1.0, 5.0
+
+
+class Axis:
+    """An axis: where its line shall go, in the machine's units about the middle of its travel."""
+
+    def __init__(self, text: str, pattern: str, unit: float) -> None:
+        letter, low, high = text.split(",")
+        self.letter, self.low, self.high = letter.lower(), float(low), float(high)
+        self.middle, self.half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
+        self.unit = unit  # units of the machine in a millimetre
+        self.in_force = f"axis.{self.letter}.eoffset" if pattern == "offset" else f"tc.{self.letter}.smooth.out"
+        self.ends: list[float] | None = None  # what is demanded at both ends of the travel; none: what is in force
+        self.aside: float | None = None  # since when it does not follow
+
+    def get(self, name: str) -> float:
+        """Return a value of its HAL."""
+        return float(hal.get_value(f"tc.{self.letter}.{name}"))
+
+    def put(self, name: str, value: float) -> None:
+        """Set a value of its HAL, which stays when this process dies."""
+        hal.set_p(f"tc.{self.letter}.{name}", repr(value))
+
+    def stay(self) -> None:
+        """Let it stay where it is."""
+        for k, part in enumerate(("offset", "slope")):
+            self.put(f"{part}.maxv", 0.0)
+            self.put(f"from{k}.in1", self.get(f"{part}.out"))
+
+    def now(self) -> list[float]:
+        """Return what the servo thread demands at both ends."""
+        offset, slope = self.get("offset.out"), self.get("slope.out")
+        return [offset - slope * self.half, offset + slope * self.half]
+
+    def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
+        """Take a line: um, um/m, mm, and what it may be at most, um."""
+        wanted = (offset + 1e-3 * slope * (p / self.unit - reference) for p in (self.low, self.high))
+        self.ends = [1e-3 * self.unit * max(-magnitude, min(magnitude, v)) for v in wanted]
+
+
+class Server:
+    """Listens, and keeps HAL as it was told."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.unit = 1.0 if options.unit == "mm" else 1.0 / 25.4
+        self.axes = {a.letter.upper(): a for a in (Axis(t, options.pattern, self.unit) for t in options.axis)}
+        self.magnitude, self.rate = options.magnitude, options.rate
+        self.heard = time.monotonic()  # when the service spoke last; a new process gives it the whole time
+        self.ticks, self.echoed = 0, time.monotonic()
+        self.client: socket.socket | None = None
+        self.since, self.buffer = 0.0, b""
+        self.selector = selectors.DefaultSelector()
+        self.component = join()
+        self.sent = bool(hal.get_value("tc.beat.in-0"))  # by the one that was there before
+        for axis in self.axes.values():
+            axis.stay()
+        self.listener = listen(options.socket, options.group)
+        self.selector.register(self.listener, selectors.EVENT_READ)
+        self.component.ready()
+
+    def run(self) -> None:
+        """Run until LinuxCNC ends."""
+        due = time.monotonic()
+        while True:
+            for key, _ in self.selector.select(max(0.0, due - time.monotonic())):
+                if key.fileobj is self.listener:
+                    self.accept()
+                elif key.fileobj is self.client:  # it may have been dropped just now
+                    self.receive()
+            now = time.monotonic()
+            if now >= due:
+                due = max(due + TICK, now)
+                self.tick(now)
+            if now - self.echoed > GONE:
+                return
+
+    # -- the controller ------------------------------------------------------------------------------------------------
+
+    def tick(self, now: float) -> None:
+        """Look at the controller, and say where the lines shall go and how fast."""
+        if bool(hal.get_value("tc.beat.out")) == self.sent:
+            self.echoed, self.sent = now, not self.sent
+            hal.set_p("tc.beat.in-0", str(int(self.sent)))
+        self.ticks += 1
+        silent = now - self.heard
+        alive = silent <= self.options.timeout
+        hal.set_p("tc.alive.in-0", str(int(alive)))
+        if now - max(self.heard, self.since) > self.options.timeout:
+            self.drop()
+        fading = silent > self.options.timeout + self.options.hold
+        for axis in self.axes.values():
+            self.move(axis, fading)
+            follows = abs(axis.get("clip.out") - hal.get_value(axis.in_force)) <= ASIDE * 1e-3 * self.unit
+            axis.aside = None if follows else axis.aside or now
+
+    def move(self, axis: Axis, fading: bool) -> None:
+        """Let the line of an axis go where it shall, straight, neither end faster than the rate."""
+        if fading:
+            axis.ends = None
+        elif axis.ends is None:
+            return
+        most, micron = self.magnitude * 1e-3 * self.unit, 1e-3 * self.unit
+        low, high = (max(-most, min(most, v)) for v in axis.ends or (0.0, 0.0))
+        offset, slope = (low + high) / 2.0, (high - low) / (2.0 * axis.half)
+        rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
+        now = axis.now()
+        seconds = max(abs(low - now[0]), abs(high - now[1])) / rate
+        if seconds > 0.0:
+            axis.put("offset.maxv", abs(offset - axis.get("offset.out")) / seconds)
+            axis.put("slope.maxv", abs(slope - axis.get("slope.out")) / seconds)
+        axis.put("from0.in1", offset)
+        axis.put("from1.in1", slope)
+
+    def why(self, now: float) -> str:
+        """Return why nothing is in force; empty if something can be."""
+        if now - self.echoed > STILL:
+            return "the controller stands still"
+        if hal.get_value("tc.on.out"):
+            return ""
+        if not hal.get_value("tc.homed.out"):
+            return "not homed"
+        return "off" if not hal.get_value("motion.motion-enabled") else "in joint mode"
+
+    def report(self, beat: int) -> dict[str, Any]:
+        """Return what is in force."""
+        now = time.monotonic()
+        why, limited = self.why(now), bool(hal.get_value("motion.eoffset-limited"))
+        micron = 1e-3 * self.unit
+        axes = {}
+        for letter, axis in self.axes.items():
+            alarm = ""
+            if not why and axis.aside is not None and now - axis.aside > PATIENCE:
+                alarm = "clipped at a soft limit" if limited else "does not follow: is OFFSET_AV_RATIO in the INI?"
+            share = 0.0 if why else 1.0  # LinuxCNC goes on showing an offset that it has made part of the position
+            axes[letter] = {
+                "offset": share * axis.get("offset.out") / micron,
+                "slope": share * axis.get("slope.out") * 1e6,
+                "reference": axis.middle / self.unit,
+                "position": hal.get_value(f"axis.{axis.letter}.pos-cmd") / self.unit,
+                "demand": share * axis.get("clip.out") / micron,
+                "in_force": share * hal.get_value(axis.in_force) / micron,
+                "alarm": alarm,
+            }
+        return {"beat": beat, "ticks": self.ticks, "suspended": why, "limited": limited, "axes": axes}
+
+    # -- the service ---------------------------------------------------------------------------------------------------
+
+    def accept(self) -> None:
+        """Let the service in; another one is told that there is one."""
+        connection, _ = self.listener.accept()
+        greeting = {"error": "another service is connected"} if self.client is not None else self.report(0)
+        with contextlib.suppress(OSError):
+            connection.sendall(json.dumps(greeting).encode() + b"\n")
+        if self.client is not None:
+            connection.close()
+            return
+        connection.setblocking(False)
+        self.client, self.buffer = connection, b""
+        self.selector.register(connection, selectors.EVENT_READ)
+        self.since = time.monotonic()
+
+    def drop(self) -> None:
+        """Let the service go."""
+        if self.client is not None:
+            self.selector.unregister(self.client)
+            self.client.close()
+            self.client = None
+
+    def receive(self) -> None:
+        """Take what was said, and answer."""
+        client = self.client
+        assert client is not None
+        try:
+            found = client.recv(65536)
+            if not found:
+                raise ConnectionError
+            *lines, self.buffer = (self.buffer + found).split(b"\n")
+            if max(map(len, [*lines, self.buffer])) > LONGEST:
+                raise ConnectionError
+            for line in lines:
+                try:
+                    answer = self.take(json.loads(line))
+                except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as e:
+                    answer = {"error": f"not understood: {type(e).__name__}: {e}"[:200]}
+                client.sendall(json.dumps(answer).encode() + b"\n")
+        except OSError:  # gone, or it does not listen to the answers
+            self.drop()
+
+    def take(self, message: dict[str, Any]) -> dict[str, Any]:
+        """Take a message: all of it or nothing."""
+        limits = {}
+        for name in ("magnitude", "rate"):
+            value = float(message.get(name, getattr(self.options, name)))
+            if not 0.0 < value < math.inf:
+                raise ValueError(name)
+            limits[name] = min(value, getattr(self.options, name))
+        lines = {letter: [float(v) for v in line] for letter, line in message.get("axes", {}).items()}
+        for letter, line in lines.items():
+            if letter not in self.axes:
+                raise ValueError(f"there is no axis {letter} here, only {', '.join(self.axes)}")
+            if len(line) != 3 or not all(map(math.isfinite, line)):
+                raise ValueError(f"axis {letter}: want three finite numbers")
+        beat = int(message["beat"])
+        self.heard = time.monotonic()
+        self.magnitude, self.rate = limits["magnitude"], limits["rate"]
+        for letter, (offset, slope, reference) in lines.items():
+            self.axes[letter].demand(offset, slope, reference, self.magnitude)
+            self.move(self.axes[letter], False)  # at once, rather than with the next tick
+        return self.report(beat)
+
+
+def join() -> Any:
+    """Return a component under a name that HAL does not know yet: those of components that were killed stay there."""
+    for k in itertools.count():
+        try:
+            return hal.component(NAME if k == 0 else f"{NAME}-{k}")
+        except hal.error:
+            if k >= MOST:
+                raise
+    return None
+
+
+def listen(path: str, group: str) -> socket.socket:
+    """Return a socket that listens, for this user, and for the members of a group if one is named."""
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    with contextlib.suppress(FileNotFoundError):  # a process that was killed leaves it
+        Path(path).unlink()
+    before = os.umask(0o177)
+    try:
+        listener.bind(path)
+    finally:
+        os.umask(before)
+    if group:
+        shutil.chown(path, group=group)
+        Path(path).chmod(0o660)
+    listener.listen(WAITING)
+    return listener
+
+
+def ending(child: "subprocess.Popen[bytes]") -> Callable[..., None]:
+    """Return what ends the process when this one is told to end."""
+    return lambda *_: child.terminate()
+
+
+def keep(arguments: list[str]) -> None:
+    """Run the component in a process of its own, and anew whenever it dies."""
+    here = Path(__file__).resolve()
+    while here.exists():
+        child = subprocess.Popen([sys.executable, str(here), *arguments, "--once"])
+        signal.signal(signal.SIGTERM, ending(child))
+        if child.wait() in (0, -signal.SIGTERM):
+            return
+        time.sleep(0.2)
+
+
+def main() -> None:
+    """Run."""
+    parser = argparse.ArgumentParser(description="The end of thermocomp inside LinuxCNC.")
+    parser.add_argument("--pattern", choices=("offset", "drive"), required=True)
+    parser.add_argument("--axis", action="append", required=True, help="letter,low,high: z,-200,100 [units of the INI]")
+    parser.add_argument("--socket", required=True)
+    parser.add_argument("--group", default="", help="whose members may connect")
+    parser.add_argument("--unit", choices=("mm", "inch"), default="mm")
+    for name, unit in (("magnitude", "um"), ("rate", "um/s"), ("timeout", "s"), ("hold", "s"), ("fade", "um/s")):
+        parser.add_argument(f"--{name}", type=float, required=True, help=unit)
+    parser.add_argument("--once", action="store_true", help="do not start it anew when it is killed")
+    options = parser.parse_args()
+    if not options.once:
+        keep(sys.argv[1:])
+        return
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC ends
+    try:
+        server = Server(options)
+    except RuntimeError as e:  # it would be started anew without end
+        print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
+        return
+    server.run()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,203 @@
+"""What a LinuxCNC configuration says of its axes, and what its HAL files already use."""
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from thermocomp.core.exceptions import InputError
+
+#: HAL files that come with LinuxCNC
+LIBRARY = Path("/usr/share/linuxcnc/hallib")
+_ARROWS = ("=>", "<=", "<=>")
+
+
+@dataclass(frozen=True)
+class Ini:
+    """An INI file of LinuxCNC, whose keys may stand there several times.
+
+    Parameters
+    ----------
+    path : Path
+    sections : dict of str to dict of str to list of str
+        Values by section and key.
+    """
+
+    path: Path
+    sections: dict[str, dict[str, list[str]]]
+
+    def get(self, section: str, key: str, default: str | None = None) -> str:
+        """Return a value.
+
+        Parameters
+        ----------
+        section, key : str
+        default : str, optional
+
+        Raises
+        ------
+        InputError
+            There is none, and no default.
+        """
+        found = self.sections.get(section, {}).get(key)
+        if found:
+            return found[0]
+        if default is None:
+            raise InputError(f"{self.path}: there is no {key} in [{section}]; is this the INI of the machine?")
+        return default
+
+    def number(self, section: str, key: str, default: float | None = None) -> float:
+        """Return a value that is a number.
+
+        Parameters
+        ----------
+        section, key : str
+        default : float, optional
+
+        Raises
+        ------
+        InputError
+            There is none, or it is none.
+        """
+        text = self.get(section, key, None if default is None else str(default))
+        try:
+            found = float(text)
+        except ValueError:
+            found = math.nan
+        if not math.isfinite(found):
+            raise InputError(f"{self.path}: [{section}] {key} = {text}: want a number")
+        return found
+
+
+@dataclass
+class HalFiles:
+    """What HAL files use, as far as it can be seen: no Tcl, no conditions.
+
+    Parameters
+    ----------
+    signals : dict of str to str
+        Signal by the pin that is on it.
+    pins : dict of str to list of str
+        Pins by signal, in the order in which they stand there.
+    modules : dict of str to tuple of str, int, str
+        File, line and arguments of ``loadrt``, by module.
+    functions : list of str
+        In the order in which the servo thread calls them.
+    unread : list of str
+        What cannot be seen through.
+    read : set of Path
+        Files that were read.
+    """
+
+    signals: dict[str, str] = field(default_factory=dict)
+    pins: dict[str, list[str]] = field(default_factory=dict)
+    modules: dict[str, tuple[str, int, str]] = field(default_factory=dict)
+    functions: list[str] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
+    read: set[Path] = field(default_factory=set)
+
+
+def read_ini(path: Path) -> Ini:
+    """Read an INI file of LinuxCNC.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    sections: dict[str, dict[str, list[str]]] = {}
+    keys: dict[str, list[str]] = {}
+    whole = ""
+    for raw in _lines(path):
+        whole += raw.strip()
+        if whole.endswith("\\") and whole[0] not in "#;":
+            whole = whole[:-1]
+            continue
+        line, whole = whole, ""
+        if line.startswith("[") and line.endswith("]"):
+            keys = sections.setdefault(line[1:-1].strip(), {})
+            continue
+        key, equals, value = line.partition("=")
+        if equals and key[0] not in "#;":  # LinuxCNC, too, takes no notice of the rest
+            keys.setdefault(key.strip(), []).append(value.strip())
+    return Ini(path, sections)
+
+
+def read_hal(ini: Ini, leave: str) -> HalFiles:
+    """Read the HAL files that an INI names.
+
+    Parameters
+    ----------
+    ini : Ini
+    leave : str
+        Name of the file that is ours.
+
+    Raises
+    ------
+    InputError
+        One cannot be read.
+    """
+    found, later = HalFiles(), HalFiles()
+    for key, into in (("HALFILE", found), ("POSTGUI_HALFILE", later)):
+        for name in ini.sections.get("HAL", {}).get(key, []):
+            path = _find(ini, name)
+            if path.name == leave:
+                continue
+            if path.suffix != ".hal" or len(name.split()) > 1:
+                into.unread.append(name)
+                continue
+            _read_one(path, ini, into)
+    found.signals = later.signals | found.signals  # a pin can be on one signal only, whoever puts it there
+    return found
+
+
+def _find(ini: Ini, name: str) -> Path:
+    """Return the path of a HAL file: beside the INI, or one that comes with LinuxCNC."""
+    first = (name.split() or [""])[0]
+    path = ini.path.parent / Path(first.removeprefix("LIB:")).expanduser()
+    return LIBRARY / path.name if first.startswith("LIB:") or not path.exists() else path
+
+
+def _read_one(path: Path, ini: Ini, found: HalFiles) -> None:
+    if path in found.read:
+        return
+    found.read.add(path)
+    whole = ""
+    for k, raw in enumerate(_lines(path), 1):
+        whole += raw.split("#", 1)[0].strip()
+        if whole.endswith("\\"):
+            whole = f"{whole[:-1]} "
+            continue
+        words, whole = _filled(whole, ini).split(), ""
+        if not words:
+            continue
+        verb, rest = words[0].lower(), [w for w in words[1:] if w not in _ARROWS]
+        if verb == "net" and rest:
+            found.pins.setdefault(rest[0], []).extend(rest[1:])
+            found.signals.update(dict.fromkeys(rest[1:], rest[0]))
+        elif verb == "loadrt" and rest:
+            found.modules[rest[0]] = (path.name, k, " ".join(rest[1:]))
+        elif verb == "addf" and len(rest) > 1:
+            place = int(rest[2]) if len(rest) > 2 and rest[2].lstrip("+-").isdigit() else -1
+            at = place - 1 if place > 0 else len(found.functions) + place + 1
+            found.functions.insert(at, rest[0])
+        elif verb == "source" and rest:
+            _read_one(path.parent / rest[0], ini, found)
+        elif verb in ("linksp", "linkps", "linkpp"):
+            found.unread.append(f"{path.name} (line {k}: {verb})")
+
+
+def _filled(line: str, ini: Ini) -> str:
+    """Return a line with the values of the INI in the place of ``[SECTION]KEY`` and ``[SECTION](KEY)``."""
+    return re.sub(r"\[(\w+)\](?:\((\w+)\)|(\w+))", lambda m: ini.get(m[1], m[2] or m[3], m[0]) if m[1] else m[0], line)
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as e:
+        raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
