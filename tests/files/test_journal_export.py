@@ -208,6 +208,24 @@ def test_a_probing_without_a_confirmation(includes_offset: bool, known: int, tmp
     assert table["z_residual_um"].notna().tolist() == [not known]
 
 
+@pytest.mark.parametrize("own", ["on", "unknown"])
+@pytest.mark.parametrize("includes_offset", [True, False])
+def test_a_probing_beside_another_compensation(own: Any, includes_offset: bool, tmp_path: Path) -> None:
+    rows: list[Row] = [
+        ConfirmationRow(BEGIN, "z_um", Correction(-12.0)),
+        ReadingRow(BEGIN, {"t1_C": 20.0}),
+        MeasurementRow(BEGIN, "z_um", 3.0, "probing", includes_offset, 0.0, Correction(-12.0)),
+        ReadingRow(BEGIN + 1, {"t1_C": 20.0}),
+        MeasurementRow(BEGIN + 1, "z_um", 3.0, "probing", False, 0.0, Correction(-12.0)),
+    ]
+    found = export(journal_of(tmp_path / "live.db", Start(BEGIN, (Target("z_um"),), (HEAT,), own, 15.0), rows))
+    assert found.recording.compensation == "unknown"
+    table = found.recording.table
+    assert table["z_um"].isna().all()
+    assert table["z_correction_um"].isna().all()
+    assert table["z_residual_um"].notna().tolist() == [not includes_offset, True]
+
+
 def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
     rows: list[Row] = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
     start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
