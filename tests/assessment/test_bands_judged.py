@@ -165,8 +165,9 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
     assert model.band.tell("um") in shown
     assert f"held {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
     assert "(90 % band by assumption, 3 cycles)" in shown
-    judged = study.assess([model], [small_machine((1500.0, 2000.0), seed=3)])
-    show_assess(judged, (), console, as_json=False)
+    tests = [small_machine((1500.0, 2000.0), seed=3)]
+    judged = study.assess([model], tests)
+    show_assess(judged, tests, (), console, as_json=False)
     shown = capsys.readouterr().out
     assert "90 % band by assumption, 4 cycles: half-width at least" in shown
     assert 0.0 < judged.overall()[0].half_width < 100.0

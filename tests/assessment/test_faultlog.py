@@ -15,6 +15,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
+from thermocomp.report.faults import describe_faults
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.watch import GOOD
 
@@ -170,3 +171,41 @@ def test_rows_of_an_earlier_file_are_gone_through_and_not_counted(model: ErrorMo
     assert len(log.time) == len(second)
     costs = find_costs(model, judged.overall()[0], [log])
     assert [c.failed for c in costs] == [("t1_C",), ("t1_C", "t2_C")]
+
+
+def test_a_sensor_that_is_missing_from_the_first_row_on_is_stood_in_for(model: ErrorModel) -> None:
+    recording = failing(t1_C=(0.0, None))
+    judged = study.assess([model], [recording], starts=Start())
+    (log,) = find_faults(judged, [recording])
+    (whole,) = judged.overall()
+    _, said, _ = live(model, recording)
+    assert log.failed == ("t1_C",)
+    assert log.faults[0].begin <= 360.0  # once its zero, the mean of five minutes, is known
+    assert whole.predicted == pytest.approx(said, abs=0.1)
+    assert rms(whole.measured, said) < 0.5 * rms(whole.measured, 0.0 * said)
+
+
+def test_the_band_is_that_without_the_sensors_that_failed(model: ErrorModel) -> None:
+    assert model.band is not None
+    good, lost, harm = (
+        study.assess([model], [failing(**cuts)], starts=Start()).overall()[0].half_widths
+        for cuts in ({}, {"t2_C": (4.0, None)}, {"t3_C": (4.0, None)})
+    )
+    assert good is not None
+    assert lost is not None
+    assert harm is not None
+    assert np.isfinite(good).all()
+    ratio = lost / good
+    assert ratio[0] == 1.0
+    assert ratio[-1] == pytest.approx(2.5 / 1.25, rel=0.3)
+    assert np.isfinite(harm[0])
+    assert np.isnan(harm[-1])
+
+
+def test_the_failures_are_told(model: ErrorModel) -> None:
+    recording = failing(t1_C=(4.0, 4.0), t2_C=(6.0, None))
+    logs = find_faults(study.assess([model], [recording], starts=Start()), [recording])
+    first, second = describe_faults(logs, [recording])
+    assert first.startswith("failing: t1_C stepped from 4.")
+    assert " to the end; it read +" in first
+    assert second == "failing: t2_C missing from 6.00 h to the end"

@@ -14,7 +14,10 @@ from smallmill import write_mill
 
 from thermocomp.cli import app
 from thermocomp.cli.app import run
+from thermocomp.core.machine import Channel
 from thermocomp.files import recordings
+from thermocomp.files.journal import Journal, JournalLimits
+from thermocomp.files.journalrows import AlarmRow, ReadingRow, Start, Target
 from thermocomp.papers import studies
 from thermocomp.papers.study import Claim, Study, StudyTable
 
@@ -152,6 +155,18 @@ def test_a_linuxcnc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_revision(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert held("revise", capsys, "part.ngc", "--model", "model.json", "--cold", "-o", "out.ngc")["axes"]
+
+
+def test_a_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    start = Start(1e9, (Target("z_um"),), (Channel("z_um", "displacement", "um"),), "off")
+    journal = Journal.open("live.db", JournalLimits(), start)
+    assert held("journal", capsys, "show", "live.db")["counts"]["reading"] == 0
+    for row in (ReadingRow(1e9, {"z_um": 1.0}), AlarmRow(1e9, "sensor", "stuck")):
+        journal.add(row)
+    journal.close()
+    assert held("journal", capsys, "show", "live.db")["events"]
+    assert held("journal", capsys, "export", "live.db", "-o", "out.csv")["compensation"] == "unknown"
 
 
 @pytest.mark.usefixtures("interpreter")

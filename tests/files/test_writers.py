@@ -31,6 +31,7 @@ GIVEN = {
     "adapters/linuxcnc/verification/verify.py": {"of": 1},
     "api/revision/expanded.py": {"write_expanded": 1},
     "api/revision/job.py": {"_write": 3},
+    "files/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
     "files/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
     "service/loop.py": {"_begin": 1},  # a state that is refused is moved aside, not lost
 }

@@ -86,6 +86,20 @@ def test_two_that_agree_are_taken_and_a_third_that_does_not_is_not() -> None:
     assert after.shift(61.0, np.ones(1)) == pytest.approx(41.0, rel=0.01)
 
 
+def test_an_error_that_lasts_is_taken_each_time_once_two_probings_agreed() -> None:
+    found, refused = adaptation.begin(2.0, 0), list[int]()
+    for k in range(1, 13):
+        found, why = adaptation.take(found, np.zeros(0), 2 * HOUR * k, 60.0, 0.5)
+        refused += [k] if why else []
+        if k > 1:
+            assert found.shift(2 * HOUR * k, np.zeros(0)) == pytest.approx(60.0, rel=0.02)
+    assert refused == [1]
+    assert found.narrowing(20 * OFFSET + found.time, np.zeros(0), 1.0) == pytest.approx(10.0)
+    wild, why = adaptation.take(found, np.zeros(0), 26 * HOUR, 300.0, 0.5)
+    assert why
+    assert wild.shift(26 * HOUR, np.zeros(0)) < 60.0
+
+
 @given(
     st.lists(
         st.tuples(st.floats(0.0, 1e6), st.floats(-1e3, 1e3), st.floats(-50.0, 50.0), st.floats(0.0, 5.0)), max_size=60

@@ -7,10 +7,13 @@ from typing import Any
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
-from thermocomp.core.reading import Reading
+from thermocomp.core.reading import Measurement, Reading
 
 #: bytes of a message, and values in it, at most
 MOST_BYTES, MOST_VALUES = 65_536, 1_000
+#: numbers of a measurement, and what they are if it does not say; it has to say the first
+_NUMBERS = {"measured_um": None, "repeatability_um": 0.5, "position_mm": 0.0}
+_KNOWN = {"time", "target", "under_correction", *_NUMBERS}
 
 
 def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str]) -> Reading:
@@ -31,14 +34,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     ReadingError
         It is too large, no JSON, or no table.
     """
-    if len(payload) > MOST_BYTES:
-        raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,}")
-    try:
-        content = json.loads(payload)
-    except (ValueError, RecursionError) as e:
-        raise ReadingError(f"a message that is no JSON: {str(e)[:80]}") from e
-    if not isinstance(content, dict):
-        raise ReadingError(f'a message that is no table of values: {str(content)[:40]}; want {{"t1_C": 21.3}}')
+    content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
         raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,}")
     stamp = content.pop("time", None)
@@ -48,6 +44,35 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     return Reading(arrived if stamp is None else float(stamp), values)
 
 
+def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
+    """Return the measurement of the tool point in a message.
+
+    Parameters
+    ----------
+    payload : bytes or str
+        JSON: ``{"target": "z_um", "measured_um": 3.2, "under_correction": true}``; with ``repeatability_um``,
+        ``position_mm`` and ``time`` (s since 1970) if they are known.
+    arrived : float
+        The clock, now [s]: its time if it does not say.
+
+    Raises
+    ------
+    ReadingError
+        It is too large, no JSON, or not such a table: whether it was measured under the correction has to be in it.
+    """
+    example = '{"target": "z_um", "measured_um": 3.2, "under_correction": true}'
+    content = _table(payload, example)
+    found = {k: _number(content.get(k, default)) for k, default in _NUMBERS.items()}
+    found["time"] = _number(content.get("time", arrived))
+    target, left = content.get("target"), content.get("under_correction")
+    wrong = [k for k, v in found.items() if v is None] + ["target"] * (not isinstance(target, str))
+    wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
+    if wrong:
+        raise ReadingError(f"a measurement whose {', '.join(wrong)[:80]} cannot be used; want {example}")
+    at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
+    return Measurement(at, str(target)[:200], measured, bool(left), spread, position)
+
+
 def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:
     """Return corrections as a message: offset [um], slope [um/m] and reference position [mm] by axis or target."""
     table = {
@@ -55,6 +80,18 @@ def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:
         for name, c in corrections.items()
     }
     return json.dumps({"time": stamp, "corrections": table}, allow_nan=False)
+
+
+def _table(payload: bytes | str, example: str) -> dict[str, Any]:
+    if len(payload) > MOST_BYTES:
+        raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,}")
+    try:
+        content = json.loads(payload)
+    except (ValueError, RecursionError) as e:
+        raise ReadingError(f"a message that is no JSON: {str(e)[:80]}") from e
+    if not isinstance(content, dict):
+        raise ReadingError(f"a message that is no table of values: {str(content)[:40]}; want {example}")
+    return content
 
 
 def _number(value: Any) -> float | None:

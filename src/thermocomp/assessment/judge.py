@@ -57,7 +57,7 @@ def judge(
     limits: Limits | None = Limits(),
     guard: Guard | None = None,
     probings: Probings | None = None,
-    watched: Samples | None = None,
+    widening: FloatArray | None = None,
 ) -> Assessment:
     """Judge a frozen model on a block: what a compensator with it would have left there.
 
@@ -87,8 +87,8 @@ def judge(
         What a watch that knows nothing of the block lets through while sensors fail; without it nothing notices.
     probings : Probings, optional
         Made in the block.
-    watched : Samples, optional
-        Of the model's watch, see `replay_compensated`.
+    widening : ndarray of shape (n_rows,), optional
+        See `replay_compensated`.
 
     Returns
     -------
@@ -104,8 +104,8 @@ def judge(
     measured = samples.deviations[rows, target]
     if learned is None and model.provenance is not None:
         learned = model.provenance.learned
+    ran = replay_compensated(model, samples, rows, limits or Limits(), probings, widening)
     stressed = stress(model, samples, measured, rows, guard=guard) if robustness else None
-    ran = replay_compensated(model, samples, rows, limits or Limits(), probings, watched)
     predicted = ran.deviation if limits is None else ran.compensated
     if not np.isfinite(metrics.rms(measured, ran.deviation)):
         return refuse_method(samples, name, target, split, f"the residual of {model.target} is beyond all numbers")

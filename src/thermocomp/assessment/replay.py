@@ -66,7 +66,7 @@ def replay_compensated(
     rows: BoolArray,
     limits: Limits = Limits(),
     probings: Probings | None = None,
-    watched: Samples | None = None,
+    widening: FloatArray | None = None,
 ) -> Replayed:
     """Replay a model and a compensator with it over the tests that hold `rows`, from the start of each test.
 
@@ -84,16 +84,17 @@ def replay_compensated(
     probings : Probings, optional
         Made in the rows that are judged, from the first of each test on: the only displacements that are used, each
         from the next row on.
-    watched : Samples, optional
-        The same rows with all inputs of the model's watch, as they were recorded: see `stack_watched`. What the watch
-        finds failed is replaced; a correction that must not run without it is held, then fades.
+    widening : ndarray of shape (n_rows,), optional
+        The samples are what a watch lets through, and this is what came with them: see `believe`. Without it the
+        model's own watch looks at them first.
 
     Returns
     -------
     Replayed
     """
     columns, within = _columns(model, samples), limits if model.unit == "um" else None
-    samples, undriven = believe(model, samples, rows, watched)
+    if widening is None:
+        samples, widening = believe(model, samples, rows)
     n, why = len(samples), ""
     deviation, compensated, half_width = np.zeros(n), np.zeros(n), np.full(n, np.nan)
     outside, rejected = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
@@ -116,14 +117,16 @@ def replay_compensated(
             reference=given_zero(samples, columns, test),
             resting=samples.stands[mine],
             anew=None if anew is None else int(np.flatnonzero(mine == anew)[0]),
-            undriven=undriven[mine],
+            undriven=np.isinf(widening[mine]),
             probed=probed,
             repeatability=probings.repeatability if probings else 0.0,
         )
         shift[mine], without[mine] = found.shift, found.without
         refused += [f"{samples.test_names[test]}: {why}" for why in found.refused]
         deviation[mine], compensated[mine] = found.deviation, found.compensated
-        outside[mine], rejected[mine], half_width[mine] = found.outside, found.rejected, found.half_width
+        outside[mine], rejected[mine] = found.outside, found.rejected
+        # how wrong the model is where it must not run was never judged: no band
+        half_width[mine] = found.half_width * np.where(np.isinf(widening[mine]), np.nan, widening[mine])
         if found.why and not why:
             why = f"{samples.test_names[test]}: {found.why}"
     seen = Probed(probings, at[rows], shift[rows], without[rows], tuple(refused)) if probings else None
@@ -134,10 +137,11 @@ def replay_compensated(
 
 def believe(
     model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
-) -> tuple[Samples, BoolArray]:
-    """Return samples as a model's watch lets them through, and where its correction is held, in the tests of `rows`.
+) -> tuple[Samples, FloatArray]:
+    """Return samples as a model's watch lets them through, and what that does to its band, in the tests of `rows`.
 
-    They are the same, and nothing is held, without a watch or its speeds. Rows without a speed are passed on unchanged.
+    They are the same, and it stays as it is, without a watch or its speeds. Rows without a speed are passed on as they
+    are.
 
     Parameters
     ----------
@@ -145,30 +149,34 @@ def believe(
     samples : Samples
     rows : ndarray of bool of shape (n_rows,)
     watched : Samples, optional
-        See `replay_compensated`.
+        The same rows with all inputs of the model's watch, as they were recorded: see `stack_watched`. What the watch
+        finds failed is replaced.
 
     Returns
     -------
     samples : Samples
-    undriven : ndarray of bool of shape (n_rows,)
+    widening : ndarray of shape (n_rows,)
+        See `ErrorModel.widening`; infinite where the model must not run, and its correction is held.
     """
-    undriven, watch, seen = np.zeros(len(samples), dtype=np.bool_), model.watch, watched or samples
+    widening, watch, seen = np.ones(len(samples)), model.watch, watched or samples
     if watch is None or not can_look(watch, seen):
-        return samples, undriven
+        return samples, widening
     names, values = [c.name for c in samples.inputs], samples.values.copy()
     known = [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
-    fault, allowed = np.zeros(len(watch.names), dtype=np.int8), True
+    fault, wider = np.zeros(len(watch.names), dtype=np.int8), 1.0
     for test in np.unique(samples.test[rows]).tolist():
         for row, state, let in look_through(watch, seen, test):
             values[row, places] = let[known]
             if (state.fault != fault).any():
                 fault = state.fault
                 failed = [n for n, f in zip(watch.names, fault.tolist(), strict=True) if f and n in model.sensors]
-                allowed = not failed or model.may_lose(failed)
-            undriven[row] = not allowed
-        fault, allowed = np.zeros_like(fault), True
-    return replace(samples, values=values), undriven
+                wider = 1.0
+                if failed:
+                    wider = model.widening(failed) if model.may_lose(failed) else np.inf
+            widening[row] = wider
+        fault, wider = np.zeros_like(fault), 1.0
+    return replace(samples, values=values), widening
 
 
 def stack_watched(

@@ -17,7 +17,7 @@ from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.pieces import explain
 from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.refit import stress_written
-from thermocomp.assessment.replay import are_absolute, stack_watched
+from thermocomp.assessment.replay import are_absolute, believe, stack_watched
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -37,6 +37,7 @@ from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start, find_starts
 
 BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
 
 
 def _silent(_: str) -> None:
@@ -274,7 +275,10 @@ def assess(
         try:
             samples = _stacked(model, recordings, starts)
             watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
-            overall, judged = _assess(model, _called_as_in(model, samples), rules, limits, probings, watched)
+            samples = _called_as_in(model, samples)
+            known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
+            samples, widening = believe(model, samples, every, watched)
+            overall, judged = _assess(model, samples, known, rules, limits, probings, widening)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
@@ -356,12 +360,13 @@ def _hashes(model: ErrorModel) -> tuple[str, ...]:
 def _assess(
     model: ErrorModel,
     samples: Samples,
+    known: BoolArray,
     rules: Rules,
     limits: Limits,
     probings: Probings | None,
-    watched: Samples | None,
+    widening: FloatArray,
 ) -> tuple[Assessment, Judging]:
-    """Judge a model on what it has not learned from; on everything if there is nothing else, and say so.
+    """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
 
     Returns
     -------
@@ -369,7 +374,6 @@ def _assess(
     Judging
         Its units.
     """
-    known = find_learned_rows(model, samples)
     judged = np.isfinite(samples.deviations[:, 0])
     n, of = int((known & judged).sum()), int(judged.sum())
     caveat = ""
@@ -382,7 +386,7 @@ def _assess(
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings, watched=watched)
+    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings, widening=widening)
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging

@@ -45,6 +45,7 @@ COMMANDS = {
     "leave of it.",
     "revise": "Correct an NC program by the drift it will cause, before it is run.",
     "serve": "Run the compensator live: sensors in, corrections out, with a page to watch.",
+    "journal": "Tell what a journal of the live compensator holds, or export it as a recording.",
     "linuxcnc": "Write what a LinuxCNC needs to be corrected, and say what to change in its configuration.",
     "papers": "Redo the papers' studies on the virtual machine: their number, ours, and whether their claim holds "
     "here.",

@@ -91,6 +91,6 @@ def assess(
         from thermocomp.report import assessed
 
         assessed.write(judged, tests, output, overwrite=overwrite)
-    out.show_assess(judged, trouble, console, as_json=json, report=output)
+    out.show_assess(judged, tests, trouble, console, as_json=json, report=output)
     before = {m.honest_error.word for m in judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in judged.overall()} else 0

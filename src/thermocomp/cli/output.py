@@ -9,6 +9,7 @@ from rich.console import Console
 from thermocomp.assessment import coverage
 from thermocomp.assessment.choice import Choice
 from thermocomp.assessment.do_no_harm import JudgedUnit
+from thermocomp.assessment.faultlog import find_faults
 from thermocomp.assessment.results import Assessment, Comparison
 from thermocomp.assessment.study import Fitted, Judged
 from thermocomp.cli.jsonoutput import print_json
@@ -17,6 +18,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
+from thermocomp.report.faults import describe_faults
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
@@ -158,9 +160,16 @@ def show_fit(fitted: Fitted, path: Path, trouble: Sequence[str], console: Consol
 
 
 def show_assess(
-    judged: Judged, trouble: Sequence[str], console: Console, *, as_json: bool, report: Path | None = None
+    judged: Judged,
+    recordings: Sequence[Recording],
+    trouble: Sequence[str],
+    console: Console,
+    *,
+    as_json: bool,
+    report: Path | None = None,
 ) -> None:
     """Print how models did on recordings."""
+    logs = find_faults(judged, recordings)
     if as_json:
         content = {
             "seen_in_training": judged.seen,
@@ -170,11 +179,14 @@ def show_assess(
             "trouble": trouble,
             "validity": asdict(judged.validity) if judged.validity is not None else None,
             "validity_when_fitted": {m.target: asdict(m.validity) for m in judged.models if m.validity is not None},
+            "failed_sensors": [{"recording": log.name, **f._asdict()} for log in logs for f in log.faults],
             "results": [records.assessment(a) for a in judged.assessments],
         }
         print_json(content)
         return
     _tell_starts(judged.starts, console)
+    for line in describe_faults(logs, recordings):
+        console.print(f"[yellow]sensor failed[/] {words(line)}", soft_wrap=True)
     print_table(_assessment_table(judged.assessments), console)
     print_table(_cycle_table(judged.assessments), console)
     print_table(_robustness(judged.overall()), console)
@@ -256,7 +268,7 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
     rows = [
         {
             "target": a.target,
-            "clean": a.metric("rms"),
+            "clean": a.unprobed_metric("rms"),  # noise and losses are tried without probings
             **{law: mean for law, (mean, _) in a.robustness.noise_rms.items()},
             "lost": "{1:.2f} ({0})".format(*a.robustness.worst_lost),
             "outside": f"{100 * a.robustness.outside:.1f} %",
@@ -264,7 +276,8 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
         for a in assessments
         if a.robustness is not None
     ]
-    return Layout(columns, rows, "Robustness: RMS in um")
+    probed = any(a.probed is not None for a in assessments)
+    return Layout(columns, rows, f"Robustness: RMS in um{', without probings' if probed else ''}")
 
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Layout:

@@ -2,18 +2,17 @@
 
 import asyncio
 import contextlib
+import secrets
 import signal
+from collections.abc import Coroutine, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
-
-if TYPE_CHECKING:
-    from thermocomp.service.loop import Service
 
 #: seconds of the virtual machine in one of the world, in the demo
 _SPEED = 60
@@ -63,27 +62,40 @@ def serve(
         raise InputError("name a configuration (a TOML file), or --demo")
     path = _demo(output) if config is None else config
     settings = read_config(path)
+    page = settings.config.page
     if port is not None:
-        page = settings.config.page or Page()
-        settings = settings._replace(config=replace(settings.config, page=replace(page, port=port)))
+        page = replace(page or Page(), port=port)
     service = build(settings)
     for target in service.compensator.lines:
         order = service.state.orders.get(target)
         console.print(
             words(f"{target}: {'runs' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
         )
-    if not check:
-        asyncio.run(_run(service))
+    if check:
+        return 0
+    work: list[Coroutine[Any, Any, None]] = [service.run()]
+    if page is not None:
+        from thermocomp.service import web
+        from thermocomp.service.page import make_app
+
+        token = web.read_token(settings.folder / page.token_file) if page.token_file else ""
+        listening = web.listen(page.host, page.port)
+        host, number = listening.getsockname()[:2]
+        console.print(f"Page: http://{f'[{host}]' if ':' in host else host}:{number}", soft_wrap=True)
+        work.append(web.serve(make_app(service, token, page.settled, (page.host,)), listening))
+    asyncio.run(_run(work))
     return 0
 
 
-async def _run(service: "Service") -> None:
+async def _run(work: Sequence[Coroutine[Any, Any, None]]) -> None:
     loop, task = asyncio.get_running_loop(), asyncio.current_task()
     assert task is not None
     for name in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(name, task.cancel)
     with contextlib.suppress(asyncio.CancelledError):
-        await service.run()
+        async with asyncio.TaskGroup() as group:
+            for one in work:
+                group.create_task(one)
     console.print("stopped: the corrections stay as they are; the state is saved")
 
 
@@ -99,6 +111,10 @@ def _demo(folder: Path) -> Path:
     if not config.exists():
         text = _CONFIG.format(speed=_SPEED)
         write_text(text, config, overwrite=False)
+    if not (token := folder / "token.txt").exists():
+        write_text(secrets.token_hex(16) + "\n", token, overwrite=False)
+        token.chmod(0o600)
+    console.print(words(f"Token for the page's buttons: {token}"), soft_wrap=True)
     return config
 
 
@@ -106,6 +122,7 @@ _CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fa
 models = ["model.json"]
 state = "state.json"
 speed = {speed}.0
+own_compensation = "off"
 
 [[sources]]
 kind = "simulated"
@@ -116,6 +133,14 @@ seed = 7
 kind = "file"
 file = "corrections.json"
 
+[[probes]]
+kind = "simulated"
+every = 7200.0
+
+[journal]
+file = "live.db"
+
 [page]
 port = 8731
+token_file = "token.txt"
 """

@@ -100,6 +100,20 @@ class Correction:
         return self.offset + self.slope * 1e-3 * (position - self.reference_position)
 
 
+def uncompensated(residual: _Position, correction: _Position) -> _Position:
+    """Return the deviation without the correction: what is measured under it less what it adds.
+
+    The tool point is off by the residual: by the deviation, which the machine makes, and the correction, which the
+    controller adds. Both count from the same zero; this is the one place where they are parted.
+
+    Parameters
+    ----------
+    residual, correction : float or ndarray
+        [um]
+    """
+    return residual - correction
+
+
 @dataclass(frozen=True)
 class Limits:
     """What a correction may never do.

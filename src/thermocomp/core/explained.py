@@ -309,6 +309,8 @@ def _lines(e: Explanation) -> list[str]:
     lines += [f"  {_sensor_line(s, e.unit)}" for s in e.sensors]
     if e.pairs[0]:
         lines.append(f"Two lost at once: judged for {e.pairs[0]} pairs, {e.pairs[1]} of which it may lose.")
+    elif len(watched) > 1:
+        lines.append("Two lost at once: not judged for so many; the correction is held, then fades.")
     return lines
 
 

@@ -198,7 +198,8 @@ def understand(heading: str) -> Meaning | None:
     Returns
     -------
     Meaning or None
-        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``).
+        None if there is no unit in it. A length is a position where the heading says so (``x_mm``, ``pos_x_mm``), or a
+        residual or correction of a machine under compensation (``z_residual_um``, ``z_correction_um``).
 
     Raises
     ------
@@ -218,8 +219,8 @@ def understand(heading: str) -> Meaning | None:
     other = (meant.symbol == "K" and _DIFFERENCE.fullmatch(base)) or _ELECTRIC.search(base)
     if other or (meant.quantity == "time" and find_named_quantity(base)):
         return None  # T1_min is the least of T1
-    if meant.quantity == "displacement" and _is_position(base, meant.symbol):
-        meant = find_unit(meant.symbol, "position")
+    if meant.quantity == "displacement":
+        meant = find_unit(meant.symbol, _kind_of_length(base, meant.symbol))
     # one word, so that the name can go into a formula or a controller
     return Meaning(f"{'_'.join(base.split())}_{HOUSE_SUFFIX[meant.house]}", base, meant)
 
@@ -230,11 +231,12 @@ def _suffix(heading: str) -> str:
     return max(ends, key=len, default="")
 
 
-def _is_position(base: str, symbol: str) -> bool:
+def _kind_of_length(base: str, symbol: str) -> str:
+    """Return the quantity of a length by its name."""
     words = re.split(r"[\s_.-]+", base.casefold())
-    if any(w in ("pos", "position") for w in words):
-        return True
-    return symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)
+    if any(w in ("pos", "position") for w in words) or (symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)):
+        return "position"
+    return next((w for w in words if w in ("residual", "correction")), "displacement")
 
 
 def _in_brackets(heading: str) -> tuple[str, Unit] | None:

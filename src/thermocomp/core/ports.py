@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Mapping
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.reading import Reading
+from thermocomp.core.reading import Measurement, Reading
 
 
 class Status(NamedTuple):
@@ -40,11 +40,41 @@ class Source(Protocol):
 
 
 @runtime_checkable
+class Probe(Protocol):
+    """Where measurements of the tool point come from while the machine runs."""
+
+    async def connect(self, timeout: float) -> None:
+        """Connect within so long [s], or raise `ThermocompError` with the reason."""
+        ...
+
+    def measurements(self) -> AsyncIterator[Measurement]:
+        """Return measurements as they come, until the probe ends or fails."""
+        ...
+
+    def status(self) -> Status:
+        """Return how the connection is, at once."""
+        ...
+
+    async def close(self) -> None:
+        """Give back what was taken; a second time does nothing."""
+        ...
+
+
+@runtime_checkable
 class Confirming(Protocol):
     """A sink that knows what is in force at the controller."""
 
     async def confirmed(self) -> Mapping[str, Correction] | None:
         """Return the correction in force per axis or target; None if that is not known."""
+        ...
+
+
+@runtime_checkable
+class Suspending(Protocol):
+    """A sink that knows when the controller can have no correction in force, such as before homing."""
+
+    def suspended(self) -> Mapping[str, str]:
+        """Return axes or targets without a correction in force, and why, as it was told last."""
         ...
 
 

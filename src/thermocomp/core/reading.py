@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -28,3 +29,14 @@ class Reading:
     time: float
     values: Mapping[str, float]
     positions: Mapping[str, float] = field(default_factory=dict)
+
+
+class Measurement(NamedTuple):
+    """The tool point of a target or axis, measured while the machine runs."""
+
+    time: float  #: seconds since 1970
+    target: str
+    measured: float  #: deviation [um]
+    left: bool  #: it is what the correction in force left; otherwise the correction is not in it
+    repeatability: float = 0.5  #: standard deviation [um]
+    position: float = 0.0  #: on the axis [mm]

@@ -47,6 +47,9 @@ HOUSE_UNITS: dict[str, str] = {
     "feed": "mm/min",
     "acceleration": "mm/s2",
     "dimensionless": "1",
+    # of a machine under compensation: what is left of a displacement, and what the controller adds
+    "residual": "um",
+    "correction": "um",
 }
 
 _UNITS = [
@@ -80,6 +83,9 @@ _UNITS = [
     Unit("m/s2", "acceleration", "mm/s2", 1e3),
     Unit("1", "dimensionless", "1", 1.0),
 ]
+#: measured as displacements are; no message offers them
+_COMPENSATED = ("residual", "correction")
+_UNITS += [replace(u, quantity=q) for q in _COMPENSATED for u in _UNITS if u.quantity == "displacement"]
 
 #: spellings met in files
 _ALIASES = {
@@ -183,7 +189,7 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
     if quantity is None and fitting:
         return fitting[0]
     if fitting:
-        measures = " or ".join(dict.fromkeys(u.quantity for u in fitting))
+        measures = " or ".join(dict.fromkeys(u.quantity for u in fitting if u.quantity not in _COMPENSATED))
         usable = ", ".join(u.symbol for u in _UNITS if u.quantity == quantity)
         raise UnitError(f"unit {symbol!r} measures {measures}, not {quantity}; for {quantity} use one of {usable}")
     known = list(dict.fromkeys([u.symbol for u in _UNITS] + [a for a in (*_ALIASES, *_WORDS) if a]))

@@ -31,6 +31,8 @@ Role = Literal[
     "angle",
     "feed",
     "dimensionless",
+    "residual",
+    "correction",
     "cycle",
     "ignore",
 ]
@@ -180,6 +182,8 @@ class Mapping:
     clean : tuple of Step
         What is changed in the values that were read, in this order; see `thermocomp.recording.cleaning`.
     limits : Limits
+    compensation : {'', 'off', 'known', 'unknown'}
+        Whether a correction was in force at the machine; see `thermocomp.recording.compensated`.
     """
 
     time: TimeColumn = TimeColumn()
@@ -188,6 +192,7 @@ class Mapping:
     cycles: CycleRule = CycleRule()
     clean: tuple[CleaningStep, ...] = ()
     limits: Limits = Limits()
+    compensation: Literal["", "off", "known", "unknown"] = ""
 
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
@@ -209,11 +214,12 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping with what only `below` says about the time and the file's columns added."""
+        """Return this mapping with what only `below` says of time, compensation and columns added."""
         time = below.time if self.time == TimeColumn() else self.time
         taken = {rule.column or name for name, rule in self.columns.items()}
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
-        return replace(self, time=time, columns={**added, **self.columns})
+        said = self.compensation or below.compensation
+        return replace(self, time=time, columns={**added, **self.columns}, compensation=said)
 
 
 #: the one door for a mapping from outside; also used for the one that thermocomp writes into its own files

@@ -156,6 +156,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         notes=_shorten(notes, len(numeric)),
         changed=_shorten(changed, 0),
         place=table.place,
+        compensation=mapping.compensation,
     )
     return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
 
@@ -192,6 +193,7 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
         aliases=rows.aliases,
         notes=(*rows.notes, *rows.changed),
         changed=rows.changed,
+        compensation=rows.compensation,
     )
     return recording.with_cycles(_cycles(recording, labels, rows))
 
@@ -222,7 +224,8 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     headings = {}
     for c in recording.channels:
         meaning = understand(c.name)
-        known = meaning is not None and (meaning.name, meaning.unit.symbol) == (c.name, c.unit)
+        said = meaning and (meaning.name, meaning.unit.symbol, meaning.unit.quantity)
+        known = said == (c.name, c.unit, c.quantity)
         heading = c.name if known else f"{c.name} [{c.unit}]".strip()
         if not known or c.place:
             column = "" if known else heading
@@ -235,8 +238,9 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
         names = [f"{k}: {name}" for k, name in enumerate(names, start=1)]
     names = [_as_written(name, as_text=as_text) for name in names]
     out["cycle"] = np.repeat(names, [len(c) for c in recording.cycles])
-    embedded = Mapping(TimeColumn(column="time_s", unit="s", start=recording.start), described)
-    needed = bool(described or recording.start)
+    time = TimeColumn(column="time_s", unit="s", start=recording.start)
+    embedded = Mapping(time, described, compensation=recording.compensation)  # type: ignore[arg-type]
+    needed = bool(described or recording.start or recording.compensation)
     text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
     with draft(target, overwrite=overwrite) as started:
         if as_text:

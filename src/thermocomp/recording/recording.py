@@ -52,6 +52,9 @@ class Recording:
         What the reader did that a user should know.
     changed : tuple of str
         Those of the notes that say what a mapping has changed in the values.
+    compensation : {'', 'off', 'known', 'unknown'}
+        Whether a correction was in force at the machine, and known; empty: not said. See
+        `thermocomp.recording.compensated`.
 
     Examples
     --------
@@ -77,6 +80,7 @@ class Recording:
     aliases: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
+    compensation: str = ""
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.table):

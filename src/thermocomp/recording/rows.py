@@ -52,6 +52,8 @@ class Rows:
         What the reader did.
     changed : tuple of str
         What a mapping has changed in the values.
+    compensation : str
+        Whether a correction was in force, see `Recording`.
     """
 
     source: str
@@ -69,6 +71,7 @@ class Rows:
     aliases: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
+    compensation: str = ""
 
     def kept(self, rows: NDArray[np.intp]) -> "Rows":
         """Return some of the rows."""

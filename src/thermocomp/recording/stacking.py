@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
 from thermocomp.core.zero import Zeroing
+from thermocomp.recording.compensated import refuse_compensated
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.samples import Samples
 from thermocomp.recording.starts import Start, bridge_files, find_resting_rows, find_starts, level
@@ -22,6 +23,8 @@ NO_INPUTS = {
     "displacement": "a machine in production has no displacement probe",
     "angle": "a machine in production has no probe for angles",
     "position": "thermocomp position fits errors that depend on it",
+    "residual": "a machine in production has no displacement probe",
+    "correction": "it is what a model makes, not what it is made of",
 }
 #: no temperature, speed or displacement of a machine reaches this, whatever its unit
 ABSURD = 1e9
@@ -60,11 +63,12 @@ def stack(
     Raises
     ------
     InputError
-        A channel is missing in one of the recordings, a displacement is asked for as an input, or it cannot be told how
-        a recording begins.
+        A channel is missing in one of the recordings, a displacement is asked for as an input, it cannot be told how a
+        recording begins, or it was made under compensation and does not tell what the machine does by itself.
     """
     if not recordings:
         raise InputError("no recording given")
+    refuse_compensated(recordings, targets)
     target_channels, input_channels = _chosen_channels(recordings, targets, inputs)
     first = recordings[0]
     names = [r.name for r in recordings]

@@ -1,7 +1,7 @@
 """Which sensors fell out in recordings, what stood in, and what it cost: figures, tables and their section."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -22,6 +22,8 @@ from thermocomp.report.sections import Section, Shown
 TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00", "swapped": "#009E73"}
 #: sensors of a recording whose stand-in is drawn, and failures in a table
 MOST, ROWS = 6, 40
+#: failures of a recording in the terminal
+TOLD = 8
 #: beyond what stands in, a reading that is further off is not drawn [degC]
 AROUND = 5.0
 
@@ -75,6 +77,28 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
             "is what is judged here and above."
         )
     return Section(TITLE, parts, cautions)
+
+
+def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -> Iterator[str]:
+    """Yield a line per failure that a watch found, the first ones of each recording.
+
+    Parameters
+    ----------
+    logs : sequence of FaultLog
+    recordings : sequence of Recording
+
+    Yields
+    ------
+    str
+    """
+    for log in logs:
+        for f in log.faults[:TOLD]:
+            recording = recordings[log.recording]
+            until = f"to {_when(f.end, recording)}" if f.returned else "to the end"
+            beside = f"; it read {f.beside:+.1f} degC beside what stood in" if math.isfinite(f.beside) else ""
+            yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
+        if len(log.faults) > TOLD:
+            yield f"{log.name}: {len(log.faults) - TOLD} more failures, on the page that -o writes"
 
 
 def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:

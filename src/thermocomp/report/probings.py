@@ -29,6 +29,8 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
     for a in assessments:
         if (probed := a.probed) is None:
             continue
+        if (after := a.metric("max_abs")) > (before := a.unprobed_metric("max_abs")):
+            yield f"{a.target}: its largest error grows with them, from {before:.2f} to {after:.2f} um"
         held = " by the probings alone, each held until the next"
         ways = {"": a.metric, " without": a.unprobed_metric, held: a.held_metric}
         left = "; ".join(f"{find('rms'):.2f} and {find('mae'):.2f}{words}" for words, find in ways.items())

@@ -19,6 +19,9 @@ OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
 UNEXPLAINED = 0.2
 #: a probing further from what is expected than so many standard deviations is refused
 IMPLAUSIBLE = 5.0
+#: two that agree on more show that the machine is unlike what the model was judged on: from then on errors of this
+#: many standard deviations are what it was seen to be wrong by
+AGREED = 3.0
 #: no error is counted on to be smaller [um]
 LEAST = 1e-3
 
@@ -40,6 +43,7 @@ class Adaptation(NamedTuple):
     mean: FloatArray  #: (n_directions + 1,)
     covariance: FloatArray  #: (n_directions + 1, n_directions + 1)
     size: float  #: of the error without probings, root mean square [um]
+    spread: float  #: standard deviation of the offset without probings: the size, or more once it was seen [um]
     time: float  #: of the last probing that was taken [s]
     refused: float = (
         np.nan
@@ -49,7 +53,7 @@ class Adaptation(NamedTuple):
         """Return mean, (..., n), and covariance, (..., n, n), at later times [s]: on their way back to no probing."""
         kept = self._kept(time)
         prior = np.ones(len(self.mean))
-        prior[-1] = self.size**2
+        prior[-1] = self.spread**2
         covariance = kept[..., :, None] * self.covariance * kept[..., None, :]
         return kept * self.mean, covariance + np.eye(len(prior)) * ((1.0 - kept**2) * prior)[..., None, :]
 
@@ -71,7 +75,10 @@ class Adaptation(NamedTuple):
         return np.asarray((self._kept(time) * self.mean * _beside(directions, 1.0)).sum(axis=-1))
 
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
-        """Return what is left of the half-width of a band, as a share of it; `floor` is that of the band [um]."""
+        """Return what is left of the half-width of a band, as a share of it; `floor` is that of the band [um].
+
+        More than 1 where probings have shown that the machine is unlike what the band was judged on.
+        """
         _, covariance = self.at(time)
         weights = _beside(directions, floor / self.size)
         left = np.einsum("...i,...ij,...j->...", weights, covariance, weights)
@@ -99,7 +106,7 @@ def begin(size: float, n_directions: int) -> Adaptation:
     Adaptation
     """
     size = max(size, LEAST)
-    return Adaptation(np.zeros(n_directions + 1), np.diag([*[1.0] * n_directions, size**2]), size, -np.inf)
+    return Adaptation(np.zeros(n_directions + 1), np.diag([*[1.0] * n_directions, size**2]), size, size, -np.inf)
 
 
 def take(
@@ -127,7 +134,7 @@ def take(
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
         return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"
-    mean, covariance = before.at(time)
+    (mean, covariance), spread = before.at(time), before.spread
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
     surprise = error - float(weights @ mean)
     plausible = IMPLAUSIBLE * float(weights @ covariance @ weights + own) ** 0.5
@@ -135,11 +142,12 @@ def take(
         if not abs(error - before.refused) <= IMPLAUSIBLE * (2 * own) ** 0.5:
             why = f"{surprise:+.1f} um from what is expected, where {plausible:.1f} um are plausible: measure again"
             return before._replace(refused=error), why
-        covariance[-1, -1] += surprise**2  # two that agree: the machine is unlike what the model was judged on
+        covariance[-1, -1] += surprise**2
+        spread = max(spread, abs(surprise) / AGREED)
     gain = covariance @ weights
     variance = float(weights @ gain) + own
     after = covariance - np.outer(gain, gain) / variance
-    return Adaptation(mean + gain * (surprise / variance), (after + after.T) / 2, before.size, time), ""
+    return Adaptation(mean + gain * (surprise / variance), (after + after.T) / 2, before.size, spread, time), ""
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:

@@ -275,11 +275,11 @@ class Compensator:
             zero, probing = references[target].shift, probings.get(target)
             answer = evaluate(line, spoken, instant.time, learned.get(target), probing, failed, zero)
             raw[target], deviations[target] = answer.raw, answer.deviation
+            if failed and (why := _unjudged(models, failed)):
+                held[target] = why  # no band either: how wrong the model is without these was never judged
+                continue
             if not math.isnan(answer.half_width):
                 widths[target] = answer.half_width
-            if failed and (why := _unjudged(models, failed)):
-                held[target] = why
-                continue
             if answer.learned is not None:
                 learned[target] = answer.learned
             if target in probings:

@@ -1,18 +1,23 @@
 """The service that a configuration describes."""
 
+from collections.abc import Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
 
+from thermocomp.adapters.linuxcnc.sink import LinuxCncSink
 from thermocomp.adapters.mqtt import MqttSink, MqttSource
 from thermocomp.adapters.plain import FileSink, ReplaySource, SimulatedSource
+from thermocomp.adapters.probes import MqttProbe, SimulatedProbe
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.ports import Sink, Source
+from thermocomp.core.ports import Probe, Sink, Source
 from thermocomp.files import modelfile
+from thermocomp.files.journal import JournalLimits
 from thermocomp.files.protocols import read_protocol
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.clock import Clock
-from thermocomp.service.config import FileOut, In, MqttIn, Out, ReplayIn, Settings
+from thermocomp.service.config import FileOut, In, LinuxCncOut, MqttIn, MqttProbing, Out, Probings, ReplayIn, Settings
 from thermocomp.service.loop import Service
+from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
 
 
@@ -31,13 +36,22 @@ def build(settings: Settings) -> Service:
     config, folder = settings
     models = [model for path in config.models for model in modelfile.read(folder / path)]
     compensator = Compensator.of(models, config.limits, watching=config.shadow)
+    for one in config.sinks:
+        if isinstance(one, LinuxCncOut) and (unknown := one.axes.keys() - compensator.lines.keys()):
+            known = ", ".join(compensator.lines)
+            raise InputError(f"axes of LinuxCNC: no model for {', '.join(sorted(unknown))}; there are {known}")
+    sources = [_source(one, folder, config.speed) for one in config.sources]
     service = Service(
         compensator,
-        [_source(one, folder, config.speed) for one in config.sources],
+        sources,
         [_sink(one, folder) for one in config.sinks],
         Clock(config.speed),
         folder / config.state if config.state else None,
+        [_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
     )
+    if (kept := config.journal) is not None:
+        room = JournalLimits(size_bytes=round(kept.size_mb * 2**20), files=kept.files)
+        service.recorder = Recorder(folder / kept.file, compensator, config.own_compensation, service.clock, room)
     if config.shadow:
         for target in compensator.lines.keys() - compensator.shadow.keys():
             service.watch_only(target)
@@ -70,7 +84,16 @@ def _source(one: In, folder: Path, speed: float) -> Source:
     return SimulatedSource(experiment=find_experiment(one.experiment, folder), seed=one.seed, speed=speed)
 
 
+def _probe(one: Probings, sources: Sequence[Source], targets: tuple[str, ...]) -> Probe:
+    if isinstance(one, MqttProbing):
+        return MqttProbe(topic=one.topic, host=one.host, port=one.port)
+    machine = next(s for s in sources if isinstance(s, SimulatedSource))
+    return SimulatedProbe(machine=machine, targets=targets, every=one.every, repeatability=one.repeatability)
+
+
 def _sink(one: Out, folder: Path) -> Sink:
     if isinstance(one, FileOut):
         return FileSink(path=folder / one.file)
+    if isinstance(one, LinuxCncOut):
+        return LinuxCncSink(path=folder / one.socket, axes=dict(one.axes))
     return MqttSink(topic=one.topic, host=one.host, port=one.port)

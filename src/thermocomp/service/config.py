@@ -32,12 +32,15 @@ class MqttIn:
         Of the broker.
     names : dict of str to str
         Channel by the name in the message, for those that are called otherwise there.
+    virtual : bool
+        It is a virtual machine that talks there, and may run faster than the world (`Config.speed`).
     """
 
     kind: Literal["mqtt"]
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883
+    virtual: bool = False
     names: Names = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -78,6 +81,49 @@ class ReplayIn:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MqttProbing:
+    """Measurements of the tool point from an MQTT topic.
+
+    Parameters
+    ----------
+    kind : {'mqtt'}
+    topic : str
+    host, port : str, int
+        Of the broker.
+    """
+
+    kind: Literal["mqtt"]
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+    def __post_init__(self) -> None:
+        _check_broker(self.topic, self.port)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatedProbing:
+    """Probings of the virtual machine.
+
+    Parameters
+    ----------
+    kind : {'simulated'}
+    every : float
+        Time of the machine between two [s].
+    repeatability : float
+        Of the probe, standard deviation [um].
+    """
+
+    kind: Literal["simulated"]
+    every: float = 7200.0
+    repeatability: float = 0.5
+
+    def __post_init__(self) -> None:
+        if not self.every > 0 or not self.repeatability >= 0:
+            raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
+
+
+@dataclass(frozen=True, kw_only=True)
 class MqttOut:
     """Corrections to an MQTT topic.
 
@@ -96,6 +142,29 @@ class MqttOut:
 
     def __post_init__(self) -> None:
         _check_broker(self.topic, self.port)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinuxCncOut:
+    """Corrections to a LinuxCNC on this computer.
+
+    Parameters
+    ----------
+    kind : {'linuxcnc'}
+    socket : str
+        Of the HAL component that ``thermocomp linuxcnc setup`` puts there.
+    axes : dict of str to str
+        Axis by target, such as ``{z_um = "Z"}``.
+    """
+
+    kind: Literal["linuxcnc"]
+    socket: str
+    axes: Names
+
+    def __post_init__(self) -> None:
+        letters = [a.upper() for a in self.axes.values()]
+        if not letters or set(letters) - set("XYZUVW") or len(set(letters)) < len(letters):
+            raise SettingError(f'axes = {self.axes}: want a straight axis per target, such as {{z_um = "Z"}}')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,19 +192,48 @@ class Page:
         Where it is served; loopback unless it is stated otherwise.
     token_file : str
         File with the token that buttons want; without one the page only shows.
+    settled : float
+        A drift below this in ten minutes counts as settled [um].
     """
 
     host: str = "127.0.0.1"
     port: int = 8731
     token_file: str = ""
+    settled: float = 1.0
 
     def __post_init__(self) -> None:
+        if not self.settled > 0.0:
+            raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
         if not 0 <= self.port <= 65535:
             raise SettingError(f"port = {self.port}: want a port from 0 (any that is free) to 65535")
 
 
+@dataclass(frozen=True, kw_only=True)
+class JournalOut:
+    """Where it is written down what happens.
+
+    Parameters
+    ----------
+    file : str
+        Its files are numbered: ``live.db`` is ``live.000001.db`` and so on.
+    size_mb : float
+        A file that has become larger is followed by a new one.
+    files : int
+        So many at most: the oldest is removed.
+    """
+
+    file: str
+    size_mb: float = 64.0
+    files: int = 8
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
+            raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
+
+
 In = Annotated[MqttIn | SimulatedIn | ReplayIn, Discriminator("kind")]
-Out = Annotated[MqttOut | FileOut, Discriminator("kind")]
+Out = Annotated[MqttOut | FileOut | LinuxCncOut, Discriminator("kind")]
+Probings = Annotated[MqttProbing | SimulatedProbing, Discriminator("kind")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,6 +246,8 @@ class Config:
         Model files.
     sources, sinks : tuple
         Where readings come from, where corrections go.
+    probes : tuple
+        Where measurements of the tool point come from.
     state : str
         File that the state is kept in; without one every start is a cold one.
     limits : Limits
@@ -156,16 +256,22 @@ class Config:
     speed : float
         Seconds of the machine in a second of the world: for the virtual machine and recordings alone.
     page : Page or None
+    journal : JournalOut or None
+    own_compensation : {'on', 'off', 'unknown'}
+        Whether the controller compensates for temperature by itself.
     """
 
     models: tuple[str, ...]
     sources: tuple[In, ...]
     sinks: tuple[Out, ...] = ()
+    probes: tuple[Probings, ...] = ()
     state: str = ""
     limits: Limits = Limits()
     shadow: bool = False
     speed: float = 1.0
     page: Page | None = None
+    journal: JournalOut | None = None
+    own_compensation: Literal["on", "off", "unknown"] = "unknown"
 
     def __post_init__(self) -> None:
         if not self.models:
@@ -174,9 +280,24 @@ class Config:
             raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
         if not 0.0 < self.speed <= 10_000.0:
             raise SettingError(f"speed = {self.speed:g}: want more than 0, at most 10000")
-        if self.speed != 1.0 and any(isinstance(s, MqttIn) for s in self.sources):
+        if self.own_compensation == "on" and not self.shadow:
             raise SettingError(
-                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1"
+                'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
+                "or let the models run in shadow (shadow = true)"
+            )
+        controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
+        if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
+            raise SettingError(
+                'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
+                "unless it is known whether the controller compensates for temperature by itself"
+            )
+        machine = any(isinstance(s, SimulatedIn) for s in self.sources)
+        if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
+            raise SettingError('a probe of kind = "simulated" wants a source of kind = "simulated"')
+        if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
+            raise SettingError(
+                f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
+                "a virtual one (virtual = true)"
             )
 
 
@@ -224,7 +345,7 @@ def read_config(path: str | Path) -> Settings:
 
 
 def _tell(error: dict[str, Any]) -> str:
-    kinds = ("mqtt", "simulated", "replay", "file")
+    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
     place = ".".join(f"{k + 1}" if isinstance(k, int) else str(k) for k in error["loc"] if k not in kinds) or "file"
     context = error.get("ctx", {})
     if error["type"] == "value_error":

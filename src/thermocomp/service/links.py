@@ -2,34 +2,43 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from typing import TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Sink, Source
-from thermocomp.core.reading import Reading
+from thermocomp.core.ports import Confirming, Probe, Sink, Source
+from thermocomp.core.reading import Measurement, Reading
+
+_Said = TypeVar("_Said", Reading, Measurement)
 
 #: a connection that takes longer, or a sink that does not answer for so long, has failed [s]
 TIMEOUT = 5.0
 #: between two attempts: at first, and at most [s]
 FIRST, LONGEST = 0.5, 30.0
+#: a sink is asked what is in force at least so often [s]
+OFTEN = 2.0
 
 
-async def read_from(source: Source, take: Callable[[Reading], None]) -> None:
+async def read_from(
+    source: Source | Probe, said: Callable[[], AsyncIterator[_Said]], take: Callable[[_Said], None]
+) -> None:
     """Take what a source says for ever; one that is played to its end stays closed.
 
     Parameters
     ----------
-    source : Source
+    source : Source or Probe
+    said : callable
+        Its readings, or measurements.
     take : callable
-        Called with each reading.
+        Called with each of them.
     """
     wait = FIRST
     while True:
         try:
             await source.connect(TIMEOUT)
-            async for reading in source.readings():
-                take(reading)
+            async for one in said():
+                take(one)
                 wait = FIRST
             if source.status().state == "closed":
                 return
@@ -49,10 +58,13 @@ class Outlet:
     Parameters
     ----------
     sink : Sink
+    heard : callable, optional
+        Called with what the sink confirms to be in force, if it does.
     """
 
-    def __init__(self, sink: Sink) -> None:
+    def __init__(self, sink: Sink, heard: Callable[[Sink, Mapping[str, Correction]], None] | None = None) -> None:
         self.sink = sink
+        self.heard = heard
         self.applied: dict[str, Correction] = {}  #: what it has taken last
         self._newest: dict[str, Correction] = {}
         self._news = asyncio.Event()
@@ -69,16 +81,26 @@ class Outlet:
             try:
                 await self.sink.connect(TIMEOUT)
                 while True:
-                    await self._news.wait()
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(OFTEN):
+                            await self._news.wait()
+                    newest = self._newest if self._news.is_set() else None
                     self._news.clear()
-                    newest = self._newest
                     async with asyncio.timeout(TIMEOUT):
-                        await self.sink.apply(newest)
-                    self.applied, wait = newest, FIRST
+                        if newest is not None:
+                            await self.sink.apply(newest)
+                            self.applied = newest
+                        await self._confirm()
+                    wait = FIRST
             except (ThermocompError, OSError, TimeoutError):
                 self._news.set()  # what was lost is applied after the next connection
             await asyncio.sleep(wait)
             wait = min(2 * wait, LONGEST)
+
+    async def _confirm(self) -> None:
+        if self.heard is not None and isinstance(self.sink, Confirming):
+            in_force = await self.sink.confirmed()
+            self.heard(self.sink, in_force or {})
 
     async def flush(self) -> None:
         """Apply what was put last, if the sink is there."""

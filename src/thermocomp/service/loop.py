@@ -11,14 +11,16 @@ from pathlib import Path
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, Sink, Source
-from thermocomp.core.reading import Reading
+from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
+from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
-from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
+from thermocomp.service.probe import KEPT, Checked, check, find_deviation
+from thermocomp.service.recorder import Recorder
 
 #: events that are kept to be shown
 EVENTS = 200
@@ -56,6 +58,9 @@ class Service:
     clock : Clock
     state_path : Path or None
         Where the state is kept.
+    probes : sequence of Probe
+    recorder : Recorder or None
+        Of the journal.
     """
 
     compensator: Compensator
@@ -63,6 +68,8 @@ class Service:
     sinks: Sequence[Sink]
     clock: Clock = field(default_factory=Clock)
     state_path: Path | None = None
+    probes: Sequence[Probe] = ()
+    recorder: Recorder | None = None
     state: CompensatorState = field(init=False)
     said: Compensated | None = field(default=None, init=False)
     events: deque[Event] = field(init=False)
@@ -71,12 +78,15 @@ class Service:
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
     listeners: set[Callable[[], None]] = field(default_factory=set, init=False)
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
+    checked: deque[Checked] = field(init=False)  #: what probings said
+    before: dict[str, Adaptation | None] = field(default_factory=dict, init=False)  #: the last one was taken
+    confirmed: dict[str, Correction] = field(default_factory=dict, init=False)  #: by the controller
 
     def __post_init__(self) -> None:
-        self.events, self.curves = deque(maxlen=EVENTS), deque(maxlen=POINTS)
-        self.outlets = [Outlet(sink) for sink in self.sinks]
+        self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
+        self.outlets = [Outlet(sink, self._hear) for sink in self.sinks]
         self.state = self._begin()
-        self._saved, self._dirty = -1e9, False
+        self._saved, self._dirty, self._trouble = -1e9, False, ""
         self._heard = self.clock.tick()
 
     # -- what happens --------------------------------------------------------------------------------------------------
@@ -88,16 +98,21 @@ class Service:
         try:
             async with asyncio.TaskGroup() as group:
                 for source in self.sources:
-                    group.create_task(read_from(source, self.take))
+                    group.create_task(read_from(source, source.readings, self.take))
+                for probe in self.probes:
+                    group.create_task(read_from(probe, probe.measurements, self.measure))
                 for outlet in self.outlets:
                     group.create_task(outlet.run())
                 group.create_task(self._watch())
         finally:
             for outlet in self.outlets:
                 await outlet.flush()
-            for close in [*(s.close for s in self.sources), *(s.close for s in self.sinks)]:
-                await within(2.0, close())
+            links: list[Source | Probe | Sink] = [*self.sources, *self.probes, *self.sinks]
+            for link in links:
+                await within(2.0, link.close())
             self._save()
+            if self.recorder is not None:
+                self.recorder.journal.close()
 
     def take(self, reading: Reading) -> None:
         """Take a reading of a source in: with it goes the latest of the others."""
@@ -111,12 +126,16 @@ class Service:
         if len(self.latest) > 10_000:  # names that nobody knows, without end
             self.latest = {n: v for n, v in self.latest.items() if tick - v[1] <= most}
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
-        probings, self.probings = self.probings, {}
+        (probings, self.probings), learned = (self.probings, {}), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
         self._heard = tick
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
         self._tell(said, probings)
+        if self.recorder is not None:
+            self.recorder.take(now, fresh, said)
+            self.recorder.count(now, self.state.references)
+        self._chart(said, probings, learned)
 
     def order(self, target: str, status: Status | None) -> None:
         """Take a target out, or let it run again; see `Compensator.order`."""
@@ -138,6 +157,32 @@ class Service:
     def probe(self, target: str, probing: Probing) -> None:
         """Use a probing with the next reading."""
         self.probings[target] = probing
+
+    def measure(self, found: Measurement) -> None:
+        """Take a measurement of the tool point as a probing, with the next reading."""
+        line = self.compensator.lines.get(found.target)
+        now, stamp = self.clock.now(), self.clock.of(found.time)
+        if line is None or now - stamp > self.compensator.limits.reading_age:
+            why = f"no target is named {found.target}" if line is None else f"it is {now - stamp:.0f} s old"
+            self._say("probing", f"{found.target} refused: {why}")
+            return
+        confirmed = self.confirmed.get(found.target)
+        if self.recorder is not None:
+            self.recorder.measure(now, found, confirmed)
+        in_force = (confirmed or self.state.corrections[found.target]) if found.left else None
+        deviation = find_deviation(found.measured, found.position, in_force)
+        self.probe(found.target, Probing(deviation, found.repeatability, found.position))
+
+    def roll_back(self, target: str) -> str:
+        """Forget the last probing of a target that was taken; return why not, or the empty string."""
+        if target not in self.before:
+            return "no probing was taken since the start, or it was taken back before"
+        learned, before = dict(self.state.learned), self.before.pop(target)
+        learned.pop(target, None)
+        self.state = self.state._replace(learned=learned if before is None else learned | {target: before})
+        self._say("probing", f"{target}: the last probing is taken back")
+        self._dirty = True
+        return ""
 
     # -- inside --------------------------------------------------------------------------------------------------------
 
@@ -189,9 +234,16 @@ class Service:
                 why = f"no reading for {silent:.0f} s"
                 self.state, said = self.compensator.wait(self.state, tick, why)
                 self._tell(said, {})
+                if self.recorder is not None:
+                    self.recorder.tell(self.clock.now(), said)
             if self._dirty and time.monotonic() - self._saved >= 1.0:
                 self._dirty, self._saved = False, time.monotonic()
                 await asyncio.to_thread(self._save)
+            if self.recorder is not None:
+                await asyncio.to_thread(self.recorder.journal.flush)
+                if (trouble := self.recorder.journal.status().reason) != self._trouble:
+                    self._trouble = trouble
+                    self._say("service", f"journal: {trouble or 'all is written again'}")
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -215,6 +267,38 @@ class Service:
         for listener in list(self.listeners):
             listener()
 
+    def _chart(self, said: Compensated, probings: Mapping[str, Probing], learned: Mapping[str, Adaptation]) -> None:
+        for target, probing in probings.items():
+            if target not in said.deviations:
+                continue
+            refused, after = said.refused.get(target, ""), self.state.learned.get(target)
+            found = check(self.clock.now(), target, probing, said.deviations[target], after, refused)
+            self.checked.append(found)
+            if self.recorder is not None:
+                added = said.deviations[target].offset + (0.0 if refused else found.residual)
+                self.recorder.update(found, added)
+            if not refused:
+                self.before[target] = learned.get(target)
+            if found.beyond:
+                limit = f"where {found.limit:.1f} um ask for action"
+                self._say("probing", f"{target} was wrong by {found.residual:+.1f} um, {limit}: look for the cause")
+
+    def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
+        """Take what a controller says is in force, and why it has none."""
+        known = {t: c for t, c in in_force.items() if t in self.state.corrections}
+        self.confirmed |= known
+        if self.recorder is not None:
+            self.recorder.confirm(self.clock.now(), known)
+        if not isinstance(sink, Suspending):
+            return
+        away = sink.suspended()
+        for target in self.compensator.lines.keys() & in_force.keys() | away.keys() & self.compensator.lines.keys():
+            order = self.state.orders.get(target)
+            if target in away and (order is None or order.word not in ("suspended", "shadow", "holding")):
+                self.order(target, Status("suspended", away[target]))
+            elif target not in away and order is not None and order.word == "suspended":
+                self.order(target, None)
+
     def _numbers(self, said: Compensated) -> dict[str, float]:
         heat = {i.name for m in self.compensator.models for i in m.inputs if i.quantity == "temperature"}
         found = {name: self.latest[name][0] for name in sorted(heat & self.latest.keys())}
@@ -226,6 +310,8 @@ class Service:
 
     def _say(self, kind: str, text: str) -> None:
         self.events.append(Event(self.clock.now(), kind, text))
+        if self.recorder is not None and kind != "state":
+            self.recorder.alarm(self.clock.now(), kind, text)
 
     def _save(self) -> None:
         if self.state_path is None:

@@ -1,0 +1,325 @@
+"""What a journal holds: rows of fixed types, checked before they are written and when they are read."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from types import UnionType
+from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from thermocomp.core.correction import Correction, Deviation, uncompensated
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.machine import Channel
+from thermocomp.files.typed import decode, encode, want
+from thermocomp.runtime.state import Word
+
+#: whether the controller compensates for temperature by itself, beside thermocomp
+Own = Literal["on", "off", "unknown"]
+#: what is measured at the machine
+Kind = Literal["probing", "work_offset", "tool_length"]
+
+#: no number is larger, no text longer; longer ones are cut
+LARGEST, LONGEST = 1e15, 2000
+#: channels and targets of one service
+_MOST = 10_000
+
+
+class Target(NamedTuple):
+    """What is compensated: a target or an axis."""
+
+    name: str
+    quantity: str = "displacement"  #: or ``angle``
+    unit: str = "um"
+    position: float = 0.0  #: where on the axis its displacement channel measures [mm]
+
+
+class Start(NamedTuple):
+    """A run of the service: how the rows after it are to be read."""
+
+    time: float  #: [s] since 1970
+    targets: tuple[Target, ...]
+    channels: tuple[Channel, ...]  #: what readings hold; one that is named as a target measures what is left of it
+    own_compensation: Own = "unknown"
+    confirm_within: float = 10.0  #: so long after a confirmation the correction in force counts as known [s]
+
+
+class ReadingRow(NamedTuple):
+    """A reading; values that are no finite numbers, or of no channel, are left out."""
+
+    time: float
+    values: Mapping[str, float]
+
+
+class DemandRow(NamedTuple):
+    """A correction that was asked for."""
+
+    time: float
+    target: str
+    correction: Correction
+
+
+class ConfirmationRow(NamedTuple):
+    """The correction that is in force, as the controller says."""
+
+    time: float
+    target: str
+    correction: Correction
+
+
+class StateRow(NamedTuple):
+    """How a target is from now on."""
+
+    time: float
+    target: str
+    word: Word
+    reason: str
+
+
+class ReferenceRow(NamedTuple):
+    """A target counts anew from now on."""
+
+    time: float
+    target: str
+    why: str
+    shift: Deviation
+
+
+class MeasurementRow(NamedTuple):
+    """A measurement at the machine, marked with what was in force while it was made.
+
+    `value` is the position that should have been found less the one that the controller reports: how far the tool point
+    seems to be off. With a correction in force it depends on the frame of that report, see `measured_by`.
+    """
+
+    time: float
+    target: str
+    value: float  #: [um]
+    kind: Kind
+    includes_offset: bool  #: the reported position includes the correction (LinuxCNC's #5063); False: not (#<_z>)
+    position: float = 0.0  #: where on the axis [mm]
+    in_force: Correction | None = None  #: as the controller confirmed; zero: made without; None: not told
+
+    @property
+    def compensated(self) -> bool | None:
+        """Whether a correction was in force; None if that is not known."""
+        return None if self.in_force is None else self.in_force.at(self.position) != 0.0
+
+
+class AlarmRow(NamedTuple):
+    """Something that somebody should look at."""
+
+    time: float
+    kind: str
+    text: str
+
+
+class UpdateRow(NamedTuple):
+    """What a probing changed."""
+
+    time: float
+    target: str
+    measured: float  #: the uncompensated deviation [um]
+    before: float  #: what was said of it before [um]
+    after: float  #: and after it [um]
+    refused: str  #: why nothing was learned; empty if it was
+
+
+Row = ReadingRow | DemandRow | ConfirmationRow | StateRow | ReferenceRow | MeasurementRow | AlarmRow | UpdateRow | Start
+KINDS: dict[str, type[Any]] = {
+    "start": Start,
+    "reading": ReadingRow,
+    "demand": DemandRow,
+    "confirmation": ConfirmationRow,
+    "state": StateRow,
+    "reference": ReferenceRow,
+    "measurement": MeasurementRow,
+    "alarm": AlarmRow,
+    "update": UpdateRow,
+}
+_NAMES = {kind: name for name, kind in KINDS.items()}
+
+
+def measured_by(row: MeasurementRow, start: Start, in_force: Correction | None = None) -> float | None:
+    """Return the uncompensated deviation that a measurement tells [um].
+
+    At the place that is probed the tool point is where it should be: the motors stand off by minus the deviation. A
+    report that includes the correction tells that as it is; one without it tells what is left of the deviation under
+    the correction. So the correction is taken off once, in the second case, and never in the first.
+
+    Parameters
+    ----------
+    row : MeasurementRow
+    start : Start
+        Of its run.
+    in_force : Correction, optional
+        What was in force, where the row does not tell.
+
+    Returns
+    -------
+    float or None
+        None if it cannot be known: the controller compensates by itself, or nobody knows what was in force.
+    """
+    known = row.in_force if row.in_force is not None else in_force
+    if start.own_compensation != "off":
+        return None
+    if row.includes_offset:
+        return row.value
+    return None if known is None else uncompensated(row.value, known.at(row.position))
+
+
+# -- as text and back --------------------------------------------------------------------------------------------------
+
+
+def kind_of(row: Row) -> str:
+    """Return the name of a row's kind.
+
+    Raises
+    ------
+    ValueError
+        It is no row.
+    """
+    found = _NAMES.get(type(row))
+    if found is None:
+        raise ValueError(f"{type(row).__name__} is no row of a journal")
+    return found
+
+
+def dumps(row: Row, start: Start) -> str:
+    """Return all of a row but its time as ASCII text.
+
+    Parameters
+    ----------
+    row : Row
+    start : Start
+        Of its run: readings are written in the order of its channels.
+
+    Raises
+    ------
+    ValueError
+        Something in it is not of its type, not finite or beyond all sense.
+    """
+    name = kind_of(row)
+    to_number(row.time)
+    if isinstance(row, Start):
+        text = _plain(encode(row))
+        _checked(json.loads(text))
+        return text
+    if isinstance(row, ReadingRow):
+        return _plain([_number_or_none(row.values.get(c.name)) for c in start.channels])
+    return _plain([write(value) for (write, _), value in zip(_CODECS[name], row[1:], strict=True)])
+
+
+def loads(kind: str, time: float, text: str, start: Start | None) -> Row:
+    """Return the row that `dumps` made a text of.
+
+    Parameters
+    ----------
+    kind : str
+    time : float
+    text : str
+    start : Start or None
+        Of its run.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    value = json.loads(text)
+    want(kind in KINDS, kind, "kind", f"one of {', '.join(KINDS)}")
+    if kind == "start":
+        return _checked(value)
+    want(start is not None, None, kind, "a start before it")
+    assert start is not None
+    if kind == "reading":
+        names = [c.name for c in start.channels]
+        want(isinstance(value, list) and len(value) == len(names), None, kind, f"{len(names)} values")
+        return ReadingRow(
+            to_number(time), {n: to_number(v) for n, v in zip(names, value, strict=True) if v is not None}
+        )
+    codecs = _CODECS[kind]
+    want(isinstance(value, list) and len(value) == len(codecs), None, kind, f"{len(codecs)} values")
+    row: Row = KINDS[kind](to_number(time), *(read(v) for (_, read), v in zip(codecs, value, strict=True)))
+    return row
+
+
+def to_number(value: Any) -> float:
+    """Return a finite number of a sensible size, or raise `ValueError`."""
+    number = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
+    want(number and abs(value) <= LARGEST, value, "number", "a finite number")
+    return float(value)
+
+
+def _checked(value: Any) -> Start:
+    try:
+        start: Start = decode(Start, value, "start")
+    except InputError as e:  # a unit that does not measure the quantity
+        raise ValueError(str(e)) from e
+    for number in (start.time, *(t.position for t in start.targets)):
+        to_number(number)
+    want(0.0 < start.confirm_within < math.inf, start.confirm_within, "confirm_within", "a positive number")
+    for names in ([t.name for t in start.targets], [c.name for c in start.channels]):
+        want(len(set(names)) == len(names) <= _MOST and all(names), None, "start", "names, each once, at most 10,000")
+    known = {c.name: (c.quantity, c.unit) for c in start.channels}
+    for t in start.targets:
+        want(known.get(t.name, t[1:3]) == t[1:3], None, t.name, f"a channel of {t.quantity} in {t.unit}, as the target")
+    return start
+
+
+def _plain(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), allow_nan=False, default=lambda v: v.item())
+
+
+def _number_or_none(value: Any) -> float | None:
+    try:
+        return to_number(value)
+    except (ValueError, OverflowError, TypeError):
+        return None
+
+
+def _text(value: Any) -> str:
+    want(isinstance(value, str), value, "text", "text")
+    return str(value) if len(value) <= LONGEST else f"{value[: LONGEST - 4]} ..."
+
+
+def _flag(value: Any) -> bool:
+    want(isinstance(value, bool | np.bool_), value, "flag", "true or false")
+    return bool(value)
+
+
+_Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+
+
+def _codec(hint: Any) -> _Codec:
+    if get_origin(hint) is UnionType:
+        write, read = _codec(get_args(hint)[0])
+        return lambda v: None if v is None else write(v), lambda v: None if v is None else read(v)
+    if get_origin(hint) is Literal:
+
+        def word(value: Any) -> Any:
+            want(isinstance(value, str) and value in get_args(hint), value, "word", f"one of {get_args(hint)}")
+            return value
+
+        return word, word
+    if hint in (Correction, Deviation):
+
+        def written(value: Any) -> list[float]:
+            want(isinstance(value, hint), value, hint.__name__, f"a {hint.__name__}")
+            return [to_number(v) for v in (value.offset, value.slope, value.reference_position)]
+
+        def back(value: Any) -> Any:
+            want(isinstance(value, list) and len(value) == 3, None, hint.__name__, "three numbers")
+            return hint(*(to_number(v) for v in value))
+
+        return written, back
+    plain: Callable[[Any], Any] = {float: to_number, str: _text, bool: _flag}[hint]
+    return plain, plain
+
+
+#: how each field behind the time is written and read, by kind
+_CODECS = {
+    name: tuple(_codec(get_type_hints(kind)[field]) for field in kind._fields[1:])
+    for name, kind in KINDS.items()
+    if kind not in (Start, ReadingRow)
+}

@@ -1,0 +1,67 @@
+"""What probings of the running machine said: a chart of what the models were wrong by, with an action limit."""
+
+import math
+from typing import NamedTuple
+
+from thermocomp.core.correction import Correction, Deviation, uncompensated
+from thermocomp.runtime.adaptation import Adaptation, Probing
+
+#: standard deviations at which the chart asks for action
+ACTION = 3.0
+#: probings that are kept to be shown
+KEPT = 200
+
+
+class Checked(NamedTuple):
+    """A probing beside what was predicted for its instant."""
+
+    time: float  #: of the machine, seconds since 1970
+    target: str
+    predicted: float  #: where it was probed, without it [um]
+    residual: float  #: measured minus predicted [um]
+    limit: float  #: beyond it the cause has to be looked for [um]
+    refused: str  #: why it was not used; empty if it was
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it is beyond the action limit."""
+        return not abs(self.residual) <= self.limit
+
+
+def check(
+    time: float, target: str, probing: Probing, predicted: Deviation, learned: Adaptation | None, refused: str
+) -> Checked:
+    """Return how a probing compares with what was predicted.
+
+    Parameters
+    ----------
+    time : float
+        Of the machine [s].
+    target : str
+    probing : Probing
+    predicted : Deviation
+        For its instant, without it.
+    learned : Adaptation or None
+        After it: knows the size of the error that was to be expected.
+    refused : str
+    """
+    size = math.nan if learned is None else learned.size
+    limit = ACTION * math.hypot(size, probing.repeatability)
+    said = predicted.at(probing.position)
+    return Checked(time, target, said, probing.deviation - said, limit, refused)
+
+
+def find_deviation(measured: float, position: float, in_force: Correction | None) -> float:
+    """Return the deviation of the machine from what was measured at a position.
+
+    Parameters
+    ----------
+    measured : float
+        [um]
+    position : float
+        On the axis [mm].
+    in_force : Correction or None
+        Where the measurement shows what the correction left; None where it does not contain it (LinuxCNC's ``#5063``
+        is a position of the motor: the offset is in it already).
+    """
+    return measured if in_force is None else uncompensated(measured, in_force.at(position))

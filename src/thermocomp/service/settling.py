@@ -1,0 +1,49 @@
+"""How long a machine still drifts: told from the curve of the predicted deviation alone."""
+
+import math
+from collections.abc import Sequence
+
+#: over which a drift is looked at, and for which it is told [s]
+WINDOW = 600.0
+
+
+def minutes_until(times: Sequence[float], deviations: Sequence[float], below: float) -> float:
+    """Return after how many minutes the deviation changes by less than `below` within ten minutes.
+
+    Two windows of ten minutes tell how fast the change dies away, and what is to come is taken as an exponential.
+
+    Parameters
+    ----------
+    times : sequence of float
+        Rising [s].
+    deviations : sequence of float
+        Predicted, in micrometres.
+    below : float
+        [um]
+
+    Returns
+    -------
+    float
+        0 if it does already; nan if it is not known: too short a curve; infinite if the change does not get smaller.
+
+    Raises
+    ------
+    ValueError
+        `below` is not positive.
+    """
+    if not below > 0:
+        raise ValueError(f"below = {below}: want more than 0 um")
+    if not times or times[-1] - times[0] < 2 * WINDOW:
+        return math.nan
+    now, middle, begin = (_at(times, deviations, times[-1] - k * WINDOW) for k in range(3))
+    last, before = abs(now - middle), abs(middle - begin)
+    if last < below:
+        return 0.0
+    if last >= before:
+        return math.inf
+    return WINDOW / 60.0 * math.log(last / below) / math.log(before / last)
+
+
+def _at(times: Sequence[float], values: Sequence[float], time: float) -> float:
+    """Return the value that was last said at a time."""
+    return next(v for t, v in zip(reversed(times), reversed(values), strict=True) if t <= time)

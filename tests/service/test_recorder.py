@@ -1,0 +1,82 @@
+"""The journal of the service: what was read, asked for, confirmed and measured."""
+
+import asyncio
+import time
+from pathlib import Path
+
+import pytest
+from test_loop import Given, machine, running, say, until
+
+from thermocomp.adapters.plain import FileSink
+from thermocomp.core.reading import Measurement
+from thermocomp.files.journal import JournalLimits
+from thermocomp.files.journalexport import export
+from thermocomp.files.journalreader import JournalReader
+from thermocomp.files.journalrows import measured_by
+from thermocomp.runtime.state import Status
+from thermocomp.service.loop import Service
+from thermocomp.service.recorder import Recorder
+
+
+def recorded(folder: Path, own: str = "off") -> tuple[Service, Given]:
+    source, compensator = Given(), machine()
+    service = Service(compensator, [source], [FileSink(path=folder / "corrections.json")])
+    service.recorder = Recorder(folder / "live.db", compensator, own, service.clock, JournalLimits())  # type: ignore[arg-type]
+    return service, source
+
+
+def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Path) -> None:
+    service, source = recorded(tmp_path)
+
+    async def work() -> None:
+        for k in range(5):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+            await until(lambda k=k: k == 0 or service.confirmed["z_um"].offset == -2.0 * k)
+        # the machine is off by 9 um, and 8 of them are corrected
+        service.measure(Measurement(time.time(), "z_um", 1.0, left=True, repeatability=0.1))
+        service.measure(Measurement(time.time(), "z_um", 9.0, left=False, repeatability=0.1))
+        say(source, 24.0)
+        await until(lambda: service.checked)
+        service.rezero("z_um", "homing")
+        service.order("z_um", Status("holding", "by hand"))
+        say(source, 24.0)
+        await until(lambda: service.counts["readings"] == 7)
+
+    asyncio.run(running(service, work))
+    reader = JournalReader(tmp_path / "live.db")
+    rows = [stored.row for stored in reader.rows()]
+    kinds = {type(row).__name__ for row in rows}
+    assert kinds == {
+        *("Start", "ReadingRow", "DemandRow", "ConfirmationRow", "StateRow", "ReferenceRow", "MeasurementRow"),
+        *("AlarmRow", "UpdateRow"),
+    }
+    start = next(r for r in rows if type(r).__name__ == "Start")
+    found = [measured_by(r, start) for r in rows if type(r).__name__ == "MeasurementRow"]  # type: ignore[arg-type]
+    assert found == [pytest.approx(9.0), pytest.approx(9.0)]
+    updates = [r for r in rows if type(r).__name__ == "UpdateRow"]
+    assert [(u.measured, u.before) for u in updates] == [(pytest.approx(9.0), pytest.approx(8.0))]  # type: ignore[union-attr]
+    assert [r.why for r in rows if type(r).__name__ == "ReferenceRow"][-1] == "homing"  # type: ignore[union-attr]
+    assert [r.word for r in rows if type(r).__name__ == "StateRow"] == ["active", "holding"]  # type: ignore[union-attr]
+    exported = export(reader)
+    (column,) = [c for c in exported.recording.table.columns if c == "z_um"]
+    told = exported.recording.table[column].dropna().tolist()
+    assert told
+    assert told == pytest.approx([9.0] * len(told))
+
+
+def test_a_journal_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
+    service, source = recorded(tmp_path)
+    assert service.recorder is not None
+    journal = service.recorder.journal
+    journal.close()
+    journal.path = tmp_path / "gone" / "live.db"
+
+    async def work() -> None:
+        for k in range(3):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+        await until(lambda: any("journal" in e.text for e in service.events), 5.0)
+
+    asyncio.run(running(service, work))
+    assert service.state.corrections["z_um"].offset == -4.0
