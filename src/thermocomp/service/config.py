@@ -40,8 +40,8 @@ class MqttIn:
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883
-    virtual: bool = False
     names: Names = field(default_factory=dict)
+    virtual: bool = False
 
     def __post_init__(self) -> None:
         _check_broker(self.topic, self.port)
