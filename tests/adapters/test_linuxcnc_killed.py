@@ -109,7 +109,7 @@ def test_service_and_component_at_random(pattern: Pattern, kills: int) -> None:
 
 @pytest.mark.parametrize("pattern", ["offset", pytest.param("drive", marks=pytest.mark.long)])
 def test_without_a_service_it_is_held_and_then_fades(pattern: Pattern) -> None:
-    settings = HalSettings(pattern=pattern, axes=AXES, rate=RATE, timeout=0.5, hold=1.0, fade=8.0)
+    settings = HalSettings(pattern=pattern, axes=AXES, rate=RATE, timeout=0.5, hold=1.0, fade=10.0)
 
     async def work() -> None:
         sink = sink_of(machine)
@@ -122,7 +122,7 @@ def test_without_a_service_it_is_held_and_then_fades(pattern: Pattern) -> None:
         machine.ready()
         asyncio.run(work())
         machine.do("trace", "trace")
-        time.sleep(4.0)
+        time.sleep(3.3)
         machine.do("stop")
         trace = machine.trace()
         assert machine.get("tc.alive.out") == 0.0
@@ -130,9 +130,9 @@ def test_without_a_service_it_is_held_and_then_fades(pattern: Pattern) -> None:
     held = int(np.argmax(np.abs(added[10:] + 12.0) > 0.1)) * PERIOD
     assert 0.9 < held < 2.5
     assert added[-1] == pytest.approx(0.0, abs=0.1)
-    assert trace.steps("Z").max() <= 8.0 * PERIOD + FINE
+    assert trace.steps("Z").max() <= 10.0 * PERIOD + FINE
     fading = (added > -11.0) & (added < -1.0) & (np.arange(len(added)) > 10)
-    assert fading.sum() * PERIOD == pytest.approx(10.0 / 8.0, rel=0.1)
+    assert fading.sum() * PERIOD == pytest.approx(10.0 / 10.0, rel=0.1)
 
 
 def test_without_a_component_it_stays_and_a_new_one_begins_there() -> None:

@@ -185,7 +185,8 @@ class Server:
                 "in_force": share * hal.get_value(axis.in_force) / micron,
                 "alarm": alarm,
             }
-        return {"beat": beat, "ticks": self.ticks, "suspended": why, "limited": limited, "axes": axes}
+        known = {"beat": beat, "ticks": self.ticks, "timeout": self.options.timeout}
+        return {**known, "suspended": why, "limited": limited, "axes": axes}
 
     # -- the service ---------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +14,8 @@ from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import SettingError, ThermocompError
 from thermocomp.core.ports import Status
 
-#: between two signs of life; the component drops who is silent for its timeout [s]
-BEAT = 0.5
+#: between two signs of life, at most [s], and as a share of the time after which the component drops who is silent
+BEAT, SHARE = 0.5, 0.25
 #: it answers within so long, or it is lost [s]
 ANSWER = 2.0
 #: a correction further from what is demanded is told as it is measured [um]
@@ -61,6 +62,7 @@ class LinuxCncSink:
     _beating: asyncio.Task[None] | None = field(default=None, init=False, repr=False)
     _lock: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
     _beat: int = field(default=0, init=False, repr=False)
+    _timeout: float = field(default=math.inf, init=False, repr=False)
     _why: str = field(default="", init=False, repr=False)
     _reports: dict[str, AxisReport] = field(default_factory=dict, init=False, repr=False)
 
@@ -154,7 +156,7 @@ class LinuxCncSink:
         """Give signs of life while the connection is there."""
         with contextlib.suppress(ThermocompError):
             while True:
-                await asyncio.sleep(BEAT)
+                await asyncio.sleep(min(BEAT, SHARE * self._timeout))
                 await self._ask({})
 
     async def _ask(self, message: dict[str, Any]) -> None:
@@ -178,6 +180,7 @@ class LinuxCncSink:
             if answer.get("beat") != self._beat:
                 raise ValueError(answer.get("error", "not the answer"))
             self._why, self.ticks = str(answer["suspended"]), int(answer["ticks"])
+            self._timeout = float(answer["timeout"])
             self._reports = {letter: _read(one) for letter, one in answer["axes"].items()}
             heard = True
         except (OSError, TimeoutError, ValueError, KeyError, AttributeError, TypeError) as e:
