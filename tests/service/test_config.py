@@ -46,7 +46,7 @@ def test_what_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('models = ["model.json"]', "", "models is missing"),
+        ('models = ["model.json"]', "", "name at least one model file"),
         ('models = ["model.json"]', "models = []", "name at least one model file"),
         ('models = ["model.json"]', 'models = "model.json"', "models must be a list"),
         ('models = ["model.json"]', "models = [7]", "models.1: Input should be a valid string, found 7"),
