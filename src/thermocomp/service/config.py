@@ -40,8 +40,8 @@ class MqttIn:
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883
-    virtual: bool = False
     names: Names = field(default_factory=dict)
+    virtual: bool = False
 
     def __post_init__(self) -> None:
         _check_broker(self.topic, self.port)
@@ -259,6 +259,8 @@ class Config:
     journal : JournalOut or None
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
+    at_stop : {'hold', 'fade'}
+        When it is stopped corrections stay as they are, or go to zero first, within the limits.
     """
 
     models: tuple[str, ...]
@@ -272,6 +274,7 @@ class Config:
     page: Page | None = None
     journal: JournalOut | None = None
     own_compensation: Literal["on", "off", "unknown"] = "unknown"
+    at_stop: Literal["hold", "fade"] = "hold"
 
     def __post_init__(self) -> None:
         if not self.models:
