@@ -84,7 +84,7 @@ def test_service_and_component_at_random(pattern: Pattern, kills: int) -> None:
             machine.do("start", "part.ngc")
             time.sleep(2.0)
             for k in range(kills):
-                time.sleep(rng.uniform(0.1, 0.7))
+                time.sleep(rng.uniform(0.1, 0.5))
                 if k % 2:
                     os.kill(machine.component(), signal.SIGKILL)
                 else:

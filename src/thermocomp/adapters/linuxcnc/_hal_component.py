@@ -39,7 +39,7 @@ MOST = 1000
 #: bytes of a line; connections at a time, of which one is listened to
 LONGEST, WAITING = 4096, 4
 #: a correction that is not where it shall be by more than this [um], for so long [s], does not follow
-ASIDE, PATIENCE = 1.0, 2.0
+ASIDE, PATIENCE = 1.0, 1.0
 #: the servo thread stands still when it has not answered for so long; then LinuxCNC is gone [s]
 STILL, GONE = 1.0, 5.0
 
@@ -69,11 +69,6 @@ class Axis:
         for k, part in enumerate(("offset", "slope")):
             self.put(f"{part}.maxv", 0.0)
             self.put(f"from{k}.in1", self.get(f"{part}.out"))
-
-    def now(self) -> list[float]:
-        """Return what the servo thread demands at both ends."""
-        offset, slope = self.get("offset.out"), self.get("slope.out")
-        return [offset - slope * self.half, offset + slope * self.half]
 
     def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
         """Take a line: um, um/m, mm, and what it may be at most, um."""
@@ -147,13 +142,17 @@ class Server:
         low, high = (max(-most, min(most, v)) for v in axis.ends or (0.0, 0.0))
         offset, slope = (low + high) / 2.0, (high - low) / (2.0 * axis.half)
         rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
-        now = axis.now()
-        seconds = max(abs(low - now[0]), abs(high - now[1])) / rate
-        if seconds > 0.0:
-            axis.put("offset.maxv", abs(offset - axis.get("offset.out")) / seconds)
-            axis.put("slope.maxv", abs(slope - axis.get("slope.out")) / seconds)
+        begin = axis.get("offset.out"), axis.get("slope.out")
+        if begin == (offset, slope):  # there: as fast as it has to come back after off and on, whoever lives then
+            begin = 0.0, 0.0
+        steps = abs(offset - begin[0]), abs(slope - begin[1])
+        seconds = (steps[0] + steps[1] * axis.half) / rate or 1.0  # of the end that moves more
+        axis.put("offset.maxv", 0.0)  # the servo thread may run in between: never both too fast, never to a wrong place
+        axis.put("slope.maxv", 0.0)
         axis.put("from0.in1", offset)
         axis.put("from1.in1", slope)
+        axis.put("offset.maxv", steps[0] / seconds)
+        axis.put("slope.maxv", steps[1] / seconds)
 
     def why(self, now: float) -> str:
         """Return why nothing is in force; empty if something can be."""
