@@ -84,7 +84,8 @@ def serve(
         token = web.read_token(settings.folder / page.token_file) if page.token_file else ""
         listening = web.listen(page.host, page.port)
         host, number = listening.getsockname()[:2]
-        console.print(f"Page: http://{f'[{host}]' if ':' in host else host}:{number}", soft_wrap=True)
+        where = f"[{host}]" if ":" in host else host
+        console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
         work.append(web.serve(make_app(service, token, page.settled, (page.host,)), listening))
     asyncio.run(_run(service if settings.config.at_stop == "fade" else None, work))
     return 0

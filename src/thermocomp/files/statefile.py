@@ -25,9 +25,9 @@ from thermocomp.runtime.watch import WORDS
 KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 
-#: of a watch
 #: no error is larger [um]
 _LARGEST = 1e6
+#: of a watch
 _INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
 
 
