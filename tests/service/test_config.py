@@ -73,6 +73,11 @@ def test_what_it_says(tmp_path: Path) -> None:
         ('state = "state.json"', 'at_stop = "drop"', "at_stop: Input should be 'hold' or 'fade'"),
         ("[page]", '[journal]\nfile = "live.db"\n[page]', 'own_compensation = "unknown": write "off" or "on"'),
         ("[page]", '[journal]\nfile = "a"\nfiles = 1\n[page]', "journal: size_mb = 64, files = 1: want"),
+        (
+            "[page]",
+            '[journal]\nfile = "a"\nchannels = {t = "heat"}\n[page]',
+            "journal: channels: heat: want one of time, temperature",
+        ),
         ("[page]", '[[probes]]\nkind = "mqtt"\n[page]', "probes.1.topic is missing"),
         ("[page]", '[[probes]]\nkind = "simulated"\nevery = 0.0\n[page]', "probes.1: every = 0"),
         ("port = 8080", "settled = 0.0", "page: settled = 0: want more than 0 um"),

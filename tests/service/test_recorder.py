@@ -8,7 +8,7 @@ import pytest
 from test_loop import Given, machine, running, say, until
 
 from thermocomp.adapters.plain import FileSink
-from thermocomp.core.reading import Measurement
+from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files.journal import JournalLimits
 from thermocomp.files.journalexport import export
 from thermocomp.files.journalreader import JournalReader
@@ -21,7 +21,8 @@ from thermocomp.service.recorder import Recorder
 def recorded(folder: Path, own: str = "off") -> tuple[Service, Given]:
     source, compensator = Given(), machine()
     service = Service(compensator, [source], [FileSink(path=folder / "corrections.json")])
-    service.recorder = Recorder(folder / "live.db", compensator, own, service.clock, JournalLimits())  # type: ignore[arg-type]
+    kept = {"t9_C": "temperature"}
+    service.recorder = Recorder(folder / "live.db", compensator, own, service.clock, JournalLimits(), kept)  # type: ignore[arg-type]
     return service, source
 
 
@@ -40,7 +41,7 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
         await until(lambda: service.checked)
         service.rezero("z_um", "homing")
         service.order("z_um", Status("holding", "by hand"))
-        say(source, 24.0)
+        source.queue.put_nowait(Reading(time.time(), {"t": 24.0, "t9_C": 19.5, "t10_C": 3.0}))
         await until(lambda: service.counts["readings"] == 7)
 
     asyncio.run(running(service, work))
@@ -59,6 +60,8 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
     assert [r.why for r in rows if type(r).__name__ == "ReferenceRow"][-1] == "homing"  # type: ignore[union-attr]
     assert [r.word for r in rows if type(r).__name__ == "StateRow"] == ["active", "holding"]  # type: ignore[union-attr]
     exported = export(reader)
+    assert exported.recording.table["t9_C"].dropna().tolist()[-1] == 19.5
+    assert "t10_C" not in exported.recording.table
     (column,) = [c for c in exported.recording.table.columns if c == "z_um"]
     told = exported.recording.table[column].dropna().tolist()
     assert told

@@ -55,7 +55,9 @@ def build(settings: Settings) -> Service:
     )
     if (kept := config.journal) is not None:
         room = JournalLimits(size_bytes=round(kept.size_mb * 2**20), files=kept.files)
-        service.recorder = Recorder(folder / kept.file, compensator, config.own_compensation, service.clock, room)
+        service.recorder = Recorder(
+            folder / kept.file, compensator, config.own_compensation, service.clock, room, kept.channels
+        )
     if config.shadow:
         for target in compensator.lines.keys() - compensator.shadow.keys():
             service.watch_only(target)

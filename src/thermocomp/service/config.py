@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Discriminator, TypeAdapter, ValidationError, wi
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.tomlfile import as_json, read_toml
 
 Names = dict[str, str]
@@ -238,13 +239,19 @@ class JournalOut:
         A file that has become larger is followed by a new one.
     files : int
         So many at most: the oldest is removed.
+    channels : dict of str to str
+        Quantity of what readings hold beside the models' inputs, such as ``{t9_C = "temperature"}``: kept, too. A
+        displacement that is named as a target measures what its correction leaves.
     """
 
     file: str
     size_mb: float = 64.0
     files: int = 8
+    channels: Names = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if unknown := set(self.channels.values()) - HOUSE_UNITS.keys():
+            raise SettingError(f"channels: {', '.join(sorted(unknown))}: want one of {', '.join(HOUSE_UNITS)}")
         if not 0.1 <= self.size_mb <= 1e6 or not self.files >= 2:
             raise SettingError(f"size_mb = {self.size_mb:g}, files = {self.files}: want 0.1 or more, and 2 or more")
 

@@ -8,6 +8,7 @@ from typing import Literal
 from thermocomp.core.correction import Correction
 from thermocomp.core.machine import Channel
 from thermocomp.core.reading import Measurement
+from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.journal import Journal, JournalLimits
 from thermocomp.files.journalrows import (
     AlarmRow,
@@ -42,11 +43,22 @@ class Recorder:
         Whether the controller compensates by itself.
     clock : Clock
     limits : JournalLimits
+    more : mapping of str to str, optional
+        Quantity of channels that are kept beside the inputs of the models.
     """
 
-    def __init__(self, path: Path, compensator: Compensator, own: Own, clock: Clock, limits: JournalLimits) -> None:
+    def __init__(
+        self,
+        path: Path,
+        compensator: Compensator,
+        own: Own,
+        clock: Clock,
+        limits: JournalLimits,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
         inputs = [i for m in compensator.models for i in (*m.inputs, *(m.watch.inputs if m.watch else ()))]
-        channels = {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
+        channels = {name: Channel(name, kind, HOUSE_UNITS[kind]) for name, kind in (more or {}).items()}
+        channels |= {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
         targets = tuple(Target(name) for name in compensator.lines)
         start = Start(clock.now(), targets, tuple(channels.values()), own, CONFIRM_WITHIN * clock.speed)
         self.journal = Journal.open(path, limits, start)
