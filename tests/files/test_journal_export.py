@@ -19,6 +19,7 @@ from thermocomp.files.journal import Journal, JournalLimits
 from thermocomp.files.journalexport import Exported, export
 from thermocomp.files.journalreader import JournalReader
 from thermocomp.files.journalrows import ConfirmationRow, DemandRow, MeasurementRow, ReadingRow, Row, Start, Target
+from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 
 FloatArray = NDArray[np.float64]
@@ -208,6 +209,24 @@ def test_a_probing_without_a_confirmation(includes_offset: bool, known: int, tmp
     assert table["z_residual_um"].notna().tolist() == [not known]
 
 
+@pytest.mark.parametrize("own", ["on", "unknown"])
+@pytest.mark.parametrize("includes_offset", [True, False])
+def test_a_probing_beside_another_compensation(own: Any, includes_offset: bool, tmp_path: Path) -> None:
+    rows: list[Row] = [
+        ConfirmationRow(BEGIN, "z_um", Correction(-12.0)),
+        ReadingRow(BEGIN, {"t1_C": 20.0}),
+        MeasurementRow(BEGIN, "z_um", 3.0, "probing", includes_offset, 0.0, Correction(-12.0)),
+        ReadingRow(BEGIN + 1, {"t1_C": 20.0}),
+        MeasurementRow(BEGIN + 1, "z_um", 3.0, "probing", False, 0.0, Correction(-12.0)),
+    ]
+    found = export(journal_of(tmp_path / "live.db", Start(BEGIN, (Target("z_um"),), (HEAT,), own, 15.0), rows))
+    assert found.recording.compensation == "unknown"
+    table = found.recording.table
+    assert table["z_um"].isna().all()
+    assert table["z_correction_um"].isna().all()
+    assert table["z_residual_um"].notna().tolist() == [not includes_offset, True]
+
+
 def test_a_probing_far_from_any_reading_is_told(tmp_path: Path) -> None:
     rows: list[Row] = [ReadingRow(BEGIN, {"t1_C": 20.0}), MeasurementRow(BEGIN + 61.0, "z_um", 3.0, "probing", True)]
     start = Start(BEGIN, (Target("z_um"),), (HEAT,), "off", 15.0)
@@ -266,3 +285,26 @@ def test_a_clock_that_was_never_set(tmp_path: Path) -> None:
     start = Start(0.0, (), (HEAT,), "off", 15.0)
     found = export(journal_of(tmp_path / "live.db", start, [ReadingRow(1e14, {"t1_C": 20.0})]))
     assert found.recording.start == ""
+
+
+def test_a_model_is_fitted_to_probings_alone(tmp_path: Path) -> None:
+    test = small_machine()
+    rows: list[Row] = []
+    for row in lived(test, ["z_um"]):
+        if not isinstance(row, ReadingRow):
+            rows.append(row)
+            continue
+        values = dict(row.values)
+        residual = values.pop("z_um")
+        rows.append(ReadingRow(row.time, values))
+        if round(row.time - BEGIN) % 1200 == 0:  # every 20 min
+            rows.append(MeasurementRow(row.time, "z_um", residual, "probing", False))
+    found = export(journal_of(tmp_path / "live.db", start_of(test, ["z_um"], measured=False), rows))
+    assert 20 < found.targets[0].measured == found.targets[0].known < 100
+    again = saved(found, tmp_path)
+    there = again.table["z_um"].notna()
+    np.testing.assert_allclose(again.table["z_um"][there], test.table["z_um"][there], atol=1e-9)
+    assert [f for f in check(again) if f.severity == "trouble"] == []
+    model = tc.fit(again, "z_um", model="ols", jobs=1).models["z_um"]
+    assert model.honest_error is not None
+    assert model.honest_error.rms < 4.0  # of a drift of 60 um

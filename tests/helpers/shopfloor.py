@@ -22,12 +22,15 @@ from driftmodels import ACCEPTED
 from linuxcnclive import Live
 from numpy.typing import NDArray
 
+from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.reading import Reading
 from thermocomp.datasets.virtual import record
 from thermocomp.files import modelfile
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recording.stacking import stack
+from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.build import find_experiment
 from thermocomp.simulation.experiments import simulate
 
@@ -123,6 +126,33 @@ class Machine(threading.Thread):
         """Return what the tool point is off by now, uncompensated [um]."""
         now = (time.monotonic() - self.begun) * self.factor + self.time[0]
         return float(np.interp(now, self.time, self.truth))
+
+
+def undisturbed(machine: Machine, at: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Return the corrections that a service without any disturbance would have in force at times of the world.
+
+    Parameters
+    ----------
+    machine : Machine
+        That was started.
+    at : ndarray of shape (n,)
+        On its monotone clock [s].
+    rate : float
+        In seconds of the world [um/s].
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        [um]
+    """
+    compensator = Compensator.of([model()], Limits(magnitude=100.0, rate=rate / machine.factor, reading_age=1e6))
+    state, said = compensator.start(), []
+    for time_of_row, row in zip(machine.time[: machine.row + 2].tolist(), machine.rows, strict=False):
+        state, told = compensator.step(state, Reading(time_of_row, json.loads(row)), time_of_row)
+        said.append(told.corrections["z_um"].offset)
+    now = (at - machine.begun) * machine.factor + machine.time[0]
+    found: NDArray[np.float64] = np.interp(now, machine.time[: len(said)], said)
+    return found
 
 
 class Service:

@@ -15,6 +15,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.files import recordings
 from thermocomp.files.mapping import Mapping, read_mapping
 from thermocomp.recording.compensated import beside, refuse_compensated
+from thermocomp.recording.quality import check
 from thermocomp.recording.recording import Recording
 
 
@@ -77,7 +78,7 @@ def test_targets_are_what_a_model_can_learn() -> None:
         (compensated(), "z_correction_um", "z_correction_um is a correction, .* as the target, z_um"),
         (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um, which is z_residual_um - z_corr"),
         (compensated("z_residual_um"), "z_um", "z_um was measured while z_correction_um was in force"),
-        (compensated(z_um=np.nan), "z_um", "z_um is empty beside z_residual_um: nobody knows"),
+        (compensated(z_um=np.nan), "z_um", "z_um is empty beside z_residual_um: compensation: unknown: nobody knows"),
     ],
 )
 def test_what_is_refused(recording: Recording, target: str, text: str) -> None:
@@ -142,3 +143,15 @@ def test_a_mapping_says_it(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text('compensation = "perhaps"\n')
     with pytest.raises(InputError, match=r"m\.toml: .*compensation.*perhaps"):
         read_mapping(tmp_path / "m.toml")
+
+
+def test_check_says_it() -> None:
+    kinds = [(f.severity, f.kind) for f in check(replace(compensated(), compensation="unknown"))]
+    assert ("trouble", "compensation") in kinds
+    held = compensated()
+    held.table["z_correction_um"] = -5.0  # a correction that is held is no dead sensor
+    held.table["z_residual_um"] = held.table["z_um"] - 5.0
+    assert [f for f in check(replace(held, compensation="known")) if f.severity == "trouble"] == []
+    sparse = compensated()
+    sparse.table.loc[sparse.table.index % 60 != 0, ["z_um", "z_residual_um"]] = np.nan  # probings
+    assert [f for f in check(sparse) if f.severity == "trouble"] == []

@@ -46,7 +46,7 @@ def test_what_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('models = ["model.json"]', "", "models is missing"),
+        ('models = ["model.json"]', "", "name at least one model file"),
         ('models = ["model.json"]', "models = []", "name at least one model file"),
         ('models = ["model.json"]', 'models = "model.json"', "models must be a list"),
         ('models = ["model.json"]', "models = [7]", "models.1: Input should be a valid string, found 7"),
@@ -68,6 +68,20 @@ def test_what_it_says(tmp_path: Path) -> None:
         ('state = "state.json"', "speed = 60.0", "a machine that MQTT tells of runs at the speed of the world"),
         ('state = "state.json"', "speed = 0.0", "speed = 0: want more than 0"),
         ('state = "state.json"', 'state = "state.json', "not valid TOML"),
+        ('state = "state.json"', 'own_compensation = "on"', "the same error would be corrected twice"),
+        ('state = "state.json"', 'own_compensation = "maybe"', "own_compensation: Input should be 'on', 'off' or"),
+        ('state = "state.json"', 'at_stop = "drop"', "at_stop: Input should be 'hold' or 'fade'"),
+        ("[page]", '[journal]\nfile = "live.db"\n[page]', 'own_compensation = "unknown": write "off" or "on"'),
+        ("[page]", '[journal]\nfile = "a"\nfiles = 1\n[page]', "journal: size_mb = 64, files = 1: want"),
+        ("[page]", '[[probes]]\nkind = "mqtt"\n[page]', "probes.1.topic is missing"),
+        ("[page]", '[[probes]]\nkind = "simulated"\nevery = 0.0\n[page]', "probes.1: every = 0"),
+        ("port = 8080", "settled = 0.0", "page: settled = 0: want more than 0 um"),
+        ('kind = "file"\nfile = "corrections.json"', 'kind = "linuxcnc"\nsocket = "s"', "sinks.1.axes is missing"),
+        (
+            'kind = "file"\nfile = "corrections.json"',
+            'kind = "linuxcnc"\nsocket = "s"\naxes = {z_um = "A"}',
+            "sinks.1: axes = {'z_um': 'A'}: want a straight axis per target",
+        ),
     ],
 )
 def test_what_is_wrong(old: str, new: str, says: str, tmp_path: Path) -> None:

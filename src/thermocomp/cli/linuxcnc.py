@@ -87,6 +87,6 @@ def linuxcnc(
         return 0
     console.print(f"Written: {words(str(folder / HAL_NAME))}, and the component that it starts.", soft_wrap=True)
     for k, one in enumerate(found.todo, 1):
-        console.print(f"{k}. {words(one)}", soft_wrap=True)
+        console.print(words(f"{k}. {one}"), soft_wrap=True)
     console.print(f"The service connects at {words(str(found.socket))}.", soft_wrap=True)
     return 0

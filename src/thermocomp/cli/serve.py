@@ -7,12 +7,15 @@ import signal
 from collections.abc import Coroutine, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
+
+if TYPE_CHECKING:
+    from thermocomp.service.loop import Service
 
 #: seconds of the virtual machine in one of the world, in the demo
 _SPEED = 60
@@ -81,22 +84,33 @@ def serve(
         token = web.read_token(settings.folder / page.token_file) if page.token_file else ""
         listening = web.listen(page.host, page.port)
         host, number = listening.getsockname()[:2]
-        console.print(f"Page: http://{f'[{host}]' if ':' in host else host}:{number}", soft_wrap=True)
+        where = f"[{host}]" if ":" in host else host
+        console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
         work.append(web.serve(make_app(service, token, page.settled, (page.host,)), listening))
-    asyncio.run(_run(work))
+    asyncio.run(_run(service if settings.config.at_stop == "fade" else None, work))
     return 0
 
 
-async def _run(work: Sequence[Coroutine[Any, Any, None]]) -> None:
+async def _run(fades: "Service | None", work: Sequence[Coroutine[Any, Any, None]]) -> None:
     loop, task = asyncio.get_running_loop(), asyncio.current_task()
     assert task is not None
+    fading: list[asyncio.Task[None]] = []
+
+    def stop() -> None:
+        if fades is None or fading:  # a second signal does not wait
+            task.cancel()
+            return
+        console.print("stopping: the corrections go to zero first; stop again not to wait for it")
+        fading.append(asyncio.create_task(fades.fade_out()))
+        fading[0].add_done_callback(lambda _: task.cancel())
+
     for name in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(name, task.cancel)
+        loop.add_signal_handler(name, stop)
     with contextlib.suppress(asyncio.CancelledError):
         async with asyncio.TaskGroup() as group:
             for one in work:
                 group.create_task(one)
-    console.print("stopped: the corrections stay as they are; the state is saved")
+    console.print("stopped: the corrections stay as they are now; the state is saved")
 
 
 def _demo(folder: Path) -> Path:

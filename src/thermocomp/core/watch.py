@@ -129,7 +129,7 @@ class Watch:
         check_between("watch", 0.0, READING, unseen=[s.unseen for s in self.sensors])
         check_between("watch", LEAST, GAP, still=[s.still for s in self.sensors])
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the temperatures."""
         return tuple(self.inputs[s.input].name for s in self.sensors)

@@ -209,7 +209,7 @@ def telling(path: Path) -> Iterator[None]:
         if code == sqlite3.SQLITE_NOTADB:
             raise InputError(f"{path}: is no journal of thermocomp, nor any database") from e
         if code == sqlite3.SQLITE_CANTOPEN:
-            hint = "copy it, and what is named like it, into a folder where files may be made"
+            hint = "may it be read? Else copy it, and what is named like it, into a folder where files may be made"
             raise InputError(f"{path}: cannot be opened; {hint}") from e
         raise InputError(f"{path}: cannot be read ({e}); set the file aside, {_OTHERS}") from e
 

@@ -245,7 +245,7 @@ class _Sources:
         path = self.folder / name
         if path not in self._files:
             try:
-                self._files[path] = _open(path)
+                self._files[path] = read_models(path)
             except InputError as e:
                 raise SettingError(str(e), here) from e
         models = {m.target: m for m in self._files[path]}
@@ -266,8 +266,18 @@ class _Sources:
         return model
 
 
-def _open(path: Path) -> Sequence[ErrorModel | PositionModel]:
-    """Read models of time, or of time and position."""
+def read_models(path: Path) -> Sequence[ErrorModel | PositionModel]:
+    """Read models of time, or of time and position.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ModelFileError
+        It is neither.
+    """
     text, source = jsonfile.read(jsonfile.MODELS, path)
     if re.search(rf'"format"\s*:\s*"{jsonfile.POSITION_MODELS.name}"', text):
         return positionfile.loads(text, source)

@@ -25,6 +25,8 @@ from thermocomp.runtime.watch import WORDS
 KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 
+#: no error is larger [um]
+_LARGEST = 1e6
 #: of a watch
 _INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
 
@@ -205,7 +207,8 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         sound = n >= 1 and np.linalg.eigvalsh(learned.covariance).min() >= -1e-6 * max(
             np.trace(learned.covariance), 1.0
         )
-        want(bool(sound) and 0.0 < learned.size < math.inf, None, place, "a mean with its covariance")
+        sizes = 0.0 < learned.size <= learned.spread <= _LARGEST
+        want(bool(sound) and sizes, None, place, "a mean with its covariance")
         models = compensator.models[lines[target].models]
         known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
         want(n in known, n, f"{place}.mean", f"{max(known)} numbers")

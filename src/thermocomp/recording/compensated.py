@@ -14,9 +14,11 @@ from thermocomp.recording.recording import Recording
 
 #: the deviation may be off by so much from what makes it, rounded as it may be [um]
 ROUNDED = 0.5
-_UNKNOWN = (
-    "nobody knows which correction was in force while it was measured, so it does not tell what the machine does by "
-    "itself; record with a controller that confirms its corrections and with its own temperature compensation off"
+#: what is said of a recording, or of a column
+UNKNOWN = (
+    "compensation: unknown: nobody knows which correction was in force while it was measured, so it does not tell what "
+    "the machine does by itself; record with a controller that confirms its corrections and with its own temperature "
+    'compensation off. If none was in force, say compensation = "off" in a mapping'
 )
 
 
@@ -44,9 +46,7 @@ def refuse_compensated(recordings: Sequence[Recording], targets: Sequence[str]) 
     for recording in recordings:
         where = recording.source or recording.name
         if recording.compensation == "unknown":
-            raise RecordingError(
-                f'{where}: compensation: unknown: {_UNKNOWN}. If none was, say compensation = "off" in a mapping'
-            )
+            raise RecordingError(f"{where}: {UNKNOWN}")
         for target in targets:
             _refuse(recording, target, where)
 
@@ -81,7 +81,7 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
         return
     d, r = _values(recording, name), _values(recording, residual)
     if not np.isfinite(d).any() and np.isfinite(r).any():
-        raise RecordingError(f"{where}: {name} is empty beside {residual}: {_UNKNOWN}")
+        raise RecordingError(f"{where}: {name} is empty beside {residual}: {UNKNOWN}")
     off = d - uncompensated(r, c)
     known = np.flatnonzero(np.isfinite(off))
     if not known.size or recording.changed:

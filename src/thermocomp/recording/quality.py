@@ -7,6 +7,7 @@ import numpy as np
 from thermocomp.core.machine import Channel
 from thermocomp.recording import suspects
 from thermocomp.recording.clocks import clocks
+from thermocomp.recording.compensated import UNKNOWN
 from thermocomp.recording.cycles import SPLITS
 from thermocomp.recording.findings import (
     SEVERITIES,
@@ -59,6 +60,8 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     """
     time = recording.time
     found = [Finding("warning", "", "left out", note) for note in recording.notes if note.startswith("left out")]
+    if recording.compensation == "unknown":
+        found.append(Finding("trouble", "", "compensation", UNKNOWN))
     found += [*_sampling(time), *_no_cycle(recording), *_duplicates(recording)]
     speed = None
     if recording.speed is not None:  # what is beyond is no speed, and its square no number
@@ -133,7 +136,7 @@ def _duplicates(recording: Recording) -> Iterator[Finding]:
 def _probed(recording: Recording) -> set[str]:
     """Return the displacements that are measured in probing cycles: several have their few values in the same rows."""
     rows: dict[bytes, list[str]] = {}
-    for channel in recording.displacements:
+    for channel in (*recording.displacements, *recording.of_quantity("residual")):
         there = np.isfinite(recording.table[channel.name].to_numpy(dtype=np.float64))
         if 1 < there.sum() < 0.5 * len(there):
             rows.setdefault(there.tobytes(), []).append(channel.name)

@@ -213,7 +213,10 @@ class Compensator:
         """
         for group in self.groups:
             values = [reading.values.get(name) for name in group.names]
-            if why := explain_implausible(group.lead, values, state.models[group.members[0]].reference.tolist()):
+            reference = state.models[group.members[0]].reference
+            if group.passes(values, reference):
+                continue
+            if why := explain_implausible(group.lead, values, reference.tolist()):
                 return why
         return ""
 
@@ -415,8 +418,8 @@ class Compensator:
             resting = watch.zeroing.stands(values.get(watch.zeroing.speed))
             seen, believed = look(watch, before, time, numbers, resting=resting)
             states.append(seen)
-            values |= {watch.inputs[k].name: float(believed[k]) for k in watch.bank.temperatures.tolist()}
-        return state._replace(watches=tuple(states)), replace(reading, values=values)
+            values |= zip(watch.names, believed[watch.bank.temperatures].tolist(), strict=True)
+        return state._replace(watches=tuple(states)), Reading(reading.time, values, reading.positions)
 
     def _travel(self, state: CompensatorState, tick: float) -> float:
         """Return the time that counts in a step: an outage, with rejected readings or with none, is no saved travel."""

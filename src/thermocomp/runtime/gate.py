@@ -118,6 +118,8 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number, and no truth value."""
+    if type(value) is float:
+        return math.isfinite(value)
     if type(value) is bool or not isinstance(value, Real):
         return False
     try:

@@ -9,6 +9,7 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.together import Together, TogetherState
+from thermocomp.runtime.gate import find_plausible_range
 
 #: what is said to be outside where each input is inside its own range, but all together are unlike the training
 TOGETHER = "inputs together"
@@ -32,6 +33,7 @@ class Group:
         self.names = tuple(i.name for i in self.lead.inputs)
         paced = [m for m in self.models if isinstance(m, PacedDynamic)]
         self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
+        self._ranges: tuple[FloatArray | None, list[tuple[float, float]]] = (None, [])
         joints = [m.joint for m in self.models]
         #: those whose joint support is no other's: of them alone it is asked how far a reading is
         self._apart = [m for k, m in enumerate(self.models) if m.joint is not None and m.joint not in joints[:k]]
@@ -44,6 +46,26 @@ class Group:
             key = Together.key(m) if isinstance(m, PacedDynamic) else None
             alike.setdefault(k if key is None else (key, m.zeroing), []).append(k)
         return tuple(Group(models, members) for members in alike.values())
+
+    def passes(self, values: Sequence[object], reference: FloatArray) -> bool:
+        """Return whether a reading is plausible beyond doubt: plain numbers, each in its range about a known zero.
+
+        The quick way through `thermocomp.runtime.gate.explain_implausible`, which has the words for what is not.
+
+        Parameters
+        ----------
+        values : sequence of shape (n_inputs,)
+            As a source gave them.
+        reference : ndarray of shape (n_inputs,)
+            What counts as zero; nan where it is not known yet.
+        """
+        if self._ranges[0] is not reference:
+            ranges = [find_plausible_range(i, z) for i, z in zip(self.lead.inputs, reference.tolist(), strict=True)]
+            self._ranges = (reference, [] if np.isnan(reference).any() else ranges)
+        ranges = self._ranges[1]
+        return bool(ranges) and all(
+            type(value) is float and low <= value <= high for value, (low, high) in zip(values, ranges, strict=True)
+        )
 
     def share(self, states: Sequence[State]) -> list[State]:
         """Return states that share what is the same in all of them."""

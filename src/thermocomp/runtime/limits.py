@@ -88,7 +88,10 @@ def limit_line(
     """
     low, high = travel
     if low == high or target.slope == current.slope == 0.0:
-        return Correction(limit_offset(target.offset, current.offset, dt, limits), 0.0, target.reference_position)
+        offset = limit_offset(target.offset, current.offset, dt, limits)
+        if offset == target.offset and target.slope == 0.0:
+            return target
+        return Correction(offset, 0.0, target.reference_position)
     at_low, at_high = (limit_offset(target.at(p), current.at(p), dt, limits) for p in travel)
     slope = (at_high - at_low) / (high - low)  # um/mm
     return Correction(at_low + slope * (target.reference_position - low), 1e3 * slope, target.reference_position)

@@ -94,7 +94,7 @@ def evaluate(
     """
     models, states, readings, said, half_widths = spoken
     raw, refused, single = line.deviation(said), "", len(models) == 1
-    deviation = raw.less(zero)
+    deviation = raw.less(zero) if zero.offset or zero.slope else raw
     width, band = math.nan, models[0].band if single else None
     if band is not None:
         width = half_widths[0] * (models[0].widening(failed) if failed else 1.0)

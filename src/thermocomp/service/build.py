@@ -10,8 +10,8 @@ from thermocomp.adapters.plain import FileSink, ReplaySource, SimulatedSource
 from thermocomp.adapters.probes import MqttProbe, SimulatedProbe
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.ports import Probe, Sink, Source
-from thermocomp.files import modelfile
 from thermocomp.files.journal import JournalLimits
+from thermocomp.files.machines import read_machine, read_models
 from thermocomp.files.protocols import read_protocol
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.clock import Clock
@@ -34,8 +34,12 @@ def build(settings: Settings) -> Service:
         A model file or an experiment cannot be used, or none of the models may run.
     """
     config, folder = settings
-    models = [model for path in config.models for model in modelfile.read(folder / path)]
-    compensator = Compensator.of(models, config.limits, watching=config.shadow)
+    if (own := config.machine) is not None:
+        machine = read_machine(folder / own.file)
+        compensator = Compensator.of_machine(machine, own.at, own.tool, config.limits)
+    else:
+        models = [model for path in config.models for model in read_models(folder / path)]
+        compensator = Compensator.of(models, config.limits, watching=config.shadow)
     for one in config.sinks:
         if isinstance(one, LinuxCncOut) and (unknown := one.axes.keys() - compensator.lines.keys()):
             known = ", ".join(compensator.lines)

@@ -40,8 +40,8 @@ class MqttIn:
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883
-    virtual: bool = False
     names: Names = field(default_factory=dict)
+    virtual: bool = False
 
     def __post_init__(self) -> None:
         _check_broker(self.topic, self.port)
@@ -209,6 +209,24 @@ class Page:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MachineOf:
+    """A machine file in place of models: offset and slope of each axis, through one point of the work volume.
+
+    Parameters
+    ----------
+    file : str
+    at : tuple of 3 float
+        Where the other axes stand while one moves [mm].
+    tool : tuple of 3 float or None
+        From the gauge point to the tip [mm]; the machine file's own if not given.
+    """
+
+    file: str
+    at: tuple[float, float, float]
+    tool: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class JournalOut:
     """Where it is written down what happens.
 
@@ -242,10 +260,11 @@ class Config:
 
     Parameters
     ----------
-    models : tuple of str
-        Model files.
     sources, sinks : tuple
         Where readings come from, where corrections go.
+    models : tuple of str
+        Model files, a target each model; or none, and a machine.
+    machine : MachineOf or None
     probes : tuple
         Where measurements of the tool point come from.
     state : str
@@ -259,11 +278,14 @@ class Config:
     journal : JournalOut or None
     own_compensation : {'on', 'off', 'unknown'}
         Whether the controller compensates for temperature by itself.
+    at_stop : {'hold', 'fade'}
+        When it is stopped corrections stay as they are, or go to zero first, within the limits.
     """
 
-    models: tuple[str, ...]
     sources: tuple[In, ...]
     sinks: tuple[Out, ...] = ()
+    models: tuple[str, ...] = ()
+    machine: MachineOf | None = None
     probes: tuple[Probings, ...] = ()
     state: str = ""
     limits: Limits = Limits()
@@ -272,10 +294,14 @@ class Config:
     page: Page | None = None
     journal: JournalOut | None = None
     own_compensation: Literal["on", "off", "unknown"] = "unknown"
+    at_stop: Literal["hold", "fade"] = "hold"
 
     def __post_init__(self) -> None:
-        if not self.models:
-            raise SettingError("models = []: name at least one model file, as 'thermocomp fit' writes it")
+        if bool(self.models) == bool(self.machine):
+            raise SettingError(
+                f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
+                "[machine], and not both"
+            )
         if not self.sources:
             raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
         if not 0.0 < self.speed <= 10_000.0:

@@ -184,6 +184,17 @@ class Service:
         self._dirty = True
         return ""
 
+    async def fade_out(self) -> None:
+        """Let all corrections go to zero, within the limits, as long as readings come; then orders are as before."""
+        orders = dict(self.state.orders)
+        for target in self.compensator.lines.keys() - self.compensator.shadow.keys():
+            self.order(target, Status("shadow", "the service is being stopped"))
+        while any(c.offset or c.slope for c in self.state.corrections.values()):
+            await asyncio.sleep(0.1)
+        for outlet in self.outlets:
+            await outlet.flush()
+        self.state = self.state._replace(orders=orders)
+
     # -- inside --------------------------------------------------------------------------------------------------------
 
     def _begin(self) -> CompensatorState:
