@@ -81,7 +81,7 @@ def test_more_joints_than_a_table_takes(tmp_path: Path) -> None:
     text = prepare(ini, tmp_path, HalSettings()).hal
     assert "net tc-homed-0 => tc.homed-1.in-4" in text
     assert "net tc-joint-5-homed joint.5.homed => tc.homed-1.in-1" in text
-    assert "net tc-homed-1 => tc.on.in-3" in text
+    assert "net tc-homed => tc.on.in-3" in text
 
 
 @pytest.mark.parametrize(

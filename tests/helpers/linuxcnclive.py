@@ -34,6 +34,8 @@ net prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net powered motion.motion-enabled
 net change iocontrol.0.tool-change => iocontrol.0.tool-changed
 """
+#: memory that the processes of a LinuxCNC share: of HAL, its sampler, its planner
+SHARED = (0x48414C32, 0x48484C34, 0x48534130, 100)
 #: what is traced of each axis: what the drive is told, what is commanded, and offset and slope in force
 TRACED = ("{drive}", "tc-axis-{a}-pos-cmd", "tc-{a}-offset-now", "traced-{a}-slope")
 #: the planner's positions reach a drive through a cubic spline, which is late: shares of the last three periods but one
@@ -151,6 +153,8 @@ class Live:
                     os.kill(pid, signal.SIGKILL)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(0.1)
+        for key in SHARED:  # it would be found by the next one as it was left
+            subprocess.run(["ipcrm", "-M", hex(key)], stderr=subprocess.DEVNULL, check=False)
 
     def stop(self) -> None:
         """End it."""

@@ -14,7 +14,6 @@ All but ``beat`` may be left out. Who says nothing for the timeout is dropped; t
 
 import argparse
 import contextlib
-import itertools
 import json
 import math
 import os
@@ -32,10 +31,13 @@ from typing import Any
 import hal  # type: ignore[import-not-found]
 
 NAME = "thermocomp"
+#: what is told of each axis, and what is heard
+TOLD = ("offset-rate", "slope-rate", "offset", "slope")
+HEARD = ("offset-now", "slope-now", "away", "demand", "force")
 #: between two looks at the controller [s]
 TICK = 0.01
 #: components that were killed, at most: then LinuxCNC has to be started anew
-MOST = 1000
+MOST = 200
 #: bytes of a line; connections at a time, of which one is listened to
 LONGEST, WAITING = 4096, 4
 #: a correction that is not where it shall be by more than this [um], for so long [s], does not follow
@@ -47,28 +49,13 @@ STILL, GONE = 1.0, 5.0
 class Axis:
     """An axis: where its line shall go, in the machine's units about the middle of its travel."""
 
-    def __init__(self, text: str, pattern: str, unit: float) -> None:
+    def __init__(self, text: str, unit: float) -> None:
         letter, low, high = text.split(",")
         self.letter, self.low, self.high = letter.lower(), float(low), float(high)
         self.middle, self.half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
         self.unit = unit  # units of the machine in a millimetre
-        self.in_force = f"axis.{self.letter}.eoffset" if pattern == "offset" else f"tc.{self.letter}.smooth.out"
         self.ends: list[float] | None = None  # what is demanded at both ends of the travel; none: what is in force
         self.aside: float | None = None  # since when it does not follow
-
-    def get(self, name: str) -> float:
-        """Return a value of its HAL."""
-        return float(hal.get_value(f"tc.{self.letter}.{name}"))
-
-    def put(self, name: str, value: float) -> None:
-        """Set a value of its HAL, which stays when this process dies."""
-        hal.set_p(f"tc.{self.letter}.{name}", repr(value))
-
-    def stay(self) -> None:
-        """Let it stay where it is."""
-        for k, part in enumerate(("offset", "slope")):
-            self.put(f"{part}.maxv", 0.0)
-            self.put(f"from{k}.in1", self.get(f"{part}.out"))
 
     def demand(self, offset: float, slope: float, reference: float, magnitude: float) -> None:
         """Take a line: um, um/m, mm, and what it may be at most, um."""
@@ -82,20 +69,18 @@ class Server:
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
         self.unit = 1.0 if options.unit == "mm" else 1.0 / 25.4
-        self.axes = {a.letter.upper(): a for a in (Axis(t, options.pattern, self.unit) for t in options.axis)}
+        self.axes = {a.letter.upper(): a for a in (Axis(t, self.unit) for t in options.axis)}
         self.magnitude, self.rate = options.magnitude, options.rate
         self.heard = time.monotonic()  # when the service spoke last; a new process gives it the whole time
         self.ticks, self.echoed = 0, time.monotonic()
         self.client: socket.socket | None = None
         self.since, self.buffer = 0.0, b""
         self.selector = selectors.DefaultSelector()
-        self.component = join()
-        self.sent = bool(hal.get_value("tc.beat.in-0"))  # by the one that was there before
-        for axis in self.axes.values():
-            axis.stay()
+        self.pins = join(list(self.axes.values()))
+        self.sent = self.pins["heartbeat"]
         self.listener = listen(options.socket, options.group)
         self.selector.register(self.listener, selectors.EVENT_READ)
-        self.component.ready()
+        self.pins.ready()
 
     def run(self) -> None:
         """Run until LinuxCNC ends."""
@@ -113,23 +98,28 @@ class Server:
             if now - self.echoed > GONE:
                 return
 
+    def get(self, axis: Axis, pin: str) -> float:
+        """Return the value of a pin of an axis."""
+        return float(self.pins[f"{axis.letter}.{pin}"])
+
     # -- the controller ------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
         """Look at the controller, and say where the lines shall go and how fast."""
-        if bool(hal.get_value("tc.beat.out")) == self.sent:
+        if self.pins["beat"] == self.sent:
             self.echoed, self.sent = now, not self.sent
-            hal.set_p("tc.beat.in-0", str(int(self.sent)))
+            self.pins["heartbeat"] = self.sent
         self.ticks += 1
         silent = now - self.heard
         alive = silent <= self.options.timeout
-        hal.set_p("tc.alive.in-0", str(int(alive)))
+        self.pins["alive"] = alive
         if now - max(self.heard, self.since) > self.options.timeout:
             self.drop()
         fading = silent > self.options.timeout + self.options.hold
         for axis in self.axes.values():
             self.move(axis, fading)
-            follows = abs(axis.get("clip.out") - hal.get_value(axis.in_force)) <= ASIDE * 1e-3 * self.unit
+            aside = abs(self.get(axis, "demand") - self.get(axis, "force"))
+            follows = aside <= ASIDE * 1e-3 * self.unit
             axis.aside = None if follows else axis.aside or now
 
     def move(self, axis: Axis, fading: bool) -> None:
@@ -142,32 +132,30 @@ class Server:
         low, high = (max(-most, min(most, v)) for v in axis.ends or (0.0, 0.0))
         offset, slope = (low + high) / 2.0, (high - low) / (2.0 * axis.half)
         rate = micron * (min(self.rate, self.options.fade) if fading else self.rate)
-        begin = axis.get("offset.out"), axis.get("slope.out")
+        begin = self.get(axis, "offset-now"), self.get(axis, "slope-now")
         if begin == (offset, slope):  # there: as fast as it has to come back after off and on, whoever lives then
             begin = 0.0, 0.0
         steps = abs(offset - begin[0]), abs(slope - begin[1])
         seconds = (steps[0] + steps[1] * axis.half) / rate or 1.0  # of the end that moves more
-        axis.put("offset.maxv", 0.0)  # the servo thread may run in between: never both too fast, never to a wrong place
-        axis.put("slope.maxv", 0.0)
-        axis.put("from0.in1", offset)
-        axis.put("from1.in1", slope)
-        axis.put("offset.maxv", steps[0] / seconds)
-        axis.put("slope.maxv", steps[1] / seconds)
+        letter = axis.letter  # the servo thread may run in between: never both too fast, never to a wrong place
+        self.pins[f"{letter}.offset-rate"] = self.pins[f"{letter}.slope-rate"] = 0.0
+        self.pins[f"{letter}.offset"], self.pins[f"{letter}.slope"] = offset, slope
+        self.pins[f"{letter}.offset-rate"], self.pins[f"{letter}.slope-rate"] = (v / seconds for v in steps)
 
     def why(self, now: float) -> str:
         """Return why nothing is in force; empty if something can be."""
         if now - self.echoed > STILL:
             return "the controller stands still"
-        if hal.get_value("tc.on.out"):
+        if self.pins["on"]:
             return ""
-        if not hal.get_value("tc.homed.out"):
+        if not self.pins["homed"]:
             return "not homed"
-        return "off" if not hal.get_value("motion.motion-enabled") else "in joint mode"
+        return "in joint mode" if self.pins["enabled"] else "off"
 
     def report(self, beat: int) -> dict[str, Any]:
         """Return what is in force."""
         now = time.monotonic()
-        why, limited = self.why(now), bool(hal.get_value("motion.eoffset-limited"))
+        why, limited = self.why(now), self.pins["limited"]
         micron = 1e-3 * self.unit
         axes = {}
         for letter, axis in self.axes.items():
@@ -176,12 +164,12 @@ class Server:
                 alarm = "clipped at a soft limit" if limited else "does not follow: is OFFSET_AV_RATIO in the INI?"
             share = 0.0 if why else 1.0  # LinuxCNC goes on showing an offset that it has made part of the position
             axes[letter] = {
-                "offset": share * axis.get("offset.out") / micron,
-                "slope": share * axis.get("slope.out") * 1e6,
+                "offset": share * self.get(axis, "offset-now") / micron,
+                "slope": share * self.get(axis, "slope-now") * 1e6,
                 "reference": axis.middle / self.unit,
-                "position": hal.get_value(f"axis.{axis.letter}.pos-cmd") / self.unit,
-                "demand": share * axis.get("clip.out") / micron,
-                "in_force": share * hal.get_value(axis.in_force) / micron,
+                "position": (self.get(axis, "away") + axis.middle) / self.unit,
+                "demand": share * self.get(axis, "demand") / micron,
+                "in_force": share * self.get(axis, "force") / micron,
                 "alarm": alarm,
             }
         known = {"beat": beat, "ticks": self.ticks, "timeout": self.options.timeout}
@@ -253,15 +241,46 @@ class Server:
         return self.report(beat)
 
 
-def join() -> Any:
-    """Return a component under a name that HAL does not know yet: those of components that were killed stay there."""
-    for k in itertools.count():
+def named(k: int) -> str:
+    """Return the name of the component after so many that were killed."""
+    return f"{NAME}-{k}" if k else NAME
+
+
+def join(axes: list[Axis]) -> Any:
+    """Return a component whose pins hang on the signals of ``thermocomp.hal``; nothing moves by that.
+
+    Pins are read and written without HAL's lock: a process that is killed while it holds that stops LinuxCNC.
+    """
+    for k in range(MOST + 1):
         try:
-            return hal.component(NAME if k == 0 else f"{NAME}-{k}")
-        except hal.error:
-            if k >= MOST:
+            component = hal.component(named(k))
+            break
+        except hal.error:  # one that was killed: its name and pins stay
+            if k == MOST:
                 raise
-    return None
+    hal.set_msg_level(hal.MSG_NONE)
+    told = {"heartbeat": hal.HAL_BIT, "alive": hal.HAL_BIT}
+    heard = dict.fromkeys(("beat", "on", "homed", "enabled", "limited"), hal.HAL_BIT)
+    for axis in axes:
+        told |= dict.fromkeys((f"{axis.letter}.{part}" for part in TOLD), hal.HAL_FLOAT)
+        heard |= dict.fromkeys((f"{axis.letter}.{part}" for part in HEARD), hal.HAL_FLOAT)
+    for pins, way in ((heard, hal.HAL_IN), (told, hal.HAL_OUT)):
+        for pin, kind in pins.items():
+            component.newpin(pin, kind, way)
+            signal_name = f"tc-{pin.replace('.', '-')}"
+            if way == hal.HAL_OUT:
+                part = pin.rpartition(".")[2]
+                now = pin if part in ("heartbeat", "alive") else f"{pin}-now"
+                if part.endswith("-rate"):
+                    component[pin] = 0.0
+                else:
+                    component[pin] = hal.get_value(f"tc-{now.replace('.', '-')}")
+                for killed in range(k):  # a signal is told by one
+                    with contextlib.suppress(hal.error, RuntimeError):
+                        hal.disconnect(f"{named(killed)}.{pin}")
+            hal.connect(f"{named(k)}.{pin}", signal_name)
+    hal.set_msg_level(hal.MSG_ERR)
+    return component
 
 
 def listen(path: str, group: str) -> socket.socket:
@@ -315,7 +334,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # LinuxCNC ends
     try:
         server = Server(options)
-    except RuntimeError as e:  # it would be started anew without end
+    except (hal.error, RuntimeError) as e:  # it would be started anew without end
         print(f"thermocomp: {e}: LinuxCNC does not run with thermocomp.hal", file=sys.stderr)
         return
     server.run()

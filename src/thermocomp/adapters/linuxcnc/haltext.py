@@ -39,13 +39,14 @@ def load_modules(axes: Sequence[HalAxis], joints: int, pattern: str, files: HalF
     letters = [a.letter for a in axes]
     homed = ["tc.homed" if k == 0 else f"tc.homed-{k}" for k in range(-(-joints // _INPUTS))]
     wanted = {
-        "lut5": ["tc.on", "tc.off", "tc.was", "tc.beat", "tc.alive", *homed],
+        "lut5": ["tc.on", "tc.off", "tc.was", "tc.beat", "tc.alive", "tc.enabled", "tc.limited", *homed],
         "mux2": [f"tc.{a}.{n}" for a in letters for n in ("from0", "from1")],
         "limit2": [f"tc.{a}.{n}" for a in letters for n in ("offset", "slope", "clip")],
         "mult2": [f"tc.{a}.times" for a in letters],
         "sum2": [f"tc.{a}.{n}" for a in letters for n in ("away", "line")],
     }
     if pattern == "offset":
+        wanted["limit2"] += [f"tc.{a}.force" for a in letters]
         wanted["sum2"] += [f"tc.{a}.{n}" for a in letters for n in ("error", "counts")]
         wanted["conv_float_s32"] = [f"tc.{a}.whole" for a in letters]
         wanted["conv_s32_float"] = [f"tc.{a}.back" for a in letters]
@@ -97,7 +98,7 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
         lines += [_net(files, pin, f"{name}.in-{i}") for i, pin in enumerate(here)]
         lines += [f"setp {name}.in-{i} 1" for i in range(len(here), _INPUTS)]
         lines.append(f"net {before} => {name}.in-4" if before else f"setp {name}.in-4 1")
-        before = f"tc-homed-{k}"
+        before = "tc-homed" if joints <= _INPUTS * (k + 1) else f"tc-homed-{k}"
         lines.append(f"net {before} {name}.out")
         lines.append(f"addf {name} servo-thread")
     lines += [f"net {before} => {n}.in-3" for n in ("tc.on", "tc.off", "tc.was")]
@@ -111,8 +112,12 @@ def make_gate(joints: int, pattern: str, files: HalFiles) -> list[str]:
     lines += ["net tc-was tc.was.out => tc.on.in-4 tc.off.in-4", f"setp tc.was.function {table:#x}"]
     lines += [f"setp tc.on.function {table << 16:#x}", f"setp tc.off.function {0xFFFFFFFF ^ table << 16:#x}"]
     lines += ["net tc-on tc.on.out", "net tc-off tc.off.out"]
-    lines += ["setp tc.beat.function 0x2", "setp tc.alive.function 0x2"]  # what comes in goes out
-    return lines + [f"addf {n} servo-thread" for n in ("tc.on", "tc.off", "tc.was", "tc.beat", "tc.alive")]
+    lines += ["net tc-heartbeat => tc.beat.in-0", "net tc-beat tc.beat.out", "net tc-alive => tc.alive.in-0"]
+    lines += [_net(files, "motion.motion-enabled", "tc.enabled.in-0"), "net tc-enabled tc.enabled.out"]
+    lines += [_net(files, "motion.eoffset-limited", "tc.limited.in-0"), "net tc-limited tc.limited.out"]
+    copying = ("tc.beat", "tc.alive", "tc.enabled", "tc.limited")
+    lines += [f"setp {n}.function 0x2" for n in copying]  # what comes in goes out
+    return lines + [f"addf {n} servo-thread" for n in ("tc.on", "tc.off", "tc.was", *copying)]
 
 
 def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -> list[str]:
@@ -137,8 +142,9 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
         lines += [
             f"net tc-on => tc.{a}.from{k}.sel",
             f"net tc-{a}-{part}-gated tc.{a}.from{k}.out => tc.{a}.{part}.in",
+            f"net tc-{a}-{part} => tc.{a}.from{k}.in1",
             f"net tc-off => tc.{a}.{part}.load",
-            f"setp tc.{a}.{part}.maxv 0",
+            f"net tc-{a}-{part}-rate => tc.{a}.{part}.maxv",
         ]
     lines += [
         f"net tc-{a}-slope-now tc.{a}.slope.out => tc.{a}.times.in0",
@@ -180,7 +186,9 @@ def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
         f"net tc-{a}-before tc.{a}.back.out => tc.{a}.counts.in1",
         f"net tc-{a}-counts-float tc.{a}.counts.out => tc.{a}.whole.in",
         f"net tc-{a}-counts tc.{a}.whole.out => axis.{a}.eoffset-counts tc.{a}.back.in",
-        *(f"addf tc.{a}.{n} servo-thread" for n in ("error", "counts", "whole", "back")),
+        _net(files, f"axis.{a}.eoffset", f"tc.{a}.force.in"),
+        f"net tc-{a}-force tc.{a}.force.out",
+        *(f"addf tc.{a}.{n} servo-thread" for n in ("error", "counts", "whole", "back", "force")),
     ]
 
 
@@ -201,7 +209,7 @@ def make_drive(axis: HalAxis, files: HalFiles) -> list[str]:
         f"net tc-{a}-demand tc.{a}.clip.out => tc.{a}.smooth.in",
         f"setp tc.{a}.smooth.maxv {axis.speed!r}",
         f"setp tc.{a}.smooth.maxa {axis.acceleration!r}",
-        f"net tc-{a}-smooth tc.{a}.smooth.out => tc.{a}.drive.offset",
+        f"net tc-{a}-force tc.{a}.smooth.out => tc.{a}.drive.offset",
         f"net {told} => tc.{a}.drive.in",
         *(f"unlinkp {pin}" for pin in drives),
         f"unlinkp {feedback}",
