@@ -105,6 +105,20 @@ def test_a_faster_spindle_than_in_the_training_is_no_failure(samples: Samples) -
     assert not found.any()
 
 
+@pytest.mark.parametrize("speed", [1e308, -1e308, 1e9, math.nan, math.inf])
+def test_a_speed_that_no_spindle_has_leaves_nothing_behind(watch: Watch, samples: Samples, speed: float) -> None:
+    names = [c.name for c in samples.inputs]
+    row, values = 600, samples.values[:900].copy()
+    values[row, names.index("spindle_rpm")] = speed
+    if speed == 1e308:
+        values[row] = speed  # and all temperatures with it
+    part = samples.take(np.arange(900))
+    _, found, _, through = run(watch, part, values[:, None])
+    assert np.isfinite(through[row + 1 :]).all()
+    assert np.array_equal(through[row + 1 :, 0], values[row + 1 :])
+    assert not found.any()
+
+
 def test_what_stands_in_does_not_jump_and_stays_near(watch: Watch, samples: Samples) -> None:
     row = 1000
     values = disturbed(samples, row)

@@ -80,6 +80,9 @@ def test_what_it_says(tmp_path: Path) -> None:
         ),
         ("[page]", '[[probes]]\nkind = "mqtt"\n[page]', "probes.1.topic is missing"),
         ("[page]", '[[probes]]\nkind = "simulated"\nevery = 0.0\n[page]', "probes.1: every = 0"),
+        ('kind = "file"\nfile = "corrections.json"', 'kind = "file"', "sinks.1.file is missing"),
+        ("[page]", "[journal]\n[page]", "journal.file is missing"),
+        ('kind = "file"\nfile = "corrections.json"', 'kind = "mqtt"\ntopic = "m/#"', "has no wildcards"),
         ("port = 8080", "settled = 0.0", "page: settled = 0: want more than 0 um"),
         ('kind = "file"\nfile = "corrections.json"', 'kind = "linuxcnc"\nsocket = "s"', "sinks.1.axes is missing"),
         (

@@ -16,7 +16,7 @@ from driftmodels import ACCEPTED, growing
 from thermocomp.adapters.mqtt import MqttSink, MqttSource
 from thermocomp.adapters.plain import FileSink
 from thermocomp.core.correction import Correction, Limits
-from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status as LinkStatus
 from thermocomp.core.reading import Reading
 from thermocomp.files import statefile
@@ -159,13 +159,82 @@ def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def test_a_damaged_state_is_a_cold_start_and_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "state.json"
-    path.write_text("{}", encoding="ascii")
+    statefile.write(machine().start(), machine(), path, datetime.now(UTC))
+    cut = path.read_text(encoding="utf-8")[:700]
+    path.write_text(cut, encoding="utf-8")
     service = Service(machine(), [], [], state_path=path)
     assert service.events[0].text.startswith("cold start: ")
-    assert (tmp_path / "state.json.refused").read_text(encoding="ascii") == "{}"
+    assert path.read_text(encoding="utf-8") == cut  # only looked at
+
+    async def work() -> None:
+        await until(lambda: (tmp_path / "state.json.refused").exists())
+
+    asyncio.run(running(service, work))
+    assert (tmp_path / "state.json.refused").read_text(encoding="utf-8") == cut
     other = replace(growing("z_um", 2.0), intercept=1.0, honest_error=ACCEPTED)
     statefile.write(machine().start(), machine(), path, datetime.now(UTC))
     assert "other models" in Service(Compensator.of([other]), [], [], state_path=path).events[0].text
+
+
+@pytest.mark.parametrize("content", ["{}", '{"format": "thermocomp-model"}', "the state of affairs", None])
+def test_a_file_of_others_is_not_written_over(content: str | None, tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    path.mkdir() if content is None else path.write_text(content, encoding="ascii")
+    with pytest.raises(InputError, match="no state file, and would be written over"):
+        Service(machine(), [], [], state_path=path)
+    assert path.is_dir() if content is None else path.read_text(encoding="ascii") == content
+
+
+def test_it_fades_out_without_a_reading_and_the_next_start_runs(tmp_path: Path) -> None:
+    path, limits = tmp_path / "state.json", Limits(rate=4.0)
+    service = Service(machine(limits), [], [FileSink(path=tmp_path / "out.json")], state_path=path)
+    for t in (20.0, 20.5):
+        service.take(Reading(time.time(), {"t": t}))
+        time.sleep(0.3)
+    service.take(Reading(time.time(), {"t": 20.5}))
+    assert service.state.corrections["z_um"].offset < -0.9
+    seen: list[float] = []
+
+    async def work() -> None:
+        fading = asyncio.create_task(service.fade_out())
+        while not fading.done():
+            seen.append(service.state.corrections["z_um"].offset)
+            service.take(Reading(time.time(), {"t": 30.0}))  # too late
+            await asyncio.sleep(0.05)
+
+    asyncio.run(running(service, work))
+    assert service.state.corrections["z_um"].offset == 0.0
+    assert any(-0.9 < v < -0.05 for v in seen)  # within the rate
+    again = Service(machine(limits), [], [], state_path=path)
+    assert again.state.orders == {}
+
+
+class Odd(Broken):
+    """A sink that fails in a way nobody foresaw."""
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        raise ValueError("Publish topic cannot contain wildcards.")
+
+
+def test_a_sink_that_fails_in_an_odd_way_stops_nothing(tmp_path: Path) -> None:
+    source, path = Given(), tmp_path / "out.json"
+    service = Service(machine(), [source], [Odd(hangs=False), FileSink(path=path)])
+
+    async def work() -> None:
+        for k in range(2):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+        await until(lambda: path.exists() and "-2.0" in path.read_text())
+
+    asyncio.run(running(service, work))
+
+
+def test_a_reading_of_tomorrow_is_not_used() -> None:
+    service = Service(machine(), [], [])
+    service.take(Reading(time.time(), {"t": 20.0}))
+    service.take(Reading(time.time() + 3600.0, {"t": 25.0}))
+    service.take(Reading(1e18, {"t": 25.0}))
+    assert service.counts == {"readings": 1, "rejected": 2}
 
 
 def test_without_a_reading_it_holds_and_says_so() -> None:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.adapters.messages import read_message, write_message
+from thermocomp.adapters.messages import read_measurement, read_message, write_message
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
+from thermocomp.core.reading import Measurement
 
 
 def test_values_by_name() -> None:
@@ -54,3 +55,28 @@ def test_corrections() -> None:
         "time": 9.0,
         "corrections": {"Z": {"offset_um": 1.5, "slope_um_per_m": 2.0, "reference_position_mm": 3.0}},
     }
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        '{"target": "z_um", "measured_um": 3.0}',
+        '{"target": "z_um", "measured_um": 3.0, "under_correction": "yes"}',
+        '{"target": "z_um", "measured_um": NaN, "under_correction": true}',
+        '{"target": "z_um", "measured_um": 1e308, "under_correction": true}',
+        '{"target": "z_um", "measured_um": 3.0, "under_correction": true, "repeatability_um": -1}',
+        '{"target": "z_um", "measured_um": 3.0, "under_correction": true, "more": 1}',
+        '{"target": 7, "measured_um": 3.0, "under_correction": true}',
+        '{"measured_um": 3.0, "under_correction": true}',
+        "[]",
+        "{",
+    ],
+)
+def test_a_measurement_that_is_none(payload: str) -> None:
+    with pytest.raises(ReadingError, match=r"measurement|message"):
+        read_measurement(payload, 5.0)
+
+
+def test_a_measurement() -> None:
+    told = '{"target": "z_um", "measured_um": 3, "under_correction": false, "position_mm": 10.5, "time": 7}'
+    assert read_measurement(told, 5.0) == Measurement(7.0, "z_um", 3.0, False, 0.5, 10.5)

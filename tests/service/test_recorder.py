@@ -36,13 +36,18 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
             await until(lambda k=k: k == 0 or service.confirmed["z_um"].offset == -2.0 * k)
         # the machine is off by 9 um, and 8 of them are corrected
         service.measure(Measurement(time.time(), "z_um", 1.0, left=True, repeatability=0.1))
+        say(source, 24.0)
+        await until(lambda: len(service.checked) == 1)
+        service.measure(Measurement(time.time(), "z_um", 5000.0, left=True, repeatability=0.1))
+        say(source, 24.0)
+        await until(lambda: len(service.checked) == 2)
         service.measure(Measurement(time.time(), "z_um", 9.0, left=False, repeatability=0.1))
         say(source, 24.0)
-        await until(lambda: service.checked)
+        await until(lambda: len(service.checked) == 3)
         service.rezero("z_um", "homing")
         service.order("z_um", Status("holding", "by hand"))
         source.queue.put_nowait(Reading(time.time(), {"t": 24.0, "t9_C": 19.5, "t10_C": 3.0}))
-        await until(lambda: service.counts["readings"] == 7)
+        await until(lambda: service.counts["readings"] == 9)
 
     asyncio.run(running(service, work))
     reader = JournalReader(tmp_path / "live.db")
@@ -54,9 +59,10 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
     }
     start = next(r for r in rows if type(r).__name__ == "Start")
     found = [measured_by(r, start) for r in rows if type(r).__name__ == "MeasurementRow"]  # type: ignore[arg-type]
-    assert found == [pytest.approx(9.0), pytest.approx(9.0)]
+    assert found == [pytest.approx(9.0), pytest.approx(9.0)]  # and not the five thousand, which was refused
     updates = [r for r in rows if type(r).__name__ == "UpdateRow"]
-    assert [(u.measured, u.before) for u in updates] == [(pytest.approx(9.0), pytest.approx(8.0))]  # type: ignore[union-attr]
+    assert [bool(u.refused) for u in updates] == [False, True, False]  # type: ignore[union-attr]
+    assert (updates[0].measured, updates[0].before) == (pytest.approx(9.0), pytest.approx(8.0))  # type: ignore[union-attr]
     assert [r.why for r in rows if type(r).__name__ == "ReferenceRow"][-1] == "homing"  # type: ignore[union-attr]
     assert [r.word for r in rows if type(r).__name__ == "StateRow"] == ["active", "holding"]  # type: ignore[union-attr]
     exported = export(reader)

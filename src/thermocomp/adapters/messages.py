@@ -13,6 +13,8 @@ from thermocomp.core.reading import Measurement, Reading
 MOST_BYTES, MOST_VALUES = 65_536, 1_000
 #: numbers of a measurement, and what they are if it does not say; it has to say the first
 _NUMBERS = {"measured_um": None, "repeatability_um": 0.5, "position_mm": 0.0}
+#: no tool point is further off [um]
+_FAR = 1e5
 _KNOWN = {"time", "target", "under_correction", *_NUMBERS}
 
 
@@ -69,6 +71,8 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
         raise ReadingError(f"a measurement whose {', '.join(wrong)[:80]} cannot be used; want {example}")
+    if abs(found["measured_um"] or 0.0) > _FAR or not 0.0 <= (found["repeatability_um"] or 0.0) <= _FAR:
+        raise ReadingError(f"a measurement beyond {_FAR:g} um, or a repeatability below 0: nothing a probe can say")
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     return Measurement(at, str(target)[:200], measured, bool(left), spread, position)
 

@@ -328,7 +328,7 @@ def assess(
         rules=Rules(harm_margin),
         limits=limits,
         starts=begun,
-        probings=Probings.parse(probing) if isinstance(probing, str) else probing,
+        probings=Probings.of(probing),
         progress=progress,
     )
     return Assessed(judged, tuple(tests), tuple(trouble_of(tests)))

@@ -57,8 +57,24 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
         None if nothing can be watched; see `thermocomp.models.watching.find_watch`.
     """
     watch = find_watch(samples, learn)
-    if watch is None:
-        return None
+    return None if watch is None else let_fail(watch, samples, rows)
+
+
+def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
+    """Let each temperature fail in turn, and every two of few; see what a watch makes of it.
+
+    Parameters
+    ----------
+    watch : Watch
+    samples : Samples
+        With all its inputs.
+    rows : ndarray of bool of shape (n_rows,)
+        Rows that are judged: their tests are gone through.
+
+    Returns
+    -------
+    Guard
+    """
     together = combinations(watch.names, 2) if len(watch.names) <= FEW else ()
     failing = [*((name,) for name in watch.names), *together]
     names = [c.name for c in samples.inputs]

@@ -1,6 +1,6 @@
 """Judge one model on one block that it has not seen: what it leaves, and whether it may run."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -167,7 +167,7 @@ def _verdict(
             if mine.sum() >= MIN_ROWS
         ),
         unit=model.unit,
-        caps=_caps(split, learned, samples, target),
+        caps=_caps(split, learned, samples, target, model.watch.names if model.watch else ()),
         refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
         stated=rules.margin,
     )
@@ -189,9 +189,14 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
     return (f"only {covered.independent} of {covered.units} units are not alike, at least {needed} are needed",)
 
 
-def _caps(split: Split, learned: Learned | None, samples: Samples, target: int) -> tuple[str, ...]:
-    """Return what keeps a model from being accepted, whatever its errors."""
-    others = {c.name for k, c in enumerate(samples.targets) if k != target}
+def _caps(
+    split: Split, learned: Learned | None, samples: Samples, target: int, watched: Sequence[str]
+) -> tuple[str, ...]:
+    """Return what keeps a model from being accepted, whatever its errors.
+
+    What is wrong with temperatures that a watch looks after (`watched`) is judged with what stood in for them.
+    """
+    others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]
     if split.stretch:
         found.append("judged on one stretch that goes on from what was learned")

@@ -66,6 +66,21 @@ class Probings:
         every = float(found["n"]) * _SECONDS[found["unit"][0]]
         return cls(every) if found["um"] is None else cls(every, float(found["um"]))
 
+    @classmethod
+    def of(cls, given: object) -> "Probings | None":
+        """Return probings as given in Python: in words, as they are, or none.
+
+        Raises
+        ------
+        InputError
+            It is something else.
+        """
+        if given is None or isinstance(given, Probings):
+            return given
+        if isinstance(given, str):
+            return cls.parse(given)
+        raise InputError(f"probing {given!r}: want words such as 'every 2 h', or Probings(every=7200.0)")
+
     def find_rows(self, time: FloatArray, usable: BoolArray) -> NDArray[np.intp]:
         """Return the rows in which probings are made.
 

@@ -156,6 +156,13 @@ class Assessment:
         """Return the metric of what would run without probings."""
         return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
 
+    @property
+    def undisturbed(self) -> float:
+        """RMS that noise and lost sensors are compared with: of the model alone, without probings."""
+        if self.probed is not None or self.alone is None:
+            return self.unprobed_metric("rms")
+        return metrics.METRICS["rms"](self.measured, self.alone)
+
     def held_metric(self, name: str) -> float:
         """Return the metric of probings without a model, each held until the next; without one, that of nothing."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from thermocomp.assessment import coverage
 from thermocomp.assessment.compare import compare, split_by_cycle
 from thermocomp.assessment.do_no_harm import Verdict
-from thermocomp.assessment.guards import find_guard
+from thermocomp.assessment.guards import Guard, find_guard, let_fail
 from thermocomp.assessment.judge import cap_alike_units, judge
 from thermocomp.assessment.leaks import find_learned_rows
 from thermocomp.assessment.pieces import explain
 from thermocomp.assessment.probing import Probings
 from thermocomp.assessment.refit import stress_written
-from thermocomp.assessment.replay import are_absolute, believe, stack_watched
+from thermocomp.assessment.replay import are_absolute, believe, can_look, stack_watched
 from thermocomp.assessment.results import Assessment, Comparison, Rules
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -269,6 +269,7 @@ def assess(
             absolute=are_absolute(models),
         )
     told: tuple[tuple[str, Start], ...] = ()
+    guards: list[Guard] = []
     errors: list[Exception] = []
     for model in models:
         progress(f"{model.target} {model.family}")
@@ -278,7 +279,8 @@ def assess(
             samples = _called_as_in(model, samples)
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
             samples, widening = believe(model, samples, every, watched)
-            overall, judged = _assess(model, samples, known, rules, limits, probings, widening)
+            guard = _guard(model, samples, watched, guards)
+            overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
@@ -365,6 +367,7 @@ def _assess(
     limits: Limits,
     probings: Probings | None,
     widening: FloatArray,
+    guard: Guard | None,
 ) -> tuple[Assessment, Judging]:
     """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
 
@@ -386,10 +389,30 @@ def _assess(
         )
         caveat, known = f"no honest test: {why}; judge it on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
-    found = judge(_name(model), model, samples, split, rules=rules, limits=limits, probings=probings, widening=widening)
+    found = judge(
+        _name(model), model, samples, split,
+        rules=rules, limits=limits, guard=guard, probings=probings, widening=widening,
+    )  # fmt: skip
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
     return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging
+
+
+def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
+    """Return what a model's watch lets through while sensors fail; models of one file share it (`known`)."""
+    watch = model.watch
+    if watch is None or watched is None or not can_look(watch, watched):
+        return None
+    have = [c.name for c in watched.inputs]
+    if any(i.name not in have for i in watch.inputs):
+        return None
+    guard = next((g for g in known if g.watch is watch or g.watch == watch), None)
+    if guard is None:
+        every = np.ones(len(watched), np.bool_)
+        guard = let_fail(watch, believe(model, watched, every)[0], every)
+        known.append(guard)
+    own = [c.name for c in samples.inputs]
+    return guard.among([own.index(name) if name in own else -1 for name in have])
 
 
 def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:

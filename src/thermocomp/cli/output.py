@@ -18,7 +18,7 @@ from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
 from thermocomp.report import records
 from thermocomp.report.bands import describe_bands
-from thermocomp.report.faults import describe_faults
+from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Layout, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
@@ -187,6 +187,8 @@ def show_assess(
     _tell_starts(judged.starts, console)
     for line in describe_faults(logs, recordings):
         console.print(f"[yellow]sensor failed[/] {words(line)}", soft_wrap=True)
+    for line in describe_held(judged, logs):
+        console.print(f"[yellow]but[/] {words(line)}", soft_wrap=True)
     print_table(_assessment_table(judged.assessments), console)
     print_table(_cycle_table(judged.assessments), console)
     print_table(_robustness(judged.overall()), console)
@@ -268,7 +270,7 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
     rows = [
         {
             "target": a.target,
-            "clean": a.unprobed_metric("rms"),  # noise and losses are tried without probings
+            "clean": a.undisturbed,
             **{law: mean for law, (mean, _) in a.robustness.noise_rms.items()},
             "lost": "{1:.2f} ({0})".format(*a.robustness.worst_lost),
             "outside": f"{100 * a.robustness.outside:.1f} %",
@@ -277,7 +279,7 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
         if a.robustness is not None
     ]
     probed = any(a.probed is not None for a in assessments)
-    return Layout(columns, rows, f"Robustness: RMS in um{', without probings' if probed else ''}")
+    return Layout(columns, rows, f"Robustness of the models alone: RMS in um{', without probings' if probed else ''}")
 
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Layout:

@@ -45,7 +45,7 @@ def serve(
         TOML file: models, sources, sinks, limits, page.
     demo : bool
         Without a configuration: the virtual machine at 60 times the speed of the world, with a model that is fitted to
-        a recording of it first (half a minute).
+        a recording of it first (a minute or more).
     port : int
         Of the page, in place of the configured one; 0: any that is free.
     output : Path
@@ -74,34 +74,34 @@ def serve(
         console.print(
             words(f"{target}: {'runs' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
         )
+    from thermocomp.service import web
+    from thermocomp.service.page import make_app
+
+    token = web.read_token(settings.folder / page.token_file) if page is not None and page.token_file else ""
     if check:
         return 0
-    work: list[Coroutine[Any, Any, None]] = [service.run()]
+    work: list[Coroutine[Any, Any, None]] = []
     if page is not None:
-        from thermocomp.service import web
-        from thermocomp.service.page import make_app
-
-        token = web.read_token(settings.folder / page.token_file) if page.token_file else ""
         listening = web.listen(page.host, page.port)
         host, number = listening.getsockname()[:2]
         where = f"[{host}]" if ":" in host else host
         console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
         work.append(web.serve(make_app(service, token, page.settled, (page.host,)), listening))
-    asyncio.run(_run(service if settings.config.at_stop == "fade" else None, work))
+    asyncio.run(_run(service, settings.config.at_stop == "fade", [service.run(), *work]))
     return 0
 
 
-async def _run(fades: "Service | None", work: Sequence[Coroutine[Any, Any, None]]) -> None:
+async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, Any, None]]) -> None:
     loop, task = asyncio.get_running_loop(), asyncio.current_task()
     assert task is not None
     fading: list[asyncio.Task[None]] = []
 
     def stop() -> None:
-        if fades is None or fading:  # a second signal does not wait
+        if not fades or fading:  # a second signal does not wait
             task.cancel()
             return
         console.print("stopping: the corrections go to zero first; stop again not to wait for it")
-        fading.append(asyncio.create_task(fades.fade_out()))
+        fading.append(asyncio.create_task(service.fade_out()))
         fading[0].add_done_callback(lambda _: task.cancel())
 
     for name in (signal.SIGINT, signal.SIGTERM):
@@ -110,7 +110,8 @@ async def _run(fades: "Service | None", work: Sequence[Coroutine[Any, Any, None]
         async with asyncio.TaskGroup() as group:
             for one in work:
                 group.create_task(one)
-    console.print("stopped: the corrections stay as they are now; the state is saved")
+    kept = f"the state is not saved: {service.not_saved}" if service.not_saved else "the state is saved"
+    console.print(words(f"stopped: the corrections stay as they are now; {kept}"), soft_wrap=True)
 
 
 def _demo(folder: Path) -> Path:
@@ -118,7 +119,7 @@ def _demo(folder: Path) -> Path:
     config, model = folder / "serve.toml", folder / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     if not model.exists():
-        console.print("A model of the virtual machine is fitted to a recording of it, half a minute ...")
+        console.print("A model of the virtual machine is fitted to a recording of it, a minute or more ...")
         with needs("study"):
             from thermocomp.api.verbs import fit, simulate
         fit(simulate("demo"), _TARGETS, inputs=_INPUTS, jobs=-1).save(model)

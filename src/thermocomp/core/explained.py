@@ -162,7 +162,7 @@ def explain(model: ErrorModel) -> Explanation:
     known = {g.name: g for g in gains(model, _ANY)} if isinstance(model, PacedDynamic) else {}
     order = list(known) if known else [i.name for i in model.inputs]
     found = model.honest_error
-    several = [rms for key, rms in found.lost.items() if key not in {i.name for i in model.inputs}] if found else []
+    several = [key for key in found.lost if key not in {i.name for i in model.inputs}] if found else []
     return Explanation(
         target=model.target,
         unit=model.unit,
@@ -184,7 +184,7 @@ def explain(model: ErrorModel) -> Explanation:
         band=model.band.tell(model.unit) if model.band else "",
         outside=_outside(model),
         covered=_covered(model),
-        pairs=(len(several), sum(rms <= found.none_rms for rms in several) if found else 0),
+        pairs=(len(several), sum(model.may_lose(names.split(", ")) for names in several)),
     )
 
 
@@ -327,7 +327,7 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
             f"jump over {s.jump:.1f} degC in {_span(s.pace)}; off by {s.off:.1f} degC{shift}; stuck while its "
             f"prediction moves {s.moved:.1f} degC{still}"
         )
-    parts.append(lost if s.runs_on else f"{lost}: held, then fades")
+    parts.append(lost if s.runs_on else f"would leave {lost}: held, then fades")
     return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
 
 

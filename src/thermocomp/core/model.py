@@ -4,6 +4,7 @@ Estimators freeze into one of the families (`thermocomp.core.polynomial`, `therm
 object is evaluated live, replayed in every assessment and written as JSON. State in, state out: nothing hides in it.
 """
 
+import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Sequence
@@ -155,10 +156,14 @@ class ErrorModel(ABC):
         """Names of the inputs that have an influence on the deviation."""
 
     def may_lose(self, names: Sequence[str]) -> bool:
-        """Return whether it was judged without some of its inputs, and leaves less than no compensation then."""
+        """Return whether it was judged without some of its inputs, and leaves less than no compensation then.
+
+        Also without each of them alone: a second failure does not let run what the first one stopped.
+        """
         found = self.honest_error
-        key = ", ".join(i.name for i in self.inputs if i.name in names)
-        return found is not None and key in found.lost and found.lost[key] <= found.none_rms
+        own = [i.name for i in self.inputs if i.name in names]
+        left = [found.lost.get(key, math.inf) for key in (*own, ", ".join(own))] if found is not None else [math.inf]
+        return found is not None and max(left) <= found.none_rms
 
     def widening(self, names: Collection[str]) -> float:
         """Return how many times its error on unseen cycles grows without some of its inputs; at least 1."""

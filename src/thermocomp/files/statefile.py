@@ -157,6 +157,20 @@ def read(path: str | Path, compensator: Compensator) -> Saved:
     return loads(text, compensator, source)
 
 
+def is_ours(path: Path) -> bool:
+    """Return whether a file that cannot be read was a state once: it may be put aside.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    try:
+        begin = path.read_bytes()[:4096]
+    except OSError:
+        return False
+    return not begin.strip(b"\0 \r\n") or KIND.name.encode() in begin
+
+
 # -- what these models can be in ---------------------------------------------------------------------------------------
 
 

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from thermocomp.assessment.results import Assessment
 from thermocomp.core.model import ErrorModel
 
@@ -30,8 +32,10 @@ def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessmen
 
 def describe_coverage(a: Assessment) -> str:
     """Return what share of the judged rows the band held, and how wide it was there."""
+    share = 0.0 if a.half_widths is None else float(np.isfinite(a.half_widths).mean())
+    some = f" that have one ({100 * share:.0f} %; there is none where the correction is held)" if share < 0.995 else ""
     seen = ", which the model has learned from" if a.caveat else ""
     return (
-        f"The band held {100 * a.coverage:.0f} % of the judged rows{seen}, with a mean half-width of "
+        f"The band held {100 * a.coverage:.0f} % of the judged rows{some}{seen}, with a mean half-width of "
         f"{a.half_width:.2f} um ({a.band})"
     )

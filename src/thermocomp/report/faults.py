@@ -63,12 +63,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     for model, a in zip(judged.models, judged.overall(), strict=True):
         if costs := find_costs(model, a, logs):
             parts.append(_cost_table(f"{a.target}: what it cost", model.unit, costs))
-        cautions += [
-            f"{a.target}: with {', '.join(c.failed)} failed its correction is held, then fades at the machine: "
-            f"{c.rms:.2f} {model.unit} RMS in {c.hours:.1f} h (see {TITLE})."
-            for c in costs
-            if not c.runs_on
-        ]
+        cautions += [_held_words(a.target, model.unit, c) for c in costs if not c.runs_on]
     if cautions:
         limits = judged.overall()[0].limits or Limits()
         parts.append(
@@ -99,6 +94,29 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
             yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
         if len(log.faults) > TOLD:
             yield f"{log.name}: {len(log.faults) - TOLD} more failures, on the page that -o writes"
+
+
+def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
+    """Yield what was left where a correction was held because of what had failed, a line per model and failure.
+
+    Parameters
+    ----------
+    judged : Judged
+    logs : sequence of FaultLog
+
+    Yields
+    ------
+    str
+    """
+    for model, a in zip(judged.models, judged.overall(), strict=True):
+        yield from (_held_words(a.target, model.unit, c) for c in find_costs(model, a, logs) if not c.runs_on)
+
+
+def _held_words(target: str, unit: str, cost: Cost) -> str:
+    return (
+        f"{target}: with {', '.join(cost.failed)} failed its correction is held, then fades at the machine: "
+        f"{cost.rms:.2f} {unit} RMS in {cost.hours:.1f} h."
+    )
 
 
 def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:

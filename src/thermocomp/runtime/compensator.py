@@ -318,6 +318,22 @@ class Compensator:
         failed = _failed(self.watches, state.watches)
         return new, Compensated(new.corrections, why, (), failed, states, {}, {}, {})
 
+    def withdraw(self, state: CompensatorState, passed: float) -> CompensatorState:
+        """Move all corrections towards zero, within the limits.
+
+        Parameters
+        ----------
+        state : CompensatorState
+        passed : float
+            Time since the step before [s].
+        """
+        free = replace(self.limits, dead_band=0.0)
+        found = {
+            target: limit_line(Correction(0.0), c, self.lines[target].travel, passed, free)
+            for target, c in state.corrections.items()
+        }
+        return state._replace(corrections=found)
+
     def order(self, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
         """Take a target or axis out, or let it run again.
 

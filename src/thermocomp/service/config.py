@@ -14,9 +14,11 @@ from thermocomp.files.tomlfile import as_json, read_toml
 Names = dict[str, str]
 
 
-def _check_broker(topic: str, port: int) -> None:
+def _check_broker(topic: str, port: int, *, published: bool = False) -> None:
     if not topic.strip():
         raise SettingError(f"topic = {topic!r}: name one, such as 'machine/7/temperatures'")
+    if published and set(topic) & set("+#"):
+        raise SettingError(f"topic = {topic!r}: one that is published to has no wildcards (+, #)")
     if not 0 < port <= 65535:
         raise SettingError(f"port = {port}: want one from 1 to 65535")
 
@@ -142,7 +144,7 @@ class MqttOut:
     port: int = 1883
 
     def __post_init__(self) -> None:
-        _check_broker(self.topic, self.port)
+        _check_broker(self.topic, self.port, published=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -378,8 +380,12 @@ def read_config(path: str | Path) -> Settings:
 
 
 def _tell(error: dict[str, Any]) -> str:
-    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
-    place = ".".join(f"{k + 1}" if isinstance(k, int) else str(k) for k in error["loc"] if k not in kinds) or "file"
+    kinds, parts, before = ("mqtt", "simulated", "replay", "file", "linuxcnc"), list[str](), object()
+    for k in error["loc"]:
+        if not (k in kinds and isinstance(before, int)):  # the kind of an entry is no key
+            parts.append(f"{k + 1}" if isinstance(k, int) else str(k))
+        before = k
+    place = ".".join(parts) or "file"
     context = error.get("ctx", {})
     if error["type"] == "value_error":
         return str(context["error"]) if place == "file" else f"{place}: {context['error']}"

@@ -92,7 +92,7 @@ class Outlet:
                             self.applied = newest
                         await self._confirm()
                     wait = FIRST
-            except (ThermocompError, OSError, TimeoutError):
+            except (ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
                 self._news.set()  # what was lost is applied after the next connection
             await asyncio.sleep(wait)
             wait = min(2 * wait, LONGEST)
@@ -104,7 +104,7 @@ class Outlet:
 
     async def flush(self) -> None:
         """Apply what was put last, if the sink is there."""
-        with contextlib.suppress(ThermocompError, OSError, TimeoutError):
+        with contextlib.suppress(ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
             async with asyncio.timeout(TIMEOUT):
                 await self.sink.apply(self._newest)
 

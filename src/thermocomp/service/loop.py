@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
@@ -80,19 +80,26 @@ class Service:
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
     checked: deque[Checked] = field(init=False)  #: what probings said
     before: dict[str, Adaptation | None] = field(default_factory=dict, init=False)  #: the last one was taken
+    measured: dict[str, tuple[Measurement, Correction | None]] = field(default_factory=dict, init=False)  #: as well
+    not_saved: str = field(default="", init=False)  #: why the state was not, last; empty if it was
     confirmed: dict[str, Correction] = field(default_factory=dict, init=False)  #: by the controller
 
     def __post_init__(self) -> None:
         self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
         self.outlets = [Outlet(sink, self._hear) for sink in self.sinks]
+        self._refused: Path | None = None
         self.state = self._begin()
-        self._saved, self._dirty, self._trouble = -1e9, False, ""
+        self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
+        self._told = dict[int, int]()
         self._heard = self.clock.tick()
 
     # -- what happens --------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
         """Run until it is cancelled; then save the state and leave the corrections as they are."""
+        if self._refused is not None:
+            with contextlib.suppress(OSError):
+                self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
         for sink in self.sinks:
             await self._adopt(sink)
         try:
@@ -116,9 +123,11 @@ class Service:
 
     def take(self, reading: Reading) -> None:
         """Take a reading of a source in: with it goes the latest of the others."""
+        if self._ending:
+            return
         tick, now = self.clock.tick(), self.clock.now()
         stamp, most = self.clock.of(reading.time), self.compensator.limits.reading_age
-        if now - stamp > most:
+        if not -most <= now - stamp <= most:
             self.counts["rejected"] += 1
             return
         for name, value in reading.values.items():
@@ -167,8 +176,7 @@ class Service:
             self._say("probing", f"{found.target} refused: {why}")
             return
         confirmed = self.confirmed.get(found.target)
-        if self.recorder is not None:
-            self.recorder.measure(now, found, confirmed)
+        self.measured[found.target] = (found, confirmed)
         in_force = (confirmed or self.state.corrections[found.target]) if found.left else None
         deviation = find_deviation(found.measured, found.position, in_force)
         self.probe(found.target, Probing(deviation, found.repeatability, found.position))
@@ -185,15 +193,18 @@ class Service:
         return ""
 
     async def fade_out(self) -> None:
-        """Let all corrections go to zero, within the limits, as long as readings come; then orders are as before."""
-        orders = dict(self.state.orders)
-        for target in self.compensator.lines.keys() - self.compensator.shadow.keys():
-            self.order(target, Status("shadow", "the service is being stopped"))
+        """Let all corrections go to zero, within the limits, whatever readings come or do not."""
+        self._ending, last = True, self.clock.tick()
+        self._say("service", "is being stopped: corrections go to zero")
         while any(c.offset or c.slope for c in self.state.corrections.values()):
             await asyncio.sleep(0.1)
+            tick = self.clock.tick()
+            self.state = self.compensator.withdraw(self.state, tick - last)
+            last = tick
+            for outlet in self.outlets:
+                outlet.put(self.state.corrections)
         for outlet in self.outlets:
             await outlet.flush()
-        self.state = self.state._replace(orders=orders)
 
     # -- inside --------------------------------------------------------------------------------------------------------
 
@@ -207,10 +218,10 @@ class Service:
         try:
             saved = statefile.read(self.state_path, self.compensator)
         except ThermocompError as e:
+            if not statefile.is_ours(self.state_path):
+                raise InputError(f"{self.state_path}: is no state file, and would be written over; name another") from e
             self._say("service", f"cold start: {e}")
-            kept = self.state_path.with_name(f"{self.state_path.name}.refused")
-            with contextlib.suppress(OSError):
-                self.state_path.replace(kept)
+            self._refused = self.state_path
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self.clock.speed
         state = resume(saved.state, cold, age)
@@ -241,6 +252,9 @@ class Service:
             await asyncio.sleep(min(1.0, max(0.1, 1.0 / self.clock.speed)))
             tick = self.clock.tick()
             silent = tick - self._heard
+            self._tell_refusals()
+            if self._ending:
+                continue
             if silent > max(2.0, 2.0 * self.clock.speed):
                 why = f"no reading for {silent:.0f} s"
                 self.state, said = self.compensator.wait(self.state, tick, why)
@@ -255,6 +269,14 @@ class Service:
                 if (trouble := self.recorder.journal.status().reason) != self._trouble:
                     self._trouble = trouble
                     self._say("service", f"journal: {trouble or 'all is written again'}")
+
+    def _tell_refusals(self) -> None:
+        """Say what connections could not read, once a look."""
+        for k, link in enumerate((*self.sources, *self.probes)):
+            refused = getattr(link, "refused", 0)
+            if refused > self._told.get(k, 0):
+                self._say("link", f"{refused} messages refused; the last: {getattr(link, 'last_refusal', '')}")
+                self._told[k] = refused
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -288,6 +310,8 @@ class Service:
             if self.recorder is not None:
                 added = said.deviations[target].offset + (0.0 if refused else found.residual)
                 self.recorder.update(found, added)
+                if not refused and target in self.measured:  # what is not believed is no deviation
+                    self.recorder.measure(found.time, *self.measured[target])
             if not refused:
                 self.before[target] = learned.get(target)
             if found.beyond:
@@ -326,8 +350,11 @@ class Service:
 
     def _save(self) -> None:
         if self.state_path is None:
+            self.not_saved = "no file is configured for it"
             return
         try:
             statefile.write(self.state, self.compensator, self.state_path, datetime.now(UTC))
+            self.not_saved = ""
         except (ThermocompError, OSError) as e:
+            self.not_saved = str(e)
             self._say("service", f"the state is not saved: {e}")
