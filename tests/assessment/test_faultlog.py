@@ -15,7 +15,8 @@ from thermocomp.core.reading import Reading
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.starts import Start
-from thermocomp.report.faults import describe_faults
+from thermocomp.report.bands import describe_bands
+from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.watch import GOOD
 
@@ -209,3 +210,34 @@ def test_the_failures_are_told(model: ErrorModel) -> None:
     assert first.startswith("failing: t1_C stepped from 4.")
     assert " to the end; it read +" in first
     assert second == "failing: t2_C missing from 6.00 h to the end"
+
+
+def test_losses_are_tried_with_the_watch_there(model: ErrorModel) -> None:
+    recording = failing()
+    with_watch, without = (
+        study.assess([m], [recording], starts=Start()).overall()[0].robustness
+        for m in (model, replace(model, watch=None))
+    )
+    assert with_watch is not None
+    assert without is not None
+    assert with_watch.lost_rms["t1_C"] < 0.5 * without.lost_rms["t1_C"]
+    assert with_watch.lost_rms.keys() == without.lost_rms.keys()
+
+
+def test_what_is_held_is_told_and_has_no_band(model: ErrorModel) -> None:
+    recording = failing(t3_C=(4.0, None))
+    judged = study.assess([model], [recording], starts=Start())
+    (line,) = describe_held(judged, find_faults(judged, [recording]))
+    assert line.startswith("z_um: with t3_C failed its correction is held, then fades at the machine: ")
+    (told,) = describe_bands(judged.models, judged.overall())
+    assert "of the judged rows that have one (" in told
+    (whole,) = judged.overall()
+    assert whole.undisturbed < whole.metric("rms")
+
+
+def test_a_second_failure_does_not_let_run_what_the_first_one_stopped(model: ErrorModel) -> None:
+    assert model.honest_error is not None
+    odd = replace(model, honest_error=replace(model.honest_error, lost={"t1_C": 1.5, "t3_C": 9.0, "t1_C, t3_C": 2.0}))
+    assert odd.may_lose(["t1_C"])
+    assert not odd.may_lose(["t3_C"])
+    assert not odd.may_lose(["t1_C", "t3_C"])

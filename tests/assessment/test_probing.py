@@ -108,3 +108,11 @@ def test_probings_alone_are_held_until_the_next() -> None:
 def test_a_model_that_was_never_judged_cannot_be_probed(day: Recording, fitted: tc.ErrorModel) -> None:
     with pytest.raises(InputError, match="never judged"):
         assess([replace(fitted, honest_error=None)], [day], probings=Probings(7200.0))
+
+
+@pytest.mark.parametrize("odd", [2, 7200.0, True, ["every 2 h"]])
+def test_what_is_no_plan_of_probings_is_refused(odd: object) -> None:
+    with pytest.raises(InputError, match="want words such as"):
+        Probings.of(odd)
+    assert Probings.of(None) is None
+    assert Probings.of("every 2 h") == Probings.of(Probings(7200.0))

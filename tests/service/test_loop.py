@@ -167,7 +167,7 @@ def test_a_damaged_state_is_a_cold_start_and_is_kept(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8") == cut  # only looked at
 
     async def work() -> None:
-        await until(lambda: (tmp_path / "state.json.refused").exists())
+        await until((tmp_path / "state.json.refused").exists)
 
     asyncio.run(running(service, work))
     assert (tmp_path / "state.json.refused").read_text(encoding="utf-8") == cut
