@@ -36,6 +36,10 @@ FADE = 3600.0
 REST = 3600.0
 
 
+#: a speed beyond so many times the fastest of the training heats no more than that
+HEATS = 2.0
+
+
 class WatchState(NamedTuple):
     """All that the watch remembers between two readings; arrays are (..., n_sensors) where nothing else is said."""
 
@@ -158,7 +162,7 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
         begun = robust_mean(gathered.values)
         zero = np.where(np.isnan(zero), begun, zero)
     change = begun - zero
-    memory, used = watch.bank.signals(change)[0], change[..., heat]
+    memory, used = watch.bank.signals(_calmed(watch, change))[0], change[..., heat]
     direct, weights = watch.read_out
     return state._replace(
         reference=zero,
@@ -195,7 +199,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     bridged = s.usual + s.predicted
     waiting = np.isfinite(s.jumped) & (s.fault == GOOD) & seen
     used = np.where(s.fault != GOOD, _stand_in(s, time), np.where(waiting | ~seen, bridged, np.nan_to_num(x)))
-    change = values - s.reference
+    change = _calmed(watch, values - s.reference)
     change[..., watch.bank.temperatures] = used
     memory = watch.bank.advance(s.memory, change, dt)
     direct, weights = watch.read_out
@@ -212,6 +216,14 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
     s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting))
     return _returns(watch, s, difference)
+
+
+def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
+    """Return changes with speeds that a memory can bear: one reading of 65,535 1/min is no heat of a hundred runs."""
+    most = HEATS * watch.top_speed
+    calm = change.copy()
+    calm[..., watch.speeds] = np.clip(calm[..., watch.speeds], -most, most)
+    return calm
 
 
 def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> tuple[WatchState, BoolArray]:
