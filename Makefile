@@ -24,7 +24,7 @@ test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev
-	scripts/system_packages.sh linuxcnc-uspace
+	scripts/system_packages.sh linuxcnc-uspace mosquitto
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -n 2 --dist loadfile -m long
 	$(BIN)/python -m pytest -m hours -rP
 
