@@ -33,7 +33,7 @@ GIVEN = {
     "api/revision/job.py": {"_write": 3},
     "files/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
     "files/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
-    "service/loop.py": {"_begin": 1},  # a state that is refused is moved aside, not lost
+    "service/loop.py": {"_put_aside": 1},  # a state that is refused is moved aside, not lost
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {

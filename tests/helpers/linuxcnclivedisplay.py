@@ -61,17 +61,27 @@ def teleop(wanted: int) -> None:
     command.wait_complete()
 
 
+def mode(wanted: int) -> None:
+    """Change the mode; a computer that stood still has lost the command, so it is said again."""
+    for _ in range(5):
+        command.mode(wanted)
+        command.wait_complete()
+        status.poll()
+        if status.task_mode == wanted:
+            return
+        time.sleep(0.5)
+    raise RuntimeError(f"does not change its mode; {errors.poll()}")
+
+
 def mdi(text: str) -> None:
-    command.mode(linuxcnc.MODE_MDI)
-    command.wait_complete()
+    mode(linuxcnc.MODE_MDI)
     command.mdi(text)
     command.wait_complete()
     wait(idle)
 
 
 def start(program: str) -> None:
-    command.mode(linuxcnc.MODE_AUTO)
-    command.wait_complete()
+    mode(linuxcnc.MODE_AUTO)
     command.program_open(program)
     command.wait_complete()
     command.auto(linuxcnc.AUTO_RUN, 0)

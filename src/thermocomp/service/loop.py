@@ -97,9 +97,7 @@ class Service:
 
     async def run(self) -> None:
         """Run until it is cancelled; then save the state and leave the corrections as they are."""
-        if self._refused is not None:
-            with contextlib.suppress(OSError):
-                self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
+        self._put_aside()
         for sink in self.sinks:
             await self._adopt(sink)
         try:
@@ -228,6 +226,12 @@ class Service:
         how = "goes on" if state.references else "begins anew, with the corrections that are in force"
         self._say("service", f"start after {age:.0f} s: {how}")
         return state
+
+    def _put_aside(self) -> None:
+        """Keep a state file that could not be used."""
+        if self._refused is not None:
+            with contextlib.suppress(OSError):
+                self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
 
     async def _adopt(self, sink: Sink) -> None:
         """Begin at what the controller says is in force: what was saved may be a second older."""

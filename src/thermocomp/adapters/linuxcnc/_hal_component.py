@@ -180,6 +180,8 @@ class Server:
     def accept(self) -> None:
         """Let the service in; another one is told that there is one."""
         connection, _ = self.listener.accept()
+        if self.client is not None and self.left():
+            self.drop()
         greeting = {"error": "another service is connected"} if self.client is not None else self.report(0)
         with contextlib.suppress(OSError):
             connection.sendall(json.dumps(greeting).encode() + b"\n")
@@ -190,6 +192,16 @@ class Server:
         self.client, self.buffer = connection, b""
         self.selector.register(connection, selectors.EVENT_READ)
         self.since = time.monotonic()
+
+    def left(self) -> bool:
+        """Return whether the service has hung up, which is read only after the one that knocks."""
+        assert self.client is not None
+        try:
+            return self.client.recv(1, socket.MSG_PEEK) == b""
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     def drop(self) -> None:
         """Let the service go."""
