@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from smallmachine import small_machine
 from watchedmachine import LOST, failing, watched_model
 
 from thermocomp.assessment import study
@@ -12,8 +13,11 @@ from thermocomp.assessment.faultlog import find_costs, find_faults
 from thermocomp.assessment.metrics import rms
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
 from thermocomp.recording.cycles import find_cycles
 from thermocomp.recording.recording import Recording
+from thermocomp.recording.stacking import stack
 from thermocomp.recording.starts import Start
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
@@ -241,3 +245,19 @@ def test_a_second_failure_does_not_let_run_what_the_first_one_stopped(model: Err
     assert odd.may_lose(["t1_C"])
     assert not odd.may_lose(["t3_C"])
     assert not odd.may_lose(["t1_C", "t3_C"])
+
+
+def test_trouble_of_a_temperature_caps_the_verdict_where_no_watch_could_look() -> None:
+    samples = stack([small_machine()], ["z_um"])
+    every = np.ones(len(samples), np.bool_)
+    bare = train("ols", samples.only(["t1_C", "t2_C"]), 0, every).model
+    model = replace(bare, watch=find_watch(samples, every), honest_error=watched_model().honest_error)
+    recording = failing(t1_C=(4.0, None))
+    blind = replace(
+        recording,
+        table=recording.table.drop(columns="spindle_rpm"),
+        channels=tuple(c for c in recording.channels if c.quantity != "spindle_speed"),
+    )
+    (seen,), (unseen,) = (study.assess([model], [r], starts=Start()).overall() for r in (recording, blind))
+    assert not any("t1_C" in cap for cap in seen.verdict.caps)
+    assert any("t1_C has trouble" in cap for cap in unseen.verdict.caps)

@@ -48,13 +48,14 @@ def test_each_machine_is_as_its_own_compensator_would_have_it(twice: bool, kind:
     states, time, values = [m.start() for m in machines], 0.0, zeros.copy()
     bad = rng.random((400, MACHINES)) < 0.15
     bad[0] = False
+    bad[0:5, 5] = True  # one whose first readings are none
     bad[150:260, 3] = True  # so long that its correction fades
     hostile = np.array([np.nan, np.inf, -np.inf, 1e300, -200.0, 3e38])
     worst = 0.0
     for k in range(400):
         dt = 0.0 if k == 0 else float(rng.choice([10.0, 10.0, 25.0, 90.0]))
         time += dt
-        values = values if k == 0 else values + rng.normal(0.03, 0.2, values.shape) - 0.02 * (values - zeros - 4.0)
+        values = values if k <= 5 else values + rng.normal(0.03, 0.2, values.shape) - 0.02 * (values - zeros - 4.0)
         given = values.copy()
         for row in np.flatnonzero(bad[k]).tolist():
             given[row, rng.integers(CHANNELS)] = rng.choice(hostile)

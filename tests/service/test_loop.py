@@ -18,10 +18,11 @@ from thermocomp.adapters.plain import FileSink
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status as LinkStatus
-from thermocomp.core.reading import Reading
+from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Status
+from thermocomp.service import loop
 from thermocomp.service.loop import Service
 
 QUICK = Limits(rate=1e9)
@@ -317,3 +318,95 @@ def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
     asyncio.run(running(service, work))
     assert source.refused == 3
     assert "no JSON" in source.last_refusal
+
+
+def test_a_stop_before_the_first_reading_leaves_what_is_in_force(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    first = Service(machine(), [], [FileSink(path=path)])
+    first.take(Reading(time.time(), {"t": 20.0}))
+    first.take(Reading(time.time(), {"t": 23.0}))
+
+    async def briefly() -> None:
+        await asyncio.sleep(0.3)
+
+    asyncio.run(running(first, briefly))
+    before = json.loads(path.read_text())["corrections"]
+    assert before["z_um"]["offset_um"] == -6.0
+    asyncio.run(running(Service(machine(), [Given()], [FileSink(path=path)]), briefly))
+    assert json.loads(path.read_text())["corrections"] == before
+
+
+@pytest.mark.parametrize(
+    ("order", "stays"),
+    [
+        (Status("holding", "by hand, at the page"), True),
+        (Status("shadow", "by hand, at the page"), True),
+        (Status("suspended", "the controller is not homed"), False),  # it will say so again, if it is there
+        (None, False),
+    ],
+)
+def test_orders_of_a_person_outlast_a_restart_and_no_others(order: Status | None, stays: bool, tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    service = Service(machine(), [], [], state_path=path)
+    service.take(Reading(time.time(), {"t": 20.0}))
+    if order is None:
+        service.watch_only("z_um")  # shadow = true, which the next configuration has not
+    else:
+        service.order("z_um", order)
+    statefile.write(service.state, service.compensator, path, datetime.now(UTC))
+    again = Service(machine(), [], [], state_path=path)
+    assert again.state.orders == ({"z_um": order} if stays else {})
+
+
+class Controller(Broken):
+    """A controller that says what is in force, until it is lost."""
+
+    def __init__(self) -> None:
+        super().__init__(hangs=False)
+        self.offset: float | None = 5.0
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        if self.offset is None:
+            raise ThermocompError("lost")
+
+    async def confirmed(self) -> dict[str, Correction] | None:
+        return None if self.offset is None else {"z_um": Correction(self.offset)}
+
+    def suspended(self) -> dict[str, str]:
+        return {}
+
+
+def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> None:
+    source, controller = Given(), Controller()
+    service = Service(machine(), [source], [controller, FileSink(path=tmp_path / "out.json")])
+
+    async def work() -> None:
+        for k in range(4):
+            say(source, 20.0 + k)
+            await until(lambda k=k: service.counts["readings"] == k + 1)
+            await asyncio.sleep(0.1)
+        found = service.in_force("z_um")
+        assert found is not None
+        assert found.offset == 5.0
+
+    asyncio.run(running(service, work))
+
+
+def test_a_measurement_under_a_correction_that_nobody_knows_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "CONFIRM_WITHIN", 0.3)
+    source, controller = Given(), Controller()
+    service = Service(machine(), [source], [controller])
+
+    async def work() -> None:
+        say(source, 20.0)
+        await until(lambda: service.in_force("z_um") is not None)
+        controller.offset = None
+        say(source, 21.0)
+        await until(lambda: service.in_force("z_um") is None)
+        service.measure(Measurement(time.time(), "z_um", 1.0, left=True))
+        assert service.probings == {}
+        assert "not known" in service.events[-1].text
+        service.measure(Measurement(time.time(), "z_um", 2.0, left=False))
+        assert service.probings["z_um"].deviation == 2.0
+
+    asyncio.run(running(service, work))

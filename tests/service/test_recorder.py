@@ -33,7 +33,7 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
         for k in range(5):
             say(source, 20.0 + k)
             await until(lambda k=k: service.counts["readings"] == k + 1)
-            await until(lambda k=k: k == 0 or service.confirmed["z_um"].offset == -2.0 * k)
+            await until(lambda k=k: k == 0 or service.confirmed["z_um"][0].offset == -2.0 * k)
         # the machine is off by 9 um, and 8 of them are corrected
         service.measure(Measurement(time.time(), "z_um", 1.0, left=True, repeatability=0.1))
         say(source, 24.0)

@@ -1,6 +1,6 @@
 """Judge one model on one block that it has not seen: what it leaves, and whether it may run."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -58,6 +58,7 @@ def judge(
     guard: Guard | None = None,
     probings: Probings | None = None,
     widening: FloatArray | None = None,
+    watched: Collection[str] = (),
 ) -> Assessment:
     """Judge a frozen model on a block: what a compensator with it would have left there.
 
@@ -89,6 +90,8 @@ def judge(
         Made in the block.
     widening : ndarray of shape (n_rows,), optional
         See `replay_compensated`.
+    watched : collection of str
+        Temperatures that a watch has looked after in these samples.
 
     Returns
     -------
@@ -118,7 +121,7 @@ def judge(
         row=samples.row[rows],
         test=samples.test[rows],
         cycle=samples.cycle[rows],
-        verdict=_verdict(model, samples, split, learned, rules, rows, measured, (predicted, ran.deviation)),
+        verdict=_verdict(model, samples, split, learned, rules, rows, measured, (predicted, ran.deviation), watched),
         sensors=model.sensors,
         n_sensors=(len(model.sensors), len(model.sensors)),
         fit_s=fit_s,
@@ -144,6 +147,7 @@ def _verdict(
     rows: BoolArray,
     measured: FloatArray,
     both: tuple[FloatArray, FloatArray],
+    watched: Collection[str],
 ) -> do_no_harm.Verdict:
     """Return the verdict on `rows`, by the worse of what would run and the model alone, in each part that is judged."""
     target = [c.name for c in samples.targets].index(model.target)
@@ -167,7 +171,7 @@ def _verdict(
             if mine.sum() >= MIN_ROWS
         ),
         unit=model.unit,
-        caps=_caps(split, learned, samples, target, model.watch.names if model.watch else ()),
+        caps=_caps(split, learned, samples, target, watched),
         refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
         stated=rules.margin,
     )
@@ -190,7 +194,7 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
 
 
 def _caps(
-    split: Split, learned: Learned | None, samples: Samples, target: int, watched: Sequence[str]
+    split: Split, learned: Learned | None, samples: Samples, target: int, watched: Collection[str]
 ) -> tuple[str, ...]:
     """Return what keeps a model from being accepted, whatever its errors.
 

@@ -280,7 +280,9 @@ def assess(
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
             samples, widening = believe(model, samples, every, watched)
             guard = _guard(model, samples, watched, guards)
-            overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard)
+            looked = model.watch is not None and can_look(model.watch, watched or samples)
+            names = model.watch.names if model.watch is not None and looked else ()
+            overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the others have their results
@@ -368,6 +370,7 @@ def _assess(
     probings: Probings | None,
     widening: FloatArray,
     guard: Guard | None,
+    looked_after: Sequence[str],
 ) -> tuple[Assessment, Judging]:
     """Judge a model on what it has not learned from (`known` rows); on everything if there is nothing else, and say so.
 
@@ -391,7 +394,7 @@ def _assess(
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     found = judge(
         _name(model), model, samples, split,
-        rules=rules, limits=limits, guard=guard, probings=probings, widening=widening,
+        rules=rules, limits=limits, guard=guard, probings=probings, widening=widening, watched=looked_after,
     )  # fmt: skip
     judging = units(samples, ~known)
     caps = (*found.verdict.caps, *cap_alike_units(samples, judging))

@@ -325,9 +325,9 @@ class Compensator:
         ----------
         state : CompensatorState
         passed : float
-            Time since the step before [s].
+            Time since the step before [s]; an outage is no saved travel.
         """
-        free = replace(self.limits, dead_band=0.0)
+        free, passed = replace(self.limits, dead_band=0.0), min(passed, self.limits.reading_age)
         found = {
             target: limit_line(Correction(0.0), c, self.lines[target].travel, passed, free)
             for target, c in state.corrections.items()

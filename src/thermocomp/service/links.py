@@ -65,7 +65,6 @@ class Outlet:
     def __init__(self, sink: Sink, heard: Callable[[Sink, Mapping[str, Correction]], None] | None = None) -> None:
         self.sink = sink
         self.heard = heard
-        self.applied: dict[str, Correction] = {}  #: what it has taken last
         self._newest: dict[str, Correction] = {}
         self._news = asyncio.Event()
 
@@ -84,12 +83,11 @@ class Outlet:
                     with contextlib.suppress(TimeoutError):
                         async with asyncio.timeout(OFTEN):
                             await self._news.wait()
-                    newest = self._newest if self._news.is_set() else None
+                    newest = self._newest if self._news.is_set() else {}
                     self._news.clear()
                     async with asyncio.timeout(TIMEOUT):
-                        if newest is not None:
+                        if newest:  # before the first reading there is nothing to say
                             await self.sink.apply(newest)
-                            self.applied = newest
                         await self._confirm()
                     wait = FIRST
             except (ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
@@ -103,7 +101,9 @@ class Outlet:
             self.heard(self.sink, in_force or {})
 
     async def flush(self) -> None:
-        """Apply what was put last, if the sink is there."""
+        """Apply what was put last, if the sink is there; what is in force stays if nothing was."""
+        if not self._newest:
+            return
         with contextlib.suppress(ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
             async with asyncio.timeout(TIMEOUT):
                 await self.sink.apply(self._newest)

@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
+import math
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,12 +21,14 @@ from thermocomp.runtime.state import Compensated, CompensatorState, Status, resu
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
 from thermocomp.service.probe import KEPT, Checked, check, find_deviation
-from thermocomp.service.recorder import Recorder
+from thermocomp.service.recorder import CONFIRM_WITHIN, Recorder
 
 #: events that are kept to be shown
 EVENTS = 200
 #: points of each curve that are kept to be shown, and time between two [s of the machine]
 POINTS, EVERY = 720, 30.0
+#: why a target is in shadow that the configuration put there
+CONFIGURED = "by configuration"
 
 
 @dataclass(frozen=True)
@@ -76,17 +79,19 @@ class Service:
     curves: deque[dict[str, float]] = field(init=False)  #: what is drawn: a row of numbers, ``time`` first
     latest: dict[str, tuple[float, float]] = field(default_factory=dict, init=False)  #: value and when, by channel
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
-    listeners: set[Callable[[], None]] = field(default_factory=set, init=False)
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
     checked: deque[Checked] = field(init=False)  #: what probings said
     before: dict[str, Adaptation | None] = field(default_factory=dict, init=False)  #: the last one was taken
     measured: dict[str, tuple[Measurement, Correction | None]] = field(default_factory=dict, init=False)  #: as well
     not_saved: str = field(default="", init=False)  #: why the state was not, last; empty if it was
-    confirmed: dict[str, Correction] = field(default_factory=dict, init=False)  #: by the controller
+    confirmed: dict[str, tuple[Correction, float]] = field(default_factory=dict, init=False)  #: in force, and when
 
     def __post_init__(self) -> None:
         self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
-        self.outlets = [Outlet(sink, self._hear) for sink in self.sinks]
+        # what a controller says is in force goes before what a file says
+        controllers: list[Sink] = [s for s in self.sinks if isinstance(s, Suspending)]
+        self._sure = controllers or list(self.sinks)
+        self.outlets = [Outlet(sink, self._hear if sink in self._sure else None) for sink in self.sinks]
         self._refused: Path | None = None
         self.state = self._begin()
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
@@ -153,7 +158,7 @@ class Service:
 
     def watch_only(self, target: str) -> None:
         """Let a target run in shadow from the start, as configured."""
-        self.state = self.compensator.order(self.state, target, Status("shadow", "by configuration"))
+        self.state = self.compensator.order(self.state, target, Status("shadow", CONFIGURED))
 
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
         """Let a target count anew from now; see `Compensator.rezero`."""
@@ -173,11 +178,20 @@ class Service:
             why = f"no target is named {found.target}" if line is None else f"it is {now - stamp:.0f} s old"
             self._say("probing", f"{found.target} refused: {why}")
             return
-        confirmed = self.confirmed.get(found.target)
-        self.measured[found.target] = (found, confirmed)
-        in_force = (confirmed or self.state.corrections[found.target]) if found.left else None
-        deviation = find_deviation(found.measured, found.position, in_force)
+        in_force = self.in_force(found.target)
+        if found.left and in_force is None:
+            self._say("probing", f"{found.target} refused: what is in force at the controller is not known")
+            return
+        self.measured[found.target] = (found, in_force)
+        deviation = find_deviation(found.measured, found.position, in_force if found.left else None)
         self.probe(found.target, Probing(deviation, found.repeatability, found.position))
+
+    def in_force(self, target: str) -> Correction | None:
+        """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""
+        if not any(isinstance(sink, Confirming) for sink in self._sure):
+            return self.state.corrections[target]
+        found, at = self.confirmed.get(target, (None, -math.inf))
+        return found if self.clock.tick() - at <= CONFIRM_WITHIN * self.clock.speed else None
 
     def roll_back(self, target: str) -> str:
         """Forget the last probing of a target that was taken; return why not, or the empty string."""
@@ -223,6 +237,9 @@ class Service:
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self.clock.speed
         state = resume(saved.state, cold, age)
+        # what the controller or the configuration ordered is theirs to say again
+        own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
+        state = state._replace(orders=cold.orders | own)
         how = "goes on" if state.references else "begins anew, with the corrections that are in force"
         self._say("service", f"start after {age:.0f} s: {how}")
         return state
@@ -301,8 +318,6 @@ class Service:
         if said.deviations and (not self.curves or now - self.curves[-1]["time"] >= EVERY):
             self.curves.append({"time": now, **self._numbers(said)})
         self._dirty = True
-        for listener in list(self.listeners):
-            listener()
 
     def _chart(self, said: Compensated, probings: Mapping[str, Probing], learned: Mapping[str, Adaptation]) -> None:
         for target, probing in probings.items():
@@ -325,7 +340,7 @@ class Service:
     def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
         """Take what a controller says is in force, and why it has none."""
         known = {t: c for t, c in in_force.items() if t in self.state.corrections}
-        self.confirmed |= known
+        self.confirmed |= {t: (c, self.clock.tick()) for t, c in known.items()}
         if self.recorder is not None:
             self.recorder.confirm(self.clock.now(), known)
         if not isinstance(sink, Suspending):
