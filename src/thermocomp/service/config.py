@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import ConfigDict, Discriminator, TypeAdapter, ValidationError, with_config
 
@@ -14,25 +14,40 @@ from thermocomp.files.tomlfile import as_json, read_toml
 Names = dict[str, str]
 
 
-def _check_broker(topic: str, port: int, *, published: bool = False) -> None:
-    if not topic.strip():
-        raise SettingError(f"topic = {topic!r}: name one, such as 'machine/7/temperatures'")
-    if published and set(topic) & set("+#"):
-        raise SettingError(f"topic = {topic!r}: one that is published to has no wildcards (+, #)")
-    if not 0 < port <= 65535:
-        raise SettingError(f"port = {port}: want one from 1 to 65535")
+@dataclass(frozen=True, kw_only=True)
+class OnBroker:
+    """What is said on an MQTT topic.
+
+    Parameters
+    ----------
+    topic : str
+    host, port : str, int
+        Of the broker.
+    """
+
+    published: ClassVar[bool] = False
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+    def __post_init__(self) -> None:
+        if not self.topic.strip():
+            raise SettingError(f"topic = {self.topic!r}: name one, such as 'machine/7/temperatures'")
+        if self.published and set(self.topic) & set("+#"):
+            raise SettingError(f"topic = {self.topic!r}: one that is published to has no wildcards (+, #)")
+        if not 0 < self.port <= 65535:
+            raise SettingError(f"port = {self.port}: want one from 1 to 65535")
 
 
 @dataclass(frozen=True, kw_only=True)
-class MqttIn:
+class MqttIn(OnBroker):
     """Readings from an MQTT topic.
 
     Parameters
     ----------
+    topic, host, port
+        Of `OnBroker`.
     kind : {'mqtt'}
-    topic : str
-    host, port : str, int
-        Of the broker.
     names : dict of str to str
         Channel by the name in the message, for those that are called otherwise there.
     virtual : bool
@@ -40,14 +55,8 @@ class MqttIn:
     """
 
     kind: Literal["mqtt"]
-    topic: str
-    host: str = "127.0.0.1"
-    port: int = 1883
     names: Names = field(default_factory=dict)
     virtual: bool = False
-
-    def __post_init__(self) -> None:
-        _check_broker(self.topic, self.port)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,24 +93,17 @@ class ReplayIn:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MqttProbing:
+class MqttProbing(OnBroker):
     """Measurements of the tool point from an MQTT topic.
 
     Parameters
     ----------
+    topic, host, port
+        Of `OnBroker`.
     kind : {'mqtt'}
-    topic : str
-    host, port : str, int
-        Of the broker.
     """
 
     kind: Literal["mqtt"]
-    topic: str
-    host: str = "127.0.0.1"
-    port: int = 1883
-
-    def __post_init__(self) -> None:
-        _check_broker(self.topic, self.port)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,24 +129,18 @@ class SimulatedProbing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MqttOut:
+class MqttOut(OnBroker):
     """Corrections to an MQTT topic.
 
     Parameters
     ----------
+    topic, host, port
+        Of `OnBroker`.
     kind : {'mqtt'}
-    topic : str
-    host, port : str, int
-        Of the broker.
     """
 
+    published: ClassVar[bool] = True
     kind: Literal["mqtt"]
-    topic: str
-    host: str = "127.0.0.1"
-    port: int = 1883
-
-    def __post_init__(self) -> None:
-        _check_broker(self.topic, self.port, published=True)
 
 
 @dataclass(frozen=True, kw_only=True)
