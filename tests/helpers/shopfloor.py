@@ -11,6 +11,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -225,3 +227,37 @@ def lay_out(folder: Path, broker: Mosquitto, socket: Path, factor: float, rate: 
     modelfile.write([model()], folder / "model.json")
     text = CONFIG.format(factor=float(factor), rate=rate / factor, age=2.0 * factor, port=broker.port, socket=socket)
     (folder / "serve.toml").write_text(text, encoding="ascii")
+
+
+@contextmanager
+def running(
+    folder: Path, controller: Live, broker: Mosquitto, factor: float, rate: float
+) -> Iterator[tuple[Service, Machine, Error]]:
+    """Start a service and then the machine, on a controller that is ready, and end both and the broker after all.
+
+    Parameters
+    ----------
+    folder : Path
+    controller : Live
+    broker : Mosquitto
+        That runs.
+    factor : float
+    rate : float
+        In seconds of the world [um/s].
+    """
+    lay_out(folder, broker, controller.socket, factor, rate)
+    service, machine = Service(folder), Machine(broker.port, factor)
+    service.start()
+    controller.ready()
+    try:
+        time.sleep(4.0)  # the service has to be there before the machine begins, or its zero is another
+        machine.start()
+        deadline = time.monotonic() + 60.0
+        while not (folder / "state.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        yield service, machine, Error(machine, controller)
+    finally:
+        service.kill(signal.SIGTERM)
+        if machine.is_alive():
+            machine.end()
+        broker.kill()

@@ -11,7 +11,7 @@ import pytest
 from broker import Mosquitto
 from linuxcnclive import AXES, PERIOD, live
 from numpy.typing import NDArray
-from shopfloor import Error, Machine, Service, lay_out, undisturbed
+from shopfloor import running, undisturbed
 
 from thermocomp.adapters.linuxcnc.halsetup import HalSettings
 from thermocomp.files.journalreader import JournalReader
@@ -44,30 +44,13 @@ def test_ten_hours_of_heat(seconds: float, factor: float, tmp_path: Path) -> Non
     broker.start()
     settings = HalSettings(axes=AXES, magnitude=100.0, rate=RATE)
     with live(settings, {"part": program(seconds)}) as controller:
-        lay_out(tmp_path, broker, controller.socket, factor, ASKED)
-        service, machine = Service(tmp_path), Machine(broker.port, factor)
-        watched = Error(machine, controller)
-        service.start()
-        controller.ready()
-        try:
-            deadline = time.monotonic() + 60.0
-            while not (tmp_path / "state.json").exists() and time.monotonic() < deadline:
-                if not machine.is_alive():
-                    time.sleep(3.0)  # the service has to be there before the machine begins, or its zero is another
-                    machine.start()
-                time.sleep(0.2)
+        with running(tmp_path, controller, broker, factor, ASKED) as (_, _, watched):
             controller.do("trace", "trace")
             controller.do("start", "part.ngc")
             watched.start()
-            end = time.monotonic() + seconds - 5.0
-            while time.monotonic() < end:
-                time.sleep(0.2)
+            time.sleep(seconds - 5.0)
             rows = watched.end()
             controller.do("stop")
-        finally:
-            service.kill(signal.SIGTERM)
-            machine.end()
-            broker.kill()
         trace = controller.trace()
     deviation, left = rows[:, 1], rows[:, 1] + rows[:, 2]
     print(
@@ -89,14 +72,7 @@ def test_killed_at_random_moments(kills: int, factor: float, tmp_path: Path) -> 
     broker.start()
     settings = HalSettings(axes=AXES, magnitude=100.0, rate=RATE)
     with live(settings) as controller:
-        lay_out(tmp_path, broker, controller.socket, factor, ASKED)
-        service, machine = Service(tmp_path), Machine(broker.port, factor)
-        watched = Error(machine, controller)
-        service.start()
-        controller.ready()
-        try:
-            time.sleep(4.0)
-            machine.start()
+        with running(tmp_path, controller, broker, factor, ASKED) as (service, machine, watched):
             time.sleep(6.0)
             controller.do("trace", "trace")
             watched.start()
@@ -116,10 +92,6 @@ def test_killed_at_random_moments(kills: int, factor: float, tmp_path: Path) -> 
             time.sleep(5.0)
             rows = watched.end()
             controller.do("stop")
-        finally:
-            service.kill(signal.SIGTERM)
-            machine.end()
-            broker.kill()
         trace = controller.trace()
     assert trace.steps("Z").max() <= RATE * PERIOD + FINE
     assert np.abs(np.diff(trace.added("Z")[10:])).max() <= RATE * PERIOD + 0.01
