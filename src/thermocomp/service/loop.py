@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
-from thermocomp.core.correction import Correction
+from thermocomp.core.correction import Correction, uncompensated
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
 from thermocomp.core.reading import Measurement, Reading
@@ -20,7 +20,7 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
-from thermocomp.service.probe import KEPT, Checked, check, find_deviation
+from thermocomp.service.probe import KEPT, Checked, check
 from thermocomp.service.recorder import CONFIRM_WITHIN, Recorder
 
 #: events that are kept to be shown
@@ -166,12 +166,12 @@ class Service:
         self._say("reference", f"{target} counts anew: {why}")
         self._dirty = True
 
-    def probe(self, target: str, probing: Probing) -> None:
-        """Use a probing with the next reading."""
-        self.probings[target] = probing
-
     def measure(self, found: Measurement) -> None:
-        """Take a measurement of the tool point as a probing, with the next reading."""
+        """Take a measurement of the tool point as a probing, with the next reading.
+
+        One that contains the correction (``left`` is false: LinuxCNC's ``#5063`` is a position of the motor) is the
+        deviation as it is.
+        """
         line = self.compensator.lines.get(found.target)
         now, stamp = self.clock.now(), self.clock.of(found.time)
         if line is None or now - stamp > self.compensator.limits.reading_age:
@@ -179,12 +179,14 @@ class Service:
             self._say("probing", f"{found.target} refused: {why}")
             return
         in_force = self.in_force(found.target)
-        if found.left and in_force is None:
-            self._say("probing", f"{found.target} refused: what is in force at the controller is not known")
-            return
+        deviation = found.measured
+        if found.left:
+            if in_force is None:
+                self._say("probing", f"{found.target} refused: what is in force at the controller is not known")
+                return
+            deviation = uncompensated(found.measured, in_force.at(found.position))
         self.measured[found.target] = (found, in_force)
-        deviation = find_deviation(found.measured, found.position, in_force if found.left else None)
-        self.probe(found.target, Probing(deviation, found.repeatability, found.position))
+        self.probings[found.target] = Probing(deviation, found.repeatability, found.position)
 
     def in_force(self, target: str) -> Correction | None:
         """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from thermocomp.core.correction import Correction, Deviation, uncompensated
+from thermocomp.core.correction import Deviation
 from thermocomp.runtime.adaptation import Adaptation, Probing
 
 #: standard deviations at which the chart asks for action
@@ -49,19 +49,3 @@ def check(
     limit = ACTION * math.hypot(size, probing.repeatability)
     said = predicted.at(probing.position)
     return Checked(time, target, said, probing.deviation - said, limit, refused)
-
-
-def find_deviation(measured: float, position: float, in_force: Correction | None) -> float:
-    """Return the deviation of the machine from what was measured at a position.
-
-    Parameters
-    ----------
-    measured : float
-        [um]
-    position : float
-        On the axis [mm].
-    in_force : Correction or None
-        Where the measurement shows what the correction left; None where it does not contain it (LinuxCNC's ``#5063``
-        is a position of the motor: the offset is in it already).
-    """
-    return measured if in_force is None else uncompensated(measured, in_force.at(position))
