@@ -308,3 +308,30 @@ def test_a_model_is_fitted_to_probings_alone(tmp_path: Path) -> None:
     model = tc.fit(again, "z_um", model="ols", jobs=1).models["z_um"]
     assert model.honest_error is not None
     assert model.honest_error.rms < 4.0  # of a drift of 60 um
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_clock_that_is_set_back_mixes_no_times(again: bool, tmp_path: Path) -> None:
+    """The first hour says 100 um and 1 um are corrected, the second, from the same half hour on, 200 and 2."""
+    path, start = tmp_path / "live.db", Start(BEGIN, (Target("z_um"),), (HEAT, Z), "off", 30.0)
+    journal = Journal.open(path, JournalLimits(), start)
+    for part, (begin, size) in enumerate(((0.0, 1.0), (1800.0, 2.0))):
+        if part and again:  # the service was started anew, by the other clock
+            journal.close()
+            journal = Journal.open(path, JournalLimits(), start._replace(time=BEGIN + begin))
+        for k in range(360):
+            now = BEGIN + begin + 10.0 * k
+            journal.add(ConfirmationRow(now, "z_um", Correction(-size)))
+            journal.add(ReadingRow(now, {"t1_C": 20.0 + size, "z_um": 100.0 * size - size}))
+            if k == 300:  # at 50 min of the first clock, which came again
+                journal.add(MeasurementRow(now, "z_um", 5.0, "work_offset", False))
+    assert journal.flush()
+    journal.close()
+    found = export(JournalReader(path))
+    table, time = found.recording.table, found.recording.time
+    assert (np.diff(time) > 0).all()
+    first = time < 1800.0
+    assert table["z_um"][first].tolist() == [100.0] * 180
+    assert table["z_um"][~first].tolist() == [200.0] * 360
+    assert table["t1_C"][~first].tolist() == [22.0] * 360
+    assert any("361 rows are not in it: a clock was set back" in note for note in found.notes)

@@ -70,6 +70,7 @@ class _Found(NamedTuple):
     values: FloatArray  #: (n, n_channels)
     confirmed: dict[tuple[int, str], _Confirmed]
     measured: list[tuple[int, MeasurementRow]]
+    overtaken: int  #: rows that were left out, because a clock was set back after them
 
 
 def export(reader: JournalReader, every: float = 0.0) -> Exported:
@@ -126,6 +127,10 @@ def export(reader: JournalReader, every: float = 0.0) -> Exported:
     left_out = sum(m.kind != "probing" for _, m in found.measured)
     if left_out:
         notes.append(f"{left_out:,} work offsets and tool lengths are not in it: workpiece and tool are new each time")
+    if found.overtaken:
+        notes.append(
+            f"{found.overtaken:,} rows are not in it: a clock was set back after them, and their times came again"
+        )
     if lost := reader.summary().lost:
         notes.append(f"{lost:,} rows were lost while the disk did not take them")
     known = any(t.known for t in told) or (in_force and not any(t.measured for t in told))
@@ -168,8 +173,12 @@ def _read(reader: JournalReader, channels: Sequence[Channel], every: float) -> _
     time, run, values = array("d"), array("q"), array("d")
     confirmed: dict[tuple[int, str], _Confirmed] = {}
     measured: list[tuple[int, MeasurementRow]] = []
+    overtaken, left = reader.overtaken(), 0
     for stored in reader.rows(_KINDS):
         row = stored.row
+        if overtaken(stored):
+            left += 1
+            continue
         if isinstance(row, ReadingRow):
             if not time or row.time - time[-1] >= max(every, _AT_ONCE):
                 time.append(row.time)
@@ -181,7 +190,7 @@ def _read(reader: JournalReader, channels: Sequence[Channel], every: float) -> _
             measured.append((stored.run, row))
     if not time:
         raise InputError(f"{reader.paths[0]}: the journal holds no reading yet")
-    return _Found(np.array(time), np.array(run), np.array(values).reshape(len(time), -1), confirmed, measured)
+    return _Found(np.array(time), np.array(run), np.array(values).reshape(len(time), -1), confirmed, measured, left)
 
 
 def _parted(
@@ -204,8 +213,9 @@ def _parted(
     residual, deviation = np.full(n, np.nan), np.full(n, np.nan)
     far = 0
     for run, m in probings:
-        k = int(np.argmin(np.abs(found.time - m.time)))
-        if abs(found.time[k] - m.time) > NEAR:
+        away = np.where(found.run == run, np.abs(found.time - m.time), np.inf)
+        k = int(np.argmin(away))
+        if away[k] > NEAR:
             far += 1
             continue
         confirmed = found.confirmed.get((run, m.target), _Confirmed())

@@ -1,10 +1,12 @@
 """A journal as it is read: all its files together, row by row, each checked."""
 
+import math
 import re
 import sqlite3
 import zlib
+from bisect import bisect_right
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from heapq import merge
 from pathlib import Path
@@ -29,6 +31,8 @@ CREATE TABLE rows (
 """
 #: kinds that do not come with every reading
 EVENTS = ("state", "reference", "measurement", "alarm", "update")
+#: a row that is so much earlier than one written before it was written after a clock was set back [s]
+SET_BACK = 5.0
 _ROWS = "SELECT run, seq, time, kind, content, crc FROM rows"
 
 
@@ -97,6 +101,30 @@ class JournalReader:
                 if stored.seq or stored.run not in begun:
                     begun |= {stored.run} if not stored.seq else set()
                     yield stored
+
+    def overtaken(self) -> Callable[[Stored], bool]:
+        """Return what tells whether a row stands at a time that was written again later: a clock was set back.
+
+        Then the later rows are right, and the earlier ones would stand among them.
+        """
+        begins: list[tuple[int, int, float]] = []  # run, its row and time, wherever it goes back
+        last = -math.inf
+        for _, (run, seq, time) in self._each("SELECT run, seq, time FROM rows WHERE seq > 0 ORDER BY id"):
+            if time < last - SET_BACK:
+                begins.append((run, seq, time))
+                last = time
+            last = max(last, time)
+        if not begins:
+            return lambda _: False
+        order = {run: k for k, run in enumerate(self.starts)}
+        places = [(order[run], seq) for run, seq, _ in begins]
+        firsts = [min(time for *_, time in begins[k:]) for k in range(len(begins))]
+
+        def told(stored: Stored) -> bool:
+            k = bisect_right(places, (order[stored.run], stored.seq))
+            return k < len(firsts) and stored.row.time >= firsts[k]
+
+        return told
 
     def latest(self, n: int, kinds: Collection[str] = EVENTS) -> list[Stored]:
         """Return the rows of some kinds that were written last, oldest first.
