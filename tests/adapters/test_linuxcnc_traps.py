@@ -45,7 +45,7 @@ def with_sink(machine: Live, work: Callable[[LinuxCncSink], Awaitable[None]]) ->
 def test_1_without_a_ratio_nothing_moves_and_it_is_said() -> None:
     async def work(sink: LinuxCncSink) -> None:
         await sink.apply({"z_um": Correction(-25.0)})
-        await until(lambda: "OFFSET_AV_RATIO" in sink.suspended().get("z_um", ""))
+        await until(lambda: "OFFSET_AV_RATIO" in sink.alarms().get("z_um", ""))
         found = await sink.confirmed()
         assert found is not None
         assert found["z_um"].at(0.0) == pytest.approx(0.0, abs=1e-6)

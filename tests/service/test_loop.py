@@ -364,6 +364,8 @@ class Controller(Broken):
     def __init__(self) -> None:
         super().__init__(hangs=False)
         self.offset: float | None = 5.0
+        self.away: dict[str, str] = {}
+        self.told: dict[str, str] = {}
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
         if self.offset is None:
@@ -373,7 +375,10 @@ class Controller(Broken):
         return None if self.offset is None else {"z_um": Correction(self.offset)}
 
     def suspended(self) -> dict[str, str]:
-        return {}
+        return self.away
+
+    def alarms(self) -> dict[str, str]:
+        return self.told
 
 
 def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> None:
@@ -410,3 +415,28 @@ def test_a_measurement_under_a_correction_that_nobody_knows_is_refused(monkeypat
         assert service.probings["z_um"].deviation == 2.0
 
     asyncio.run(running(service, work))
+
+
+def test_an_alarm_is_told_and_suspends_nothing() -> None:
+    source, controller = Given(), Controller()
+    service = Service(machine(), [source], [controller])
+
+    async def work() -> None:
+        say(source, 20.0)
+        say(source, 23.0)
+        await until(lambda: service.counts["readings"] == 2)
+        controller.told, controller.offset = {"z_um": "the controller stands still"}, None
+        await until(lambda: any("stands still" in e.text for e in service.events))
+        assert service.state.corrections["z_um"].offset == -6.0
+        assert service.state.orders == {}
+        controller.told, controller.offset, controller.away = {}, 0.0, {"z_um": "the controller is off"}
+        await until(lambda: "z_um" in service.state.orders)
+        assert service.state.corrections["z_um"].offset == 0.0
+        controller.away = {}
+        await until(lambda: service.state.orders == {})
+
+    asyncio.run(running(service, work))
+    assert [e.text for e in service.events if e.kind == "link"] == [
+        "z_um: the controller stands still",
+        "z_um: is in force as it shall be again",
+    ]

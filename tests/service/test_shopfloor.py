@@ -102,6 +102,7 @@ def test_killed_at_random_moments(kills: int, factor: float, tmp_path: Path) -> 
         f"{kills} kills: RMS {rms(left):.2f} um of {rms(deviation):.1f}, {rms(without):.2f} without kills; "
         f"largest {np.abs(left).max():.2f} of {np.abs(deviation).max():.1f} um, {np.abs(without).max():.2f} without"
     )
-    assert rms(left) <= 1.1 * rms(without) + 0.1
+    # an outage of a second is one of three minutes where the heat is 200 times as fast
+    assert rms(left) <= (1.1 if factor < 100.0 else 1.2) * rms(without)
     rows_kept = sum(1 for _ in JournalReader(tmp_path / "live.db").rows())
     assert rows_kept > 50

@@ -77,6 +77,10 @@ class Suspending(Protocol):
         """Return axes or targets without a correction in force, and why, as it was told last."""
         ...
 
+    def alarms(self) -> Mapping[str, str]:
+        """Return axes or targets whose correction is not in force as it shall be, and why, as it was told last."""
+        ...
+
 
 @runtime_checkable
 class Sink(Protocol):

@@ -95,7 +95,7 @@ class Service:
         self._refused: Path | None = None
         self.state = self._begin()
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
-        self._told = dict[int, int]()
+        self._told, self._alarms = dict[int, int](), dict[str, str]()
         self._heard = self.clock.tick()
 
     # -- what happens --------------------------------------------------------------------------------------------------
@@ -347,7 +347,11 @@ class Service:
             self.recorder.confirm(self.clock.now(), known)
         if not isinstance(sink, Suspending):
             return
-        away = sink.suspended()
+        away, alarms = sink.suspended(), dict(sink.alarms())
+        for target in alarms.keys() | self._alarms.keys():
+            if alarms.get(target) != self._alarms.get(target):
+                self._say("link", f"{target}: {alarms.get(target, 'is in force as it shall be again')}")
+        self._alarms = alarms
         for target in self.compensator.lines.keys() & in_force.keys() | away.keys() & self.compensator.lines.keys():
             order = self.state.orders.get(target)
             if target in away and (order is None or order.word not in ("suspended", "shadow", "holding")):

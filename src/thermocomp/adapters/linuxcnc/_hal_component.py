@@ -142,10 +142,8 @@ class Server:
         self.pins[f"{letter}.offset"], self.pins[f"{letter}.slope"] = offset, slope
         self.pins[f"{letter}.offset-rate"], self.pins[f"{letter}.slope-rate"] = (v / seconds for v in steps)
 
-    def why(self, now: float) -> str:
+    def why(self) -> str:
         """Return why nothing is in force; empty if something can be."""
-        if now - self.echoed > STILL:
-            return "the controller stands still"
         if self.pins["on"]:
             return ""
         if not self.pins["homed"]:
@@ -155,7 +153,7 @@ class Server:
     def report(self, beat: int) -> dict[str, Any]:
         """Return what is in force."""
         now = time.monotonic()
-        why, limited = self.why(now), self.pins["limited"]
+        why, limited = self.why(), self.pins["limited"]
         micron = 1e-3 * self.unit
         axes = {}
         for letter, axis in self.axes.items():
@@ -173,7 +171,8 @@ class Server:
                 "alarm": alarm,
             }
         known = {"beat": beat, "ticks": self.ticks, "timeout": self.options.timeout}
-        return {**known, "suspended": why, "limited": limited, "axes": axes}
+        still = now - self.echoed > STILL  # what was in force is so, as far as anybody knows
+        return {**known, "suspended": why, "still": still, "limited": limited, "axes": axes}
 
     # -- the service ---------------------------------------------------------------------------------------------------
 

@@ -64,6 +64,7 @@ class LinuxCncSink:
     _beat: int = field(default=0, init=False, repr=False)
     _timeout: float = field(default=math.inf, init=False, repr=False)
     _why: str = field(default="", init=False, repr=False)
+    _still: bool = field(default=False, init=False, repr=False)
     _reports: dict[str, AxisReport] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -109,6 +110,8 @@ class LinuxCncSink:
             await self._ask({})
         except ThermocompError:
             return None
+        if self._still:
+            return None
         return {target: self._reports[letter.upper()].correction for target, letter in self.axes.items()}
 
     def status(self) -> Status:
@@ -117,9 +120,14 @@ class LinuxCncSink:
 
     def suspended(self) -> dict[str, str]:
         """Return targets that the controller has no correction in force of, and why, as it said last."""
-        if self._why:
-            return dict.fromkeys(self.axes, f"the controller is {self._why}")
-        return {t: f"axis {a.upper()} {alarm}" for t, a in self.axes.items() if (alarm := self._alarm(a))}
+        return dict.fromkeys(self.axes, f"the controller is {self._why}") if self._why else {}
+
+    def alarms(self) -> dict[str, str]:
+        """Return targets whose correction is not in force as it shall be, and why, as was said last."""
+        if self._still:
+            return dict.fromkeys(self.axes, "the controller stands still")
+        found = {t: self._reports[a.upper()].alarm for t, a in self.axes.items() if a.upper() in self._reports}
+        return {t: f"axis {self.axes[t].upper()} {alarm}" for t, alarm in found.items() if alarm}
 
     def reports(self) -> dict[str, AxisReport]:
         """Return what was said last of each axis, by its letter."""
@@ -135,10 +143,6 @@ class LinuxCncSink:
         self._connection.to("closed")
 
     # -- inside --------------------------------------------------------------------------------------------------------
-
-    def _alarm(self, letter: str) -> str:
-        found = self._reports.get(letter.upper())
-        return found.alarm if found else ""
 
     async def _hang_up(self) -> None:
         streams, self._streams = self._streams, None
@@ -180,6 +184,7 @@ class LinuxCncSink:
             if answer.get("beat") != self._beat:
                 raise ValueError(answer.get("error", "not the answer"))
             self._why, self.ticks = str(answer["suspended"]), int(answer["ticks"])
+            self._still = bool(answer["still"])
             self._timeout = float(answer["timeout"])
             self._reports = {letter: _read(one) for letter, one in answer["axes"].items()}
             heard = True
