@@ -93,3 +93,30 @@ def test_what_a_configuration_names_has_to_fit(tmp_path: Path) -> None:
     path.write_text(f'models = ["drift.json"]\n{CONFIG}', encoding="utf-8")
     with pytest.raises(InputError, match="judged"):
         build(read_config(path))
+
+
+def test_all_files_and_folders_that_are_not_there_are_said_at_once(tmp_path: Path) -> None:
+    (tmp_path / "folder.json").mkdir()
+    text = """models = ["a.json", "b.json"]
+state = "none/state.json"
+own_compensation = "off"
+[[sources]]
+kind = "replay"
+file = "c.csv"
+[[sinks]]
+kind = "file"
+file = "folder.json"
+[journal]
+file = "nowhere/live.db"
+[page]
+token_file = "token.txt"
+"""
+    path = tmp_path / "serve.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        build(read_config(path))
+    said = str(caught.value)
+    for word in ("a.json: no", "b.json: no", "c.csv: no", "token.txt: no", "none", "folder.json: is a", "nowhere"):
+        assert word in said
+    assert len(said.splitlines()) == 8
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder.json", "serve.toml"]

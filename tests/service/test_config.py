@@ -66,7 +66,7 @@ def test_what_it_says(tmp_path: Path) -> None:
         ("port = 8080", 'port = "8080"', "page.port: Input should be a valid integer, found '8080'"),
         ("[page]", "[pages]", "pages is no key that is known"),
         ('state = "state.json"', "speed = 60.0", "a machine that MQTT tells of runs at the speed of the world"),
-        ('state = "state.json"', "speed = 0.0", "speed = 0: want more than 0"),
+        ('state = "state.json"', "speed = 0.0", "speed: Input should be greater than 0, found 0.0"),
         ('state = "state.json"', 'state = "state.json', "not valid TOML"),
         ('state = "state.json"', 'own_compensation = "on"', "the same error would be corrected twice"),
         ('state = "state.json"', 'own_compensation = "maybe"', "own_compensation: Input should be 'on', 'off' or"),
@@ -105,10 +105,34 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
         read_config(written(tmp_path, text))
     lines = str(caught.value).splitlines()
     assert lines[0].endswith("4 to mend:")
-    assert [
-        any(word in line for line in lines) for word in ("limits.rates", "page.port", "sinks.1.fil ", "sinks.1.file")
-    ]
+    for word in ("limits.rates", "page.port", "sinks.1.fil ", "sinks.1.file"):
+        assert any(word in line for line in lines)
     assert len(lines) == 5
+
+
+def test_a_key_of_a_wrong_type_hides_nothing(tmp_path: Path) -> None:
+    text = GOOD.replace("rate = 0.05", 'rate = "x"\nhold = 0.0\nfade = -1.0').replace(
+        "port = 8080", 'port = "x"\nsettled = 0.0'
+    )
+    with pytest.raises(InputError) as caught:
+        read_config(written(tmp_path, text.replace('topic = "', 'port = "x"\ntopic = " " # ', 1)))
+    found = sorted(line.strip() for line in str(caught.value).splitlines()[1:])
+    said = (
+        "limits.rate: Input should be a valid number",
+        "limits: limit hold = 0.0: must be positive; limit fade = -1.0: must be positive",
+        "page.port: Input should be a valid integer",
+        "page: settled = 0: want more than 0 um",
+        "sources.1.port: Input should be a valid integer",
+        "sources.1: topic = ' ': name one",
+    )
+    for line, start in zip(found, sorted(said), strict=True):
+        assert line.startswith(start)
+
+
+def test_all_that_does_not_fit_together_is_said_at_once(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        read_config(written(tmp_path, 'models = []\nsources = []\nown_compensation = "on"\n'))
+    assert str(caught.value).splitlines()[0].endswith("3 to mend:")
 
 
 def test_there_is_none(tmp_path: Path) -> None:

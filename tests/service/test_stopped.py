@@ -44,6 +44,8 @@ asyncio.run(main())
         end = time.monotonic() + 40.0
         while not ((found := in_force(path)) and found[1] == -4.0) and time.monotonic() < end:
             time.sleep(0.05)
+        second = subprocess.run(command, check=False, capture_output=True, text=True, timeout=30)
+        looked = subprocess.run([*command, "--check"], check=False, capture_output=True, text=True, timeout=30)
         process.send_signal(signal.SIGTERM)
         while process.poll() is None and time.monotonic() < end:
             found = in_force(path)
@@ -57,6 +59,9 @@ asyncio.run(main())
         talking.wait(10)
         broker.kill()
     assert process.returncode == 0
+    assert second.returncode == 2
+    assert "state.json: another thermocomp uses it now" in second.stderr
+    assert looked.returncode == 0
     assert "the state is saved" in out
     last = json.loads(path.read_text())["corrections"]["z_um"]["offset_um"]
     assert last == (0.0 if at_stop == "fade" else -4.0)

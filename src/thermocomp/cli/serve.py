@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from thermocomp.cli.extras import needs
 from thermocomp.cli.terminal import console, words
+from thermocomp.core.alone import alone
 from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
+    from thermocomp.service.config import Settings
     from thermocomp.service.loop import Service
 
 #: seconds of the virtual machine in one of the world, in the demo
@@ -59,12 +61,25 @@ def serve(
         0 stopped as asked.
     """
     with needs("live"):
-        from thermocomp.service.build import build
-        from thermocomp.service.config import Page, read_config
+        from thermocomp.service.config import read_config
     if (config is None) != demo:
         raise InputError("name a configuration (a TOML file), or --demo")
     path = _demo(output) if config is None else config
     settings = read_config(path)
+    own, journal = settings.config.state, settings.config.journal
+    with contextlib.ExitStack() as stack:
+        for name in (own, journal.file if journal else ""):
+            if name and not check and (settings.folder / name).parent.is_dir():
+                stack.enter_context(alone(settings.folder / name))
+        return _serve(settings, port, check=check)
+
+
+def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
+    from thermocomp.service import web
+    from thermocomp.service.build import build
+    from thermocomp.service.config import Page
+    from thermocomp.service.page import make_app
+
     page = settings.config.page
     if port is not None:
         page = replace(page or Page(), port=port)
@@ -74,9 +89,6 @@ def serve(
         console.print(
             words(f"{target}: {'runs' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
         )
-    from thermocomp.service import web
-    from thermocomp.service.page import make_app
-
     token = web.read_token(settings.folder / page.token_file) if page is not None and page.token_file else ""
     if check:
         return 0

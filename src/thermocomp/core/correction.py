@@ -148,12 +148,12 @@ class Limits:
     fade: float = 3600.0
 
     def __post_init__(self) -> None:
-        for name in ("magnitude", "rate", "reading_age", "hold", "fade"):
-            value = getattr(self, name)
-            if not value > 0:  # also refuses nan
-                raise SettingError(f"limit {name} = {value}: must be positive")
+        values = {name: getattr(self, name) for name in ("magnitude", "rate", "reading_age", "hold", "fade")}
+        wrong = [f"limit {name} = {value}: must be positive" for name, value in values.items() if not value > 0]  # nan
         if not (self.dead_band >= 0 and math.isfinite(self.dead_band)):
-            raise SettingError(f"limit dead_band = {self.dead_band}: must be finite and not negative")
+            wrong.append(f"limit dead_band = {self.dead_band}: must be finite and not negative")
+        if wrong:
+            raise SettingError("; ".join(wrong))
 
     def in_words(self) -> str:
         """Return what holds for corrections as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""

@@ -61,8 +61,7 @@ def advance(
                 begins[k] = begun
         answers, bands = [math.nan] * len(mine), [math.nan] * len(mine)
         if known:
-            mine, answers = group.step(mine, values, dt)
-            bands = group.half_widths(mine, values)
+            mine, answers, bands = group.step(mine, values, dt)
             outside += group.beyond(mine, values)
         for k, state, answer, width in zip(group.members, mine, answers, bands, strict=True):
             after[k], said[k], widths[k], given[k] = state, answer, width, values
@@ -87,6 +86,6 @@ def _zeroed(
     reference = np.where(np.isnan(states[0].reference), mean, states[0].reference)
     states = [s._replace(reference=reference) for s in states]
     for time in before.times:
-        states, _ = group.step(states, mean, time - last)
+        states, _, _ = group.step(states, mean, time - last)
         last = time
     return states, Gathered(), True, values

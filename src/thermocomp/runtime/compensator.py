@@ -33,13 +33,16 @@ from thermocomp.runtime.gate import explain_implausible, is_number
 from thermocomp.runtime.group import Group
 from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine, Spoken, constant, evaluate, straight
+from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
-from thermocomp.runtime.watch import WORDS, WatchState, begin, look
+from thermocomp.runtime.watch import WatchState, begin
 from thermocomp.volumetric.model import VolumetricModel
 from thermocomp.volumetric.straight import best_lines
 
 #: after a restart a correction has caught up once it is so near to what its models want [um]
 ARRIVED = 0.1
+
+ACTIVE = Status("active")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,10 @@ class Compensator:
             if m.watch is not None and m.watch not in found:
                 found.append(m.watch)
         return tuple(found)
+
+    @cached_property
+    def _lookouts(self) -> tuple[Lookout, ...]:
+        return tuple(Lookout(w) for w in self.watches)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -214,7 +221,7 @@ class Compensator:
         for group in self.groups:
             values = [reading.values.get(name) for name in group.names]
             reference = state.models[group.members[0]].reference
-            if group.passes(values, reference):
+            if group.ranges.hold(values, reference):
                 continue
             if why := explain_implausible(group.lead, values, reference.tolist()):
                 return why
@@ -259,7 +266,7 @@ class Compensator:
         travel = self._travel(state, tick)
         stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
         failed, corrections, learned = (
-            _failed(self.watches, state.watches),
+            Lookout.failed(self._lookouts, state.watches),
             dict(state.corrections),
             dict(state.learned),
         )
@@ -272,7 +279,8 @@ class Compensator:
             if not all(map(math.isfinite, told)):
                 states_of[target] = Status("restarting", "its zero is being averaged")
                 continue
-            references.setdefault(target, Reference(reading.time, "start: mean over the first readings"))
+            if target not in references:
+                references[target] = Reference(reading.time, "start: mean over the first readings")
             mine = line.models
             spoken = Spoken(models, stepped.states[mine], stepped.values[mine], told, stepped.half_widths[mine])
             zero, probing = references[target].shift, probings.get(target)
@@ -289,10 +297,18 @@ class Compensator:
                 refused[target] = answer.refused
             corrections[target], states_of[target] = self._drive(state, target, answer.deviation, travel)
             arrived &= states_of[target].word != "restarting"
-        new = state._replace(models=stepped.states, gathered=stepped.gathered, corrections=corrections, learned=learned)
-        new = new._replace(references=references, raw=raw, away=None if arrived else state.away)
-        new, idle = self._idle(new, tick, held, driven=states_of)
-        new = new._replace(time=instant.time, origin=instant.origin, taken=new.clock)
+        new, idle = self._idle(state._replace(corrections=corrections), tick, held, driven=states_of)
+        new = new._replace(
+            models=stepped.states,
+            gathered=stepped.gathered,
+            learned=learned,
+            references=references,
+            raw=raw,
+            away=None if arrived else state.away,
+            time=instant.time,
+            origin=instant.origin,
+            taken=new.clock,
+        )
         told_of = {t: why for t, why in refused.items() if why}
         return new, Compensated(
             *(new.corrections, "", stepped.outside, failed, states_of | idle, deviations, widths, told_of)
@@ -315,7 +331,7 @@ class Compensator:
         said : Compensated
         """
         new, states = self._idle(state, tick, dict.fromkeys(self.lines, why))
-        failed = _failed(self.watches, state.watches)
+        failed = Lookout.failed(self._lookouts, state.watches)
         return new, Compensated(new.corrections, why, (), failed, states, {}, {}, {})
 
     def withdraw(self, state: CompensatorState, passed: float) -> CompensatorState:
@@ -421,20 +437,16 @@ class Compensator:
         after = limit_line(wanted, before, line.travel, travel, self.limits)
         if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, self.limits.dead_band):
             return after, Status("restarting", f"nothing ran for {state.away:.0f} s; probe, or set the zero anew")
-        return after, Status("active")
+        return after, ACTIVE
 
     def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
         """Return the reading with what stands in for temperatures that are not believed."""
-        if not self.watches:
-            return state, reading
-        values, states = dict(reading.values), []
-        for watch, before in zip(self.watches, state.watches, strict=True):
-            given = [values.get(i.name) for i in watch.inputs]
-            numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
-            resting = watch.zeroing.stands(values.get(watch.zeroing.speed))
-            seen, believed = look(watch, before, time, numbers, resting=resting)
+        values, states = reading.values, list[WatchState]()
+        for lookout, before in zip(self._lookouts, state.watches, strict=True):
+            seen, values = lookout.believe(before, time, values)
             states.append(seen)
-            values |= zip(watch.names, believed[watch.bank.temperatures].tolist(), strict=True)
+        if values is reading.values:
+            return state, reading
         return state._replace(watches=tuple(states)), Reading(reading.time, values, reading.positions)
 
     def _travel(self, state: CompensatorState, tick: float) -> float:
@@ -466,17 +478,6 @@ class Compensator:
             word: Literal["fading", "holding"] = "fading" if idle[target] > self.limits.hold else "holding"
             states[target] = Status(word, f"not driven for {idle[target]:.0f} s: {why}")
         return state._replace(corrections=corrections, clock=clock, idle=idle), states
-
-
-def _failed(watches: Sequence[Watch], states: Sequence[WatchState]) -> dict[str, str]:
-    """Return the sensors that are not believed, and what they are."""
-    return {
-        name: WORDS[fault]
-        for watch, state in zip(watches, states, strict=True)
-        if state.fault.any()
-        for name, fault in zip(watch.names, state.fault.tolist(), strict=True)
-        if fault
-    }
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:

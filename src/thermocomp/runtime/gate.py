@@ -10,6 +10,9 @@ from collections.abc import Mapping, Sequence
 from numbers import Real
 from statistics import median
 
+import numpy as np
+from numpy.typing import NDArray
+
 from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
@@ -114,6 +117,41 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
         room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
         low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
     return low, high
+
+
+class Ranges:
+    """What some inputs can read, worked out once per zero: the quick way through `explain_implausible`.
+
+    Parameters
+    ----------
+    inputs : sequence of Input
+    """
+
+    def __init__(self, inputs: Sequence[Input]) -> None:
+        self._inputs = tuple(inputs)
+        self._of: tuple[NDArray[np.float64] | None, list[tuple[float, float]]] = (None, [])
+
+    def hold(self, values: Sequence[object], reference: NDArray[np.float64]) -> bool:
+        """Return whether values are plausible beyond doubt: plain numbers, each in its range about a known zero.
+
+        Parameters
+        ----------
+        values : sequence of shape (n_inputs,)
+            As a source gave them.
+        reference : ndarray of shape (n_inputs,)
+            What counts as zero; nan where it is not known yet.
+        """
+        known, ranges = self._of
+        if known is not reference:
+            ranges = [find_plausible_range(i, z) for i, z in zip(self._inputs, reference.tolist(), strict=True)]
+            ranges = [] if np.isnan(reference).any() else ranges
+            self._of = (reference, ranges)
+        if not ranges:
+            return False
+        for value, (low, high) in zip(values, ranges, strict=True):
+            if type(value) is not float or not low <= value <= high:
+                return False
+        return True
 
 
 def is_number(value: object) -> bool:

@@ -9,7 +9,7 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.model import ErrorModel, FloatArray, State
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.together import Together, TogetherState
-from thermocomp.runtime.gate import find_plausible_range
+from thermocomp.runtime.gate import Ranges
 
 #: what is said to be outside where each input is inside its own range, but all together are unlike the training
 TOGETHER = "inputs together"
@@ -33,7 +33,7 @@ class Group:
         self.names = tuple(i.name for i in self.lead.inputs)
         paced = [m for m in self.models if isinstance(m, PacedDynamic)]
         self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
-        self._ranges: tuple[FloatArray | None, list[tuple[float, float]]] = (None, [])
+        self.ranges = Ranges(self.lead.inputs)
         joints = [m.joint for m in self.models]
         #: those whose joint support is no other's: of them alone it is asked how far a reading is
         self._apart = [m for k, m in enumerate(self.models) if m.joint is not None and m.joint not in joints[:k]]
@@ -47,26 +47,6 @@ class Group:
             alike.setdefault(k if key is None else (key, m.zeroing), []).append(k)
         return tuple(Group(models, members) for members in alike.values())
 
-    def passes(self, values: Sequence[object], reference: FloatArray) -> bool:
-        """Return whether a reading is plausible beyond doubt: plain numbers, each in its range about a known zero.
-
-        The quick way through `thermocomp.runtime.gate.explain_implausible`, which has the words for what is not.
-
-        Parameters
-        ----------
-        values : sequence of shape (n_inputs,)
-            As a source gave them.
-        reference : ndarray of shape (n_inputs,)
-            What counts as zero; nan where it is not known yet.
-        """
-        if self._ranges[0] is not reference:
-            ranges = [find_plausible_range(i, z) for i, z in zip(self.lead.inputs, reference.tolist(), strict=True)]
-            self._ranges = (reference, [] if np.isnan(reference).any() else ranges)
-        ranges = self._ranges[1]
-        return bool(ranges) and all(
-            type(value) is float and low <= value <= high for value, (low, high) in zip(values, ranges, strict=True)
-        )
-
     def share(self, states: Sequence[State]) -> list[State]:
         """Return states that share what is the same in all of them."""
         lead = states[0]
@@ -75,30 +55,33 @@ class Group:
             return list(states)
         return [State(lead.reference, lead.memory, s.deviation, lead.outside) for s in states]
 
-    def step(self, states: Sequence[State], values: FloatArray, dt: float) -> tuple[list[State], list[float]]:
-        """Take a reading in; see `ErrorModel.step`."""
+    def step(
+        self, states: Sequence[State], values: FloatArray, dt: float
+    ) -> tuple[list[State], list[float], list[float]]:
+        """Take a reading in, as `ErrorModel.step` does.
+
+        Returns
+        -------
+        states : list of State
+        deviations : list of float
+            One per model [its unit].
+        half_widths : list of float
+            Of the bands about them; nan without one.
+        """
         lead = states[0]
         if self._together is None or any(
             s.memory is not lead.memory or s.reference is not lead.reference for s in states
         ):
             each = [m.step(s, values, dt) for m, s in zip(self.models, states, strict=True)]
-            return self.share([s for s, _ in each]), [float(d) for _, d in each]
+            widths = [
+                math.nan if m.band is None else float(m.half_width(s, values))
+                for m, (s, _) in zip(self.models, each, strict=True)
+            ]
+            return self.share([s for s, _ in each]), [float(d) for _, d in each], widths
         before = TogetherState(lead.reference, lead.memory, lead.reference, lead.outside)
         after, deviations = self._together.step(before, values, min(dt, GAP))
         found = [State(after.reference, after.memory, d, after.outside) for d in deviations]
-        return found, deviations.tolist()
-
-    def half_widths(self, states: Sequence[State], values: FloatArray) -> list[float]:
-        """Return the half-widths of the bands about what was said of a reading; nan without one [unit of the model]."""
-        lead = states[0]
-        if self._together is not None and all(s.memory is lead.memory for s in states):
-            change = self.lead.change(lead, values)
-            now = TogetherState(lead.reference, lead.memory, change, lead.outside)
-            return list(self._together.half_widths(now).tolist())
-        return [
-            math.nan if m.band is None else float(m.half_width(s, values))
-            for m, s in zip(self.models, states, strict=True)
-        ]
+        return found, deviations.tolist(), self._together.half_widths(after).tolist()
 
     def beyond(self, states: Sequence[State], values: FloatArray) -> list[str]:
         """Return the inputs that are outside the trained range of a model."""

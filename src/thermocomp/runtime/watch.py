@@ -90,6 +90,11 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     )
 
 
+def is_quiet(state: WatchState, time: float) -> bool:
+    """Return whether all sensors are good and the next look is not due: a plausible reading is believed as it is."""
+    return time - state.time < TICK and not state.fault.any() and bool(np.isnan(state.jumped).all())
+
+
 def look(
     watch: Watch, state: WatchState, time: float, values: FloatArray, *, resting: bool = False
 ) -> tuple[WatchState, FloatArray]:

@@ -1,6 +1,7 @@
 """The service that a configuration describes."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -31,9 +32,11 @@ def build(settings: Settings) -> Service:
     Raises
     ------
     InputError
-        A model file or an experiment cannot be used, or none of the models may run.
+        A file or a folder is not there, a model file or an experiment cannot be used, or none of the models may run.
     """
     config, folder = settings
+    if missing := list(_missing(settings)):
+        raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {m}" for m in missing)]))
     if (own := config.machine) is not None:
         machine = read_machine(folder / own.file)
         compensator = Compensator.of_machine(machine, own.at, own.tool, config.limits)
@@ -80,6 +83,26 @@ def find_experiment(name: str, folder: Path) -> Experiment:
         raise InputError(f"experiment {name!r}: want a path that ends in .toml, or one of {', '.join(known)}")
     with as_file(home / f"{name}.toml") as path:
         return read_protocol(path)
+
+
+def _missing(settings: Settings) -> Iterator[str]:
+    """Say which files cannot be read, and which folders nothing can be written in."""
+    config, folder = settings
+    read = [*config.models, *([config.machine.file] if config.machine else [])]
+    read += [s.file for s in config.sources if isinstance(s, ReplayIn)]
+    read += [config.page.token_file] if config.page and config.page.token_file else []
+    for path in (folder / name for name in read):
+        if not path.is_file():
+            yield f"{path}: no such file"
+    written = [config.state, config.journal.file if config.journal else ""]
+    written += [s.file for s in config.sinks if isinstance(s, FileOut)]
+    for path in (folder / name for name in written if name):
+        if path.is_dir():
+            yield f"{path}: is a folder; name a file"
+        elif not path.parent.is_dir():
+            yield f"{path}: there is no folder {path.parent}"
+        elif not os.access(path.parent, os.W_OK):
+            yield f"{path}: nothing can be written in {path.parent}"
 
 
 def _source(one: In, folder: Path, speed: float) -> Source:

@@ -1,10 +1,13 @@
 """The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
 
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
-from pydantic import ConfigDict, Discriminator, TypeAdapter, ValidationError, with_config
+from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
+from pydantic_core import ErrorDetails
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, SettingError
@@ -295,38 +298,41 @@ class Config:
     state: str = ""
     limits: Limits = Limits()
     shadow: bool = False
-    speed: float = 1.0
+    speed: Annotated[float, Field(gt=0, le=10_000)] = 1.0
     page: Page | None = None
     journal: JournalOut | None = None
     own_compensation: Literal["on", "off", "unknown"] = "unknown"
     at_stop: Literal["hold", "fade"] = "hold"
 
     def __post_init__(self) -> None:
+        if found := list(self._wrong()):
+            raise SettingError("\n".join(found))
+
+    def _wrong(self) -> Iterator[str]:
+        """Say what does not fit together."""
         if bool(self.models) == bool(self.machine):
-            raise SettingError(
+            yield (
                 f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
                 "[machine], and not both"
             )
         if not self.sources:
-            raise SettingError('no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"')
-        if not 0.0 < self.speed <= 10_000.0:
-            raise SettingError(f"speed = {self.speed:g}: want more than 0, at most 10000")
+            yield 'no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"'
         if self.own_compensation == "on" and not self.shadow:
-            raise SettingError(
+            yield (
                 'own_compensation = "on": the same error would be corrected twice; switch that of the controller off, '
                 "or let the models run in shadow (shadow = true)"
             )
         controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
         if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
-            raise SettingError(
+            yield (
                 'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
                 "unless it is known whether the controller compensates for temperature by itself"
             )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
-            raise SettingError('a probe of kind = "simulated" wants a source of kind = "simulated"')
+            yield 'a probe of kind = "simulated" wants a source of kind = "simulated"'
         if self.speed != 1.0 and any(isinstance(s, MqttIn) and not s.virtual for s in self.sources):
-            raise SettingError(
+            yield (
                 f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
                 "a virtual one (virtual = true)"
             )
@@ -370,9 +376,29 @@ def read_config(path: str | Path) -> Settings:
         config = _ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
         errors = e.errors(include_url=False)
-        lines = [_tell(dict(error)) for error in errors]
+        lines = [line for error in [*errors, *_behind(content, errors)] for line in _tell(dict(error)).splitlines()]
         raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
     return Settings(config, Path(path).resolve().parent)
+
+
+def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Return what else is wrong in tables that have a key of a wrong type: they are not judged as a whole then."""
+    content = deepcopy(content)
+    tables = set[tuple[int | str, ...]]()
+    for error in errors:
+        path = error["loc"][:-1]
+        if path and error["type"] not in ("value_error", "missing"):
+            table: Any = content
+            for k in path:
+                if not (isinstance(table, dict) and k not in table):  # the kind of an entry is no key
+                    table = table[k]
+            if isinstance(table, dict) and table.pop(error["loc"][-1], None) is not None:
+                tables.add(path)
+    try:
+        _ADAPTER.validate_json(as_json(content))
+    except ValidationError as e:
+        return [x for x in e.errors(include_url=False) if x["type"] == "value_error" and x["loc"] in tables]
+    return []
 
 
 def _tell(error: dict[str, Any]) -> str:

@@ -1,0 +1,58 @@
+"""A watch over what a source gives: values by channel in, values by channel out."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from thermocomp.core.watch import Watch
+from thermocomp.runtime.gate import Ranges, is_number
+from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
+
+
+class Lookout:
+    """A watch, and where its inputs are in a reading.
+
+    Parameters
+    ----------
+    watch : Watch
+    """
+
+    def __init__(self, watch: Watch) -> None:
+        self.watch = watch
+        self._names = tuple(i.name for i in watch.inputs)
+        self._ranges = Ranges(watch.inputs)
+
+    def believe(
+        self, state: WatchState, time: float, values: Mapping[str, float]
+    ) -> tuple[WatchState, Mapping[str, float]]:
+        """Return the values with what stands in for temperatures that are not believed.
+
+        Parameters
+        ----------
+        state : WatchState
+            Before the reading.
+        time : float
+            When it was taken [s].
+        values : mapping of str to float
+            As a source gave them, by channel.
+        """
+        given = [values.get(name) for name in self._names]
+        if is_quiet(state, time) and self._ranges.hold(given, state.reference):
+            return state, values
+        numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
+        zeroing, watch = self.watch.zeroing, self.watch
+        resting = zeroing.stands(values.get(zeroing.speed))
+        state, believed = look(watch, state, time, numbers, resting=resting)
+        return state, {**values, **dict(zip(watch.names, believed[watch.bank.temperatures].tolist(), strict=True))}
+
+    @staticmethod
+    def failed(lookouts: Sequence["Lookout"], states: Sequence[WatchState]) -> dict[str, str]:
+        """Return the sensors that are not believed, and what they are."""
+        return {
+            name: WORDS[fault]
+            for lookout, state in zip(lookouts, states, strict=True)
+            if state.fault.any()
+            for name, fault in zip(lookout.watch.names, state.fault.tolist(), strict=True)
+            if fault
+        }
