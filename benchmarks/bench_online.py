@@ -3,7 +3,8 @@
 Run with ``python benchmarks/bench_online.py``. All sides are timed in turn in one run, on the same readings; frozen
 model and estimator must say the same to 1e-12 relative. Goals: the median step of the compensator with one model, and
 that of `averaged` for the five channels of the virtual machine's demo with their bands and the watch over its 16
-temperatures, take at most 50 us.
+temperatures, take at most 50 us; the whole step of the compensator with all of that, from reading to corrections,
+100 us. A reading comes every second; in every tenth the watch looks at the differences.
 """
 
 import sys
@@ -33,8 +34,11 @@ from thermocomp.runtime.watch import begin, look
 
 FloatArray = NDArray[np.float64]
 
-GOAL_US = 50.0
+GOAL_US, WHOLE_US = 50.0, 100.0
 N_ROWS, N_TEMPERATURES = 4000, 16
+
+
+HONEST = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so that it runs", rules=RULES)
 
 
 def recording(seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
@@ -67,10 +71,16 @@ def percentiles(job: Callable[[int], object], count: int) -> tuple[float, float]
     return float(np.median(times)) / 1e3, float(np.quantile(times, 0.99)) / 1e3
 
 
-def step_of_five() -> Callable[[int], object]:
-    """Return the step of five channels: which temperatures are believed, what the models say, and their bands."""
+def steps_of_five() -> tuple[Callable[[int], object], Callable[[int], object]]:
+    """Return two steps of five channels.
+
+    Which temperatures are believed, what the models say, and their bands; and a whole one of the compensator.
+    """
     (found,) = record("demo")
     samples = stack([found], [c.name for c in found.displacements])
+    seconds = np.arange(4000.0)
+    table = np.column_stack([np.interp(seconds, found.time - found.time[0], v) for v in samples.values.T])
+    table[:, :N_TEMPERATURES] += 0.01 * np.random.default_rng(0).normal(size=(len(table), N_TEMPERATURES))
     samples = samples.take(np.arange(len(samples)) % 9 == 0)
     everything = np.ones(len(samples), dtype=np.bool_)
     models = [train("averaged", samples, k, everything).model for k in range(len(samples.targets))]
@@ -80,15 +90,23 @@ def step_of_five() -> Callable[[int], object]:
     together = Stack(models)
     names = [c.name for c in samples.inputs]
     assert list(together.inputs) == [i.name for i in watch.inputs] == names
-    live, seen = together.init(), begin(watch)
+    readings = [Reading(float(k), dict(zip(names, row, strict=True))) for k, row in enumerate(table.tolist())]
+    compensator = Compensator.of([replace(m, watch=watch, honest_error=HONEST) for m in models], Limits())
+    assert len(compensator.groups) == len(compensator.watches) == 1
+    live, seen, all_ = together.init(), begin(watch), compensator.start()
 
     def step(k: int) -> None:
         nonlocal live, seen
-        seen, believed = look(watch, seen, 1.0 * k, samples.values[k // 20])  # a reading a second
+        seen, believed = look(watch, seen, 1.0 * k, table[k])
         live, _ = together.step(live, believed, 1.0)
         together.half_widths(live, believed)
 
-    return step
+    def whole(k: int) -> None:
+        nonlocal all_
+        all_, said = compensator.step(all_, readings[k], readings[k].time)
+        assert not said.failed
+
+    return step, whole
 
 
 def main() -> int:
@@ -110,8 +128,7 @@ def main() -> int:
     print(f"frozen model against its estimator, {N_ROWS} rows: largest relative difference {worst:.1e} (goal 1e-12)")
 
     readings = [Reading(30.0 * k, dict(zip(names, row.tolist(), strict=True))) for k, row in enumerate(X)]
-    honest = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so that it runs", rules=RULES)
-    compensator, last = Compensator.of([replace(model, honest_error=honest)], Limits()), model.init()
+    compensator, last = Compensator.of([replace(model, honest_error=HONEST)], Limits()), model.init()
     live = compensator.start()
 
     def compensator_step(k: int) -> None:
@@ -123,18 +140,20 @@ def main() -> int:
         last, _ = model.step(last, X[k], 30.0)
 
     pipeline = make_pipeline(StandardScaler(), Ridge()).fit(X, y)
+    five, whole = steps_of_five()
     rows = [
         ("compensator: gate, model, limits", percentiles(compensator_step, 3000)),
         (f"frozen model alone ({len(names)} inputs, {len(estimator.coef_)} features)", percentiles(model_step, 3000)),
-        ("averaged, five channels, bands and watch", percentiles(step_of_five(), 3000)),
+        ("averaged, five channels, bands and watch", percentiles(five, 3000)),
+        ("the same, the whole step of the compensator", percentiles(whole, 3000)),
         ("scikit-learn pipeline, one row, no dynamics", percentiles(lambda k: pipeline.predict(X[k : k + 1]), 1500)),
     ]
     print(f"{'one sample':<48} {'p50 [us]':>9} {'p99 [us]':>9} {'peer / this':>12}")
     peer = rows[-1][1][0]
     for title, (p50, p99) in rows:
         print(f"{title:<48} {p50:>9.1f} {p99:>9.1f} {peer / p50:>11.1f}x")
-    reached = worst <= 1e-12 and max(rows[0][1][0], rows[2][1][0]) <= GOAL_US
-    print(f"goal p50 <= {GOAL_US:.0f} us: {'reached' if reached else 'MISSED'}")
+    reached = worst <= 1e-12 and max(rows[0][1][0], rows[2][1][0]) <= GOAL_US and rows[3][1][0] <= WHOLE_US
+    print(f"goal p50 <= {GOAL_US:.0f} us, whole step {WHOLE_US:.0f} us: {'reached' if reached else 'MISSED'}")
     return 0 if reached else 1
 
 

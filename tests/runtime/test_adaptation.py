@@ -17,8 +17,9 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.runtime import adaptation, batch
 from thermocomp.runtime.adaptation import OFFSET, STRUCTURES, UNEXPLAINED, Probing
+from thermocomp.runtime.advance import Advanced
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.lines import DeviationLine, Spoken, constant, evaluate
+from thermocomp.runtime.lines import DeviationLine, constant, evaluate
 
 HOUR = 3600.0
 MODEL = PacedDynamic(
@@ -192,6 +193,8 @@ def test_a_lost_sensor_widens_the_band() -> None:
     assert model.widening([]) == model.widening(["other"]) == 1.0
     line, reading = DeviationLine(slice(0, 1), (0.0, 0.0), constant), np.array([25.0, 0.0])
     state, said = model.step(model.init((20.0, 0.0)), reading, 0.0)
-    spoken = Spoken([model], [state], [reading], [float(said)], [float(model.half_width(state, reading))])
-    widths = [evaluate(line, spoken, 0.0, None, None, failed, Deviation(0.0)).half_width for failed in ([], ["t"])]
+    spoken = Advanced((state,), (), [float(said)], [float(model.half_width(state, reading))], [reading], ())
+    widths = [
+        evaluate(line, [model], spoken, 0.0, None, None, failed, Deviation(0.0)).half_width for failed in ([], ["t"])
+    ]
     assert widths == [model.half_width(state, reading), 2.5 * model.half_width(state, reading)]

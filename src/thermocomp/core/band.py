@@ -80,7 +80,7 @@ class Band:
 
     def turning(self, change: FloatArray) -> NDArray[np.bool_]:
         """Return whether the spindle turns in states of the inputs, (..., n_inputs)."""
-        return np.asarray((np.abs(change[..., self.speeds]) > STANDS).any(axis=-1))
+        return np.asarray(np.logical_or.reduce([np.abs(change[..., k]) > STANDS for k in self.speeds]))
 
     def half_width(self, change: FloatArray, spread: FloatArray) -> FloatArray:
         """Return the half-width for states of the inputs.

@@ -89,7 +89,7 @@ class JointSupport:
         columns, weights, points, squares = self._numbers
         far = np.zeros(change.shape[:-1])
         if self.columns:
-            state = change[..., columns] * weights
+            state = change.take(columns, axis=-1) * weights
             square = np.minimum.reduce(squares - state @ points, axis=-1) + np.add.reduce(state * state, axis=-1)
             far = np.sqrt(np.maximum(square, 0.0))
         for k, levels, tolerance in zip(self.speeds, self._levels, self.tolerances, strict=True):

@@ -24,8 +24,8 @@ class Bank(NamedTuple):
 
     def signals(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the states follow, (..., n_memory), and the share of top speed of each speed state."""
-        share = np.abs(change[..., self.speeds]) / self.top
-        temperatures = change[..., self.temperatures]
+        share = np.abs(change.take(self.speeds, axis=-1)) / self.top
+        temperatures = change.take(self.temperatures, axis=-1)
         return np.concatenate((*(temperatures,) * self.taus, share**self.powers), axis=-1), share
 
     def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:

@@ -17,6 +17,7 @@ class TogetherState(NamedTuple):
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
     change: FloatArray  #: (..., n_inputs), of the last reading, clipped
     outside: NDArray[np.bool_]  #: (..., n_inputs), inputs beyond the trained range
+    spread: FloatArray | None = None  #: (..., n_spread of all), what the structures of each model differ in
 
 
 class Together:
@@ -31,10 +32,11 @@ class Together:
     def __init__(self, models: Sequence[PacedDynamic]) -> None:
         self.models = tuple(models)
         self._first = models[0]
-        self._direct = np.column_stack([m.read_out[0] for m in models])
-        self._weights = np.column_stack([m.read_out[1] for m in models])
+        # of inputs and of states, the deviations first, behind them the spread
+        self._direct, self._weights = (
+            np.column_stack([*(m.read_out[k] for m in models), *(m.spread_out[k] for m in models)]) for k in (0, 1)
+        )
         self._intercept = np.array([m.intercept for m in models])
-        self._spread = tuple(np.hstack([m.spread_out[k] for m in models]) for k in (0, 1))
         counts = [len(m.spread) for m in models]
         self._sum = np.repeat(np.eye(len(models)), counts, axis=0)  # (n_spread of all, n_models)
         bands = [m.band for m in models]
@@ -66,14 +68,14 @@ class Together:
             memory = self._first.bank.signals(change)[0]
         else:
             memory = self._first.bank.advance(state.memory, change, dt)
-        deviations = change @ self._direct + memory @ self._weights + self._intercept
-        return TogetherState(reference, memory, change, outside), deviations
+        said, n = change @ self._direct + memory @ self._weights, len(self.models)
+        return TogetherState(reference, memory, change, outside, said[..., n:]), said[..., :n] + self._intercept
 
     def half_widths(self, state: TogetherState) -> FloatArray:
         """Return the half-widths of the bands about the deviations of the last reading, (..., n_models)."""
-        if state.memory is None or self._first.band is None:
+        if state.spread is None or self._first.band is None:
             return np.full((*state.change.shape[:-1], len(self.models)), np.nan)
-        spread = (state.change @ self._spread[0] + state.memory @ self._spread[1]) ** 2 @ self._sum
+        spread = state.spread**2 @ self._sum
         turning = self._first.band.turning(state.change)
         factor = np.where(turning[..., None], self._running, self._stopped)
         return np.asarray(factor * np.sqrt(self._floor + spread))

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +32,7 @@ from thermocomp.runtime.clocking import place
 from thermocomp.runtime.gate import explain_implausible, is_number
 from thermocomp.runtime.group import Group
 from thermocomp.runtime.limits import fade, limit_line
-from thermocomp.runtime.lines import DeviationLine, Spoken, constant, evaluate, straight
+from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WatchState, begin
@@ -275,18 +275,16 @@ class Compensator:
         refused = dict.fromkeys(probings, "no model drives its correction")
         arrived = state.away is not None
         for target, line in self.lines.items():
-            models, told = self.models[line.models], stepped.said[line.models]
-            if not all(map(math.isfinite, told)):
+            if not all(map(math.isfinite, stepped.said[line.models])):
                 states_of[target] = Status("restarting", "its zero is being averaged")
                 continue
             if target not in references:
                 references[target] = Reference(reading.time, "start: mean over the first readings")
-            mine = line.models
-            spoken = Spoken(models, stepped.states[mine], stepped.values[mine], told, stepped.half_widths[mine])
             zero, probing = references[target].shift, probings.get(target)
-            answer = evaluate(line, spoken, instant.time, learned.get(target), probing, failed, zero)
+            known = learned.get(target)
+            answer = evaluate(line, self.models, stepped, instant.time, known, probing, failed, zero)
             raw[target], deviations[target] = answer.raw, answer.deviation
-            if failed and (why := _unjudged(models, failed)):
+            if failed and (why := _unjudged(self.models[line.models], failed)):
                 held[target] = why  # no band either: how wrong the model is without these was never judged
                 continue
             if not math.isnan(answer.half_width):
@@ -297,9 +295,12 @@ class Compensator:
                 refused[target] = answer.refused
             corrections[target], states_of[target] = self._drive(state, target, answer.deviation, travel)
             arrived &= states_of[target].word != "restarting"
-        new, idle = self._idle(state._replace(corrections=corrections), tick, held, driven=states_of)
-        new = new._replace(
+        rest = self._idle(state, corrections, tick, held, driven=states_of)
+        new = state._replace(
             models=stepped.states,
+            corrections=rest.corrections,
+            clock=rest.clock,
+            idle=rest.idle,
             gathered=stepped.gathered,
             learned=learned,
             references=references,
@@ -307,11 +308,11 @@ class Compensator:
             away=None if arrived else state.away,
             time=instant.time,
             origin=instant.origin,
-            taken=new.clock,
+            taken=rest.clock,
         )
         told_of = {t: why for t, why in refused.items() if why}
         return new, Compensated(
-            *(new.corrections, "", stepped.outside, failed, states_of | idle, deviations, widths, told_of)
+            *(rest.corrections, "", stepped.outside, failed, states_of | rest.states, deviations, widths, told_of)
         )
 
     def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:
@@ -330,9 +331,10 @@ class Compensator:
         state : CompensatorState
         said : Compensated
         """
-        new, states = self._idle(state, tick, dict.fromkeys(self.lines, why))
+        rest = self._idle(state, state.corrections, tick, dict.fromkeys(self.lines, why))
+        new = state._replace(corrections=rest.corrections, clock=rest.clock, idle=rest.idle)
         failed = Lookout.failed(self._lookouts, state.watches)
-        return new, Compensated(new.corrections, why, (), failed, states, {}, {}, {})
+        return new, Compensated(rest.corrections, why, (), failed, rest.states, {}, {}, {})
 
     def withdraw(self, state: CompensatorState, passed: float) -> CompensatorState:
         """Move all corrections towards zero, within the limits.
@@ -456,13 +458,18 @@ class Compensator:
         return max(0.0, min(tick - state.clock, self.limits.reading_age))
 
     def _idle(
-        self, state: CompensatorState, tick: float, held: dict[str, str], driven: Collection[str] = ()
-    ) -> tuple[CompensatorState, dict[str, Status]]:
+        self,
+        state: CompensatorState,
+        corrections: dict[str, Correction],
+        tick: float,
+        held: dict[str, str],
+        driven: Collection[str] = (),
+    ) -> "_Idle":
         """Let corrections that nothing drives fade once they were held for long; say how they are."""
         # one reading counts for no more than its age may be: a clock that leaps makes nothing fade
         travel = self._travel(state, tick)
         clock = state.clock if not is_number(tick) else tick if state.clock is None else max(state.clock, tick)
-        corrections, states = dict(state.corrections), dict[str, Status]()
+        corrections, states = dict(corrections), dict[str, Status]()
         idle = {t: s for t, s in state.idle.items() if t not in driven}
         for target, why in held.items():
             order = state.orders.get(target)
@@ -477,7 +484,16 @@ class Compensator:
                 continue
             word: Literal["fading", "holding"] = "fading" if idle[target] > self.limits.hold else "holding"
             states[target] = Status(word, f"not driven for {idle[target]:.0f} s: {why}")
-        return state._replace(corrections=corrections, clock=clock, idle=idle), states
+        return _Idle(corrections, clock, idle, states)
+
+
+class _Idle(NamedTuple):
+    """Corrections that nothing drives, after a step; see `CompensatorState`."""
+
+    corrections: dict[str, Correction]  #: of all
+    clock: float | None
+    idle: dict[str, float]
+    states: dict[str, Status]  #: of those that nothing drives
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:

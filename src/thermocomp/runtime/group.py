@@ -34,9 +34,7 @@ class Group:
         paced = [m for m in self.models if isinstance(m, PacedDynamic)]
         self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
         self.ranges = Ranges(self.lead.inputs)
-        joints = [m.joint for m in self.models]
-        #: those whose joint support is no other's: of them alone it is asked how far a reading is
-        self._apart = [m for k, m in enumerate(self.models) if m.joint is not None and m.joint not in joints[:k]]
+        self._apart = list(dict.fromkeys(m.joint for m in self.models if m.joint is not None))
 
     @staticmethod
     def of(models: Sequence[ErrorModel]) -> tuple["Group", ...]:
@@ -85,9 +83,10 @@ class Group:
 
     def beyond(self, states: Sequence[State], values: FloatArray) -> list[str]:
         """Return the inputs that are outside the trained range of a model."""
-        if states[0].outside.any():
+        if np.count_nonzero(states[0].outside):
             return [name for name, out in zip(self.names, states[0].outside.tolist(), strict=True) if out]
-        near = all(m.distance(states[0], values) <= 1.0 for m in self._apart)
+        change = values - states[0].reference
+        near = all(joint.distance(change) <= 1.0 for joint in self._apart)
         return [] if near else [TOGETHER]
 
 

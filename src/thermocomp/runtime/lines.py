@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from thermocomp.core.correction import Deviation
-from thermocomp.core.model import ErrorModel, FloatArray, State
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.runtime import adaptation
 from thermocomp.runtime.adaptation import Adaptation, Probing
+from thermocomp.runtime.advance import Advanced
 from thermocomp.volumetric.straight import best_line
 
 
@@ -21,16 +22,6 @@ class DeviationLine(NamedTuple):
     models: slice  #: which they are, of the compensator's models
     travel: tuple[float, float]  #: where the axis goes [mm]: the limits hold from end to end
     deviation: Callable[[Sequence[float]], Deviation]  #: of what these models say
-
-
-class Spoken(NamedTuple):
-    """What the models of a line say of a reading."""
-
-    models: Sequence[ErrorModel]
-    states: Sequence[State]  #: after the step that took the reading in
-    readings: Sequence[FloatArray]  #: (n_inputs,) each
-    said: Sequence[float]
-    half_widths: Sequence[float]  #: of the bands about that; nan without one
 
 
 class Said(NamedTuple):
@@ -63,7 +54,8 @@ def straight(source: PositionModel) -> Callable[[Sequence[float]], Deviation]:
 
 def evaluate(
     line: DeviationLine,
-    spoken: Spoken,
+    models: Sequence[ErrorModel],
+    spoken: Advanced,
     time: float,
     learned: Adaptation | None,
     probing: Probing | None,
@@ -75,8 +67,10 @@ def evaluate(
     Parameters
     ----------
     line : DeviationLine
-    spoken : Spoken
-        By its models.
+    models : sequence of ErrorModel
+        Of the compensator.
+    spoken : Advanced
+        What they say.
     time : float
         Of the reading [s].
     learned : Adaptation or None
@@ -92,15 +86,15 @@ def evaluate(
     -------
     Said
     """
-    models, states, readings, said, half_widths = spoken
-    raw, refused, single = line.deviation(said), "", len(models) == 1
+    first, end = line.models.start, line.models.stop
+    raw, refused, single = line.deviation(spoken.said[first:end]), "", end == first + 1
     deviation = raw.less(zero) if zero.offset or zero.slope else raw
-    width, band = math.nan, models[0].band if single else None
+    width, band = math.nan, models[first].band if single else None
     if band is not None:
-        width = half_widths[0] * (models[0].widening(failed) if failed else 1.0)
+        width = spoken.half_widths[first] * (models[first].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
         return Said(deviation, width, None, "", raw)
-    directions = models[0].directions(states[0], readings[0]) if single else np.zeros(0)
+    directions = models[first].directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
         wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions)))
@@ -108,7 +102,7 @@ def evaluate(
             width *= float(learned.narrowing(time, directions, band.floor))
     if probing is not None:
         error = probing.deviation - deviation.at(probing.position)
-        before = learned or adaptation.begin(_size(line, models), len(directions))
+        before = learned or adaptation.begin(_size(line, models[line.models]), len(directions))
         learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
     return Said(wanted, width, learned, refused, raw)
 

@@ -52,7 +52,7 @@ class Lookout:
         return {
             name: WORDS[fault]
             for lookout, state in zip(lookouts, states, strict=True)
-            if state.fault.any()
+            if np.count_nonzero(state.fault)
             for name, fault in zip(lookout.watch.names, state.fault.tolist(), strict=True)
             if fault
         }

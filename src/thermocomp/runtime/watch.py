@@ -92,7 +92,8 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
 
 def is_quiet(state: WatchState, time: float) -> bool:
     """Return whether all sensors are good and the next look is not due: a plausible reading is believed as it is."""
-    return time - state.time < TICK and not state.fault.any() and bool(np.isnan(state.jumped).all())
+    due = not time - state.time < TICK  # nor is it known
+    return not (due or np.count_nonzero(state.fault) or np.count_nonzero(state.jumped == state.jumped))
 
 
 def look(
@@ -122,18 +123,19 @@ def look(
     heat = watch.bank.temperatures
     believed = values.copy()
     fastest = PLAUSIBLE["spindle_speed"][1]  # what no spindle has must not get into a memory
-    if not (np.abs(values[..., watch.speeds]) <= fastest).all():
+    if not (np.abs(values.take(watch.speeds, axis=-1)) <= fastest).all():
         return state, believed
     if np.isnan(state.time):
         believed[..., heat] = _made_up(watch, values[..., heat])
         return _start(watch, state, time, believed, resting), believed
-    zero = state.reference[..., heat]
-    x = values[..., heat] - zero
-    missing = ~_plausible(watch, x, values[..., heat])
+    zero = state.reference.take(heat, axis=-1)
+    read = values.take(heat, axis=-1)
+    x = read - zero
+    missing = ~_plausible(watch, x, read)
     if time - state.time >= TICK:
         state = _step(watch, state, time, np.where(missing, np.nan, x), values)
     if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
-        believed[..., heat] = np.where(replaced, zero + state.used, values[..., heat])
+        believed[..., heat] = np.where(replaced, zero + state.used, read)
     return state, believed
 
 
