@@ -27,6 +27,7 @@ from thermocomp.recording.samples import Samples
 from thermocomp.recording.stacking import stack
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.orders import order, rezero
 from thermocomp.runtime.state import CompensatorState, Status
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -73,9 +74,9 @@ def plain(value: Any) -> Any:
 @pytest.mark.parametrize("rows", [0, 1, 2, 5, 90, 101, 200])
 def test_it_comes_back_bit_by_bit(machine: Compensator, samples: Samples, rows: int, tmp_path: Path) -> None:
     state = run(machine, samples, rows)
-    state = machine.order(state, "x1_um", Status("holding", "by M. Weber"))
+    state = order(machine, state, "x1_um", Status("holding", "by M. Weber"))
     if rows > 5:
-        state = machine.rezero(state, "x1_um", 5.0, "homing")
+        state = rezero(machine, state, "x1_um", 5.0, "homing")
     statefile.write(state, machine, tmp_path / "state.json", NOW)
     saved = statefile.read(tmp_path / "state.json", machine)
     assert saved.written == NOW

@@ -16,6 +16,7 @@ from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.reading import Reading
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.orders import order, rezero
 from thermocomp.runtime.state import FORGOTTEN, CompensatorState, Status, resume
 
 HOUR = 3600.0
@@ -110,12 +111,12 @@ def test_the_ledger_says_from_when_it_counts() -> None:
 
 def test_a_new_zero_moves_nothing_and_counts_from_there() -> None:
     state, before, _ = run(MACHINE.start(), 0.0, HOUR)
-    homed = MACHINE.rezero(state, "z", HOUR, "homing")
+    homed = rezero(MACHINE, state, "z", HOUR, "homing")
     _, after, _ = run(homed, HOUR, 3 * HOUR)
     _, plain, _ = run(state, HOUR, 3 * HOUR)
     assert abs(after[0] - before[-1]) < 0.1
     assert after[-1] - before[-1] == pytest.approx(plain[-1] - before[-1], abs=1e-6)
-    cleared = MACHINE.rezero(state, "z", HOUR, "homing", in_force=Correction(0.0))
+    cleared = rezero(MACHINE, state, "z", HOUR, "homing", in_force=Correction(0.0))
     _, zero, _ = run(cleared, HOUR, 3 * HOUR)
     assert abs(zero[0]) < 0.1
     assert zero[-1] == pytest.approx(plain[-1] - before[-1], abs=0.1)
@@ -124,9 +125,9 @@ def test_a_new_zero_moves_nothing_and_counts_from_there() -> None:
 
 def test_a_new_zero_wants_one_before() -> None:
     with pytest.raises(InputError, match="still being averaged"):
-        MACHINE.rezero(MACHINE.start(), "z", 0.0, "homing")
+        rezero(MACHINE, MACHINE.start(), "z", 0.0, "homing")
     with pytest.raises(InputError, match="want one of z"):
-        MACHINE.rezero(MACHINE.start(), "y", 0.0, "homing")
+        rezero(MACHINE, MACHINE.start(), "y", 0.0, "homing")
 
 
 def test_probings_are_forgotten_with_the_zero_they_counted_from() -> None:
@@ -134,7 +135,7 @@ def test_probings_are_forgotten_with_the_zero_they_counted_from() -> None:
     deviation = state.raw["z"].offset + 1.0
     state, said = MACHINE.step(state, reading(HOUR), HOUR, {"z": Probing(deviation)}, tick=HOUR)
     assert not said.refused
-    assert MACHINE.rezero(state, "z", HOUR, "homing").learned == {}
+    assert rezero(MACHINE, state, "z", HOUR, "homing").learned == {}
 
 
 def test_targets_run_or_stay_out_one_by_one() -> None:
@@ -149,7 +150,7 @@ def test_targets_run_or_stay_out_one_by_one() -> None:
     assert said.states["y"].word == "shadow"
     assert "worse than none" in said.states["y"].reason
     with pytest.raises(InputError, match="shadow only"):
-        machine.order(state, "y", None)
+        order(machine, state, "y", None)
     with pytest.raises(InputError, match="refused"):
         Compensator.of([replace(MODEL, honest_error=refused)])
     assert Compensator.of([replace(MODEL, honest_error=refused)], watching=True).shadow
@@ -157,21 +158,21 @@ def test_targets_run_or_stay_out_one_by_one() -> None:
 
 def test_what_somebody_orders() -> None:
     state, before, _ = run(MACHINE.start(), 0.0, HOUR)
-    held, after, words = run(MACHINE.order(state, "z", Status("holding", "by M. Weber")), HOUR, 3 * HOUR)
+    held, after, words = run(order(MACHINE, state, "z", Status("holding", "by M. Weber")), HOUR, 3 * HOUR)
     assert set(after) == {before[-1]}  # longer than `Limits.hold`: it was ordered
     assert set(words) == {"holding"}
-    _, after, _ = run(MACHINE.order(held, "z", None), 3 * HOUR, 4 * HOUR)
+    _, after, _ = run(order(MACHINE, held, "z", None), 3 * HOUR, 4 * HOUR)
     assert max(np.abs(np.diff([before[-1], *after]))) <= LIMITS.rate * 10.0 + 1e-12
-    _, after, words = run(MACHINE.order(state, "z", Status("shadow", "trial")), HOUR, 3 * HOUR)
+    _, after, words = run(order(MACHINE, state, "z", Status("shadow", "trial")), HOUR, 3 * HOUR)
     assert after[-1] == 0.0
     assert max(np.abs(np.diff([before[-1], *after]))) <= LIMITS.rate * 10.0 + 1e-12
-    off, after, words = run(MACHINE.order(state, "z", Status("suspended", "not homed")), HOUR, 2 * HOUR)
+    off, after, words = run(order(MACHINE, state, "z", Status("suspended", "not homed")), HOUR, 2 * HOUR)
     assert set(after) == {0.0}
-    _, after, _ = run(MACHINE.order(off, "z", None), 2 * HOUR, 4 * HOUR)
+    _, after, _ = run(order(MACHINE, off, "z", None), 2 * HOUR, 4 * HOUR)
     assert abs(after[0]) <= LIMITS.rate * 10.0 + 1e-12
     for wrong in (Status("active"), Status("fading")):
         with pytest.raises(InputError, match="nobody can order"):
-            MACHINE.order(state, "z", wrong)
+            order(MACHINE, state, "z", wrong)
 
 
 def test_no_reading_at_all_holds_and_then_fades() -> None:

@@ -17,6 +17,7 @@ from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
 from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.orders import order, rezero, withdraw
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
@@ -150,19 +151,19 @@ class Service:
         self._chart(said, probings, learned)
 
     def order(self, target: str, status: Status | None) -> None:
-        """Take a target out, or let it run again; see `Compensator.order`."""
-        self.state = self.compensator.order(self.state, target, status)
+        """Take a target out, or let it run again; see `thermocomp.runtime.orders.order`."""
+        self.state = order(self.compensator, self.state, target, status)
         word = f"{status.word}: {status.reason}" if status else "runs again"
         self._say("state", f"{target} {word}, as ordered")
         self._dirty = True
 
     def watch_only(self, target: str) -> None:
         """Let a target run in shadow from the start, as configured."""
-        self.state = self.compensator.order(self.state, target, Status("shadow", CONFIGURED))
+        self.state = order(self.compensator, self.state, target, Status("shadow", CONFIGURED))
 
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
-        """Let a target count anew from now; see `Compensator.rezero`."""
-        self.state = self.compensator.rezero(self.state, target, self.clock.now(), why, in_force)
+        """Let a target count anew from now; see `thermocomp.runtime.orders.rezero`."""
+        self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
         self._say("reference", f"{target} counts anew: {why}")
         self._dirty = True
 
@@ -213,7 +214,7 @@ class Service:
         while any(c.offset or c.slope for c in self.state.corrections.values()):
             await asyncio.sleep(0.1)
             tick = self.clock.tick()
-            self.state = self.compensator.withdraw(self.state, tick - last)
+            self.state = withdraw(self.compensator, self.state, tick - last)
             last = tick
             for outlet in self.outlets:
                 outlet.put(self.state.corrections)

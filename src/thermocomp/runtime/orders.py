@@ -1,0 +1,110 @@
+"""What somebody, or the controller, has a compensator do: take a target out, count anew, let all corrections go."""
+
+from dataclasses import replace
+
+from thermocomp.core.correction import Correction, Deviation
+from thermocomp.core.exceptions import InputError
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.limits import limit_line
+from thermocomp.runtime.state import CompensatorState, Reference, Status
+
+
+def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -> CompensatorState:
+    """Move all corrections towards zero, within the limits.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    state : CompensatorState
+    passed : float
+        Time since the step before [s]; an outage is no saved travel.
+    """
+    free, passed = replace(compensator.limits, dead_band=0.0), min(passed, compensator.limits.reading_age)
+    found = {
+        target: limit_line(Correction(0.0), c, compensator.lines[target].travel, passed, free)
+        for target, c in state.corrections.items()
+    }
+    return state._replace(corrections=found)
+
+
+def order(compensator: Compensator, state: CompensatorState, target: str, status: Status | None) -> CompensatorState:
+    """Take a target or axis out, or let it run again.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    state : CompensatorState
+    target : str
+    status : Status or None
+        ``holding``: it stays where it is until somebody says otherwise; ``shadow``: it is predicted, and its
+        correction goes to zero within the limits; ``suspended``: the controller has none in force, and it begins
+        at zero again. None: it runs.
+
+    Returns
+    -------
+    CompensatorState
+
+    Raises
+    ------
+    InputError
+        There is no such target, a word is none of these, or its models may not run.
+    """
+    if target not in compensator.lines:
+        raise InputError(f"{target}: want one of {', '.join(compensator.lines)}")
+    if status is not None and status.word not in ("holding", "shadow", "suspended"):
+        raise InputError(f"{target}: nobody can order {status.word}: want holding, shadow or suspended")
+    if target in compensator.shadow and (status is None or status.word != "suspended"):
+        raise InputError(f"{target} runs in shadow only: {compensator.shadow[target].reason}")
+    orders = {t: s for t, s in state.orders.items() if t != target} | ({} if status is None else {target: status})
+    corrections = dict(state.corrections)
+    if status is not None and status.word == "suspended":
+        corrections[target] = Correction(0.0)
+    if status is None and target in compensator.shadow:
+        orders[target] = compensator.shadow[target]
+    return state._replace(orders=orders, corrections=corrections)
+
+
+def rezero(
+    compensator: Compensator,
+    state: CompensatorState,
+    target: str,
+    time: float,
+    why: str,
+    in_force: Correction | None = None,
+) -> CompensatorState:
+    """Let a target or axis count anew from where it is: its correction stays, and moves on from there.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    state : CompensatorState
+    target : str
+    time : float
+        On the stamps of the readings [s].
+    why : str
+        For the ledger, such as ``homing`` or ``work offset, by M. Weber``.
+    in_force : Correction, optional
+        What the controller says is in force now; the last one without it.
+
+    Returns
+    -------
+    CompensatorState
+        What was learned from probings is gone: it counted from the zero before.
+
+    Raises
+    ------
+    InputError
+        There is no such target, or its zero is still being averaged.
+    """
+    if target not in compensator.lines:
+        raise InputError(f"{target}: want one of {', '.join(compensator.lines)}")
+    if target not in state.references:
+        raise InputError(f"{target}: its zero is still being averaged; wait until that is known")
+    now, correction = state.raw[target], in_force or state.corrections[target]
+    at = now.reference_position
+    shift = Deviation(now.offset + correction.at(at), now.slope + correction.slope, at)
+    return state._replace(
+        references=state.references | {target: Reference(time, why, shift)},
+        corrections=state.corrections | {target: correction},
+        learned={t: a for t, a in state.learned.items() if t != target},
+    )
