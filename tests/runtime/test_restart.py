@@ -17,7 +17,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero
-from thermocomp.runtime.state import FORGOTTEN, CompensatorState, Status, resume
+from thermocomp.runtime.state import FORGOTTEN, CompensatorState, Status, resume, silence
 
 HOUR = 3600.0
 LIMITS = Limits(rate=0.05)
@@ -236,3 +236,28 @@ def test_deviations_are_taken_off_each_other_on_one_axis() -> None:
     one, other = Deviation(10.0, 20.0, 100.0), Deviation(4.0, -10.0, 300.0)
     for position in (0.0, 100.0, 700.0):
         assert one.less(other).at(position) == pytest.approx(one.at(position) - other.at(position))
+
+
+def test_the_wait_for_the_first_reading_is_part_of_the_outage() -> None:
+    state, _, _ = run(MACHINE.start(), 0.0, HOUR)
+    last = state.time
+    assert last is not None
+    again = resume(state, MACHINE.start(), 10.0, tick=5.0)
+    assert silence(again, 5.0) == 10.0
+    waited = silence(again, 25.0)  # and then it is restarted once more, without a reading
+    again = resume(again, MACHINE.start(), waited, tick=1000.0)
+    after, said = MACHINE.step(again, reading(HOUR + 60.0), HOUR + 60.0, tick=1030.0)
+    assert not said.rejected
+    assert after.time == pytest.approx(last + 60.0)
+    assert silence(after, 1031.0) == 1.0
+
+
+def test_many_restarts_do_not_slow_the_clock_of_the_models() -> None:
+    state, _, _ = run(MACHINE.start(), 0.0, 600.0)
+    _, offsets, _ = run(state, 600.0, 600.0 + HOUR)
+    for begin in np.arange(600.0, 600.0 + HOUR, 60.0).tolist():
+        state, found, _ = run(state, begin, begin + 40.0)
+        clock = begin + 30.0
+        state = resume(state, MACHINE.start(), silence(state, clock + 5.0), tick=clock + 5.0)
+    assert state.time == pytest.approx(HOUR + 570.0)
+    assert found[-1] == pytest.approx(offsets[-3], abs=0.1)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Reading
 from thermocomp.runtime.gate import CLOCK_SKEW, explain_untimely
-from thermocomp.runtime.state import CompensatorState
+from thermocomp.runtime.state import CompensatorState, silence
 
 
 class Instant(NamedTuple):
@@ -43,9 +43,9 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
         return Instant(math.nan, state.origin), why
     if state.time is None:
         return Instant(reading.time, 0.0), ""
-    passed = 0.0 if state.taken is None else max(tick - state.taken, 0.0)
-    if math.isnan(state.origin):  # after a restart: what was saved is `away` old
-        return _set(state, reading, state.away or 0.0), ""
+    passed = silence(state, tick)
+    if math.isnan(state.origin):  # after a restart
+        return _set(state, reading, passed), ""
     time, last = reading.time - state.origin, state.time + state.origin
     back = time <= state.time
     if back and (last <= now + CLOCK_SKEW or passed <= 0.0):

@@ -42,7 +42,7 @@ class CompensatorState(NamedTuple):
     corrections: dict[str, Correction]  #: in force, by target or axis
     time: float | None  #: of the last reading that passed the gate [s]
     clock: float | None  #: the latest at which a step was taken, on the monotone clock of the process [s]
-    taken: float | None  #: on the same clock, when the last reading passed the gate [s]
+    taken: float | None  #: on the same clock, when the last reading passed the gate, or `away` after that [s]
     origin: float  #: what the clock of the readings was set by meanwhile [s]; nan: unknown, after a restart
     gathered: tuple[Gathered, ...]  #: readings that the zero is averaged of, one per model; empty once it is known
     watches: tuple[WatchState, ...]  #: over the temperatures
@@ -72,8 +72,25 @@ class Compensated(NamedTuple):
         return {t: s.reason for t, s in self.states.items() if s.word in ("holding", "fading")}
 
 
+def silence(state: CompensatorState, tick: float) -> float:
+    """Return how long ago the last reading passed the gate, restarts included; 0 before the first [s].
+
+    Parameters
+    ----------
+    state : CompensatorState
+    tick : float
+        The monotone clock of the process, now [s].
+    """
+    passed = 0.0 if state.taken is None else max(tick - state.taken, 0.0)
+    return passed + (state.away or 0.0) if math.isnan(state.origin) else passed
+
+
 def resume(
-    state: CompensatorState, cold: CompensatorState, age: float, in_force: Mapping[str, Correction] | None = None
+    state: CompensatorState,
+    cold: CompensatorState,
+    age: float,
+    in_force: Mapping[str, Correction] | None = None,
+    tick: float | None = None,
 ) -> CompensatorState:
     """Return the state to go on with after a restart.
 
@@ -88,9 +105,11 @@ def resume(
     cold : CompensatorState
         Of a compensator that starts.
     age : float
-        Since it was saved [s].
+        Since the last reading in it [s].
     in_force : mapping of str to Correction, optional
         What the controller says is in force; what was saved without it.
+    tick : float, optional
+        The monotone clock of the process, now: what goes by until the first reading is part of the outage, too [s].
 
     Returns
     -------
@@ -99,4 +118,4 @@ def resume(
     corrections = {t: (in_force or state.corrections).get(t, c) for t, c in cold.corrections.items()}
     if not 0.0 <= age <= FORGOTTEN:
         return cold._replace(corrections=corrections, orders=state.orders, away=age if age >= 0 else math.nan)
-    return state._replace(corrections=corrections, clock=None, taken=None, origin=math.nan, away=age)
+    return state._replace(corrections=corrections, clock=None, taken=tick, origin=math.nan, away=age)

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from thermocomp.core.correction import Correction, uncompensated
@@ -18,7 +18,7 @@ from thermocomp.files import statefile
 from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero, withdraw
-from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
+from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume, silence
 from thermocomp.service.clock import Clock
 from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
 from thermocomp.service.probe import KEPT, Checked, check
@@ -239,7 +239,7 @@ class Service:
             self._refused = self.state_path
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self.clock.speed
-        state = resume(saved.state, cold, age)
+        state = resume(saved.state, cold, age, tick=self.clock.tick())
         # what the controller or the configuration ordered is theirs to say again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)
@@ -379,7 +379,8 @@ class Service:
             self.not_saved = "no file is configured for it"
             return
         try:
-            statefile.write(self.state, self.compensator, self.state_path, datetime.now(UTC))
+            old = timedelta(seconds=silence(self.state, self.clock.tick()) / self.clock.speed)
+            statefile.write(self.state, self.compensator, self.state_path, datetime.now(UTC) - old)
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
             self.not_saved = str(e)
