@@ -1,0 +1,81 @@
+"""The C code of a model says what the model says: compiled by a real compiler, for every family."""
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from families import FAMILIES, READINGS
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
+from thermocomp.exporters.c99 import Sources, translate
+
+FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-fsanitize=undefined", "-fno-sanitize-recover"]
+COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+
+class Compiled:
+    """A model's C code that runs in this process."""
+
+    def __init__(self, sources: Sources, n_inputs: int, folder: Path, compiler: str, *, single: bool = False) -> None:
+        (folder / f"{sources.name}.h").write_text(sources.header, encoding="ascii")
+        code, library = folder / f"{sources.name}.c", folder / "model.so"
+        code.write_text(sources.source, encoding="ascii")
+        flags = [*FLAGS, *(["-DTC_FLOAT"] if single else [])]
+        subprocess.run([compiler, *flags, "-shared", "-fPIC", str(code), "-o", str(library), "-lm"], check=True)
+        kind: Any = ctypes.c_float if single else ctypes.c_double
+        found = ctypes.CDLL(str(library))
+        self._start, self._step = (getattr(found, f"{sources.name}_{verb}") for verb in ("start", "step"))
+        self._step.restype, self._kind = kind, kind
+        self._step.argtypes = [ctypes.c_void_p, kind * n_inputs, kind]
+        self._inputs, self._state = kind * n_inputs, ctypes.create_string_buffer(100_000)
+
+    def start(self, zero: list[float]) -> None:
+        self._start(self._state, self._inputs(*zero))
+
+    def step(self, values: list[float], dt: float) -> float:
+        return float(self._step(self._state, self._inputs(*values), dt))
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("family", FAMILIES)
+@settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(data=st.data(), rows=READINGS)
+def test_the_code_is_the_model(family: str, compiler: str, data: st.DataObject, rows: list[tuple[float, ...]]) -> None:
+    model: ErrorModel = data.draw(FAMILIES[family])
+    with tempfile.TemporaryDirectory() as folder:
+        code = Compiled(translate(model), 3, Path(folder), compiler)
+        for repeat in (1, 40):  # a second run begins anew; long ones settle
+            code.start([rows[0][0], 20.0, 0.0])
+            state = model.init()
+            for *values, dt in rows:
+                state, expected = model.step(state, np.array(values), dt * repeat)
+                assert code.step(values, dt * repeat) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+
+
+def test_a_name_that_would_end_a_comment_does_not(tmp_path: Path) -> None:
+    inputs = (Input("a*/ #error /*b", "temperature", "degC", 20.0, True, -3.0, 15.0),)
+    model = Polynomial(
+        target="z 1*/",
+        unit="um",
+        inputs=inputs,
+        variables=(Variable.single(inputs[0].name, 0),),
+        terms=((0,),),
+        coefficients=(2.0,),
+    )
+    sources = translate(model)
+    assert sources.name == "tc_z_1"
+    code = Compiled(sources, 1, tmp_path, COMPILERS[0])
+    code.start([20.0])
+    assert code.step([23.0], 0.0) == 6.0
