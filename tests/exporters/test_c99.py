@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from families import FAMILIES, READINGS
+from families import CURVES, FAMILIES, HEAD, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
@@ -79,3 +80,31 @@ def test_a_name_that_would_end_a_comment_does_not(tmp_path: Path) -> None:
     code = Compiled(sources, 1, tmp_path, COMPILERS[0])
     code.start([20.0])
     assert code.step([23.0], 0.0) == 6.0
+
+
+@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(curve=CURVES, at=st.lists(st.floats(-12, 12), min_size=1, max_size=5))
+def test_a_table_is_its_curve(curve: Curve, at: list[float]) -> None:
+    model = Additive(**HEAD, variables=(SINGLES[1],), curves=(curve,))
+    with tempfile.TemporaryDirectory() as folder:
+        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0])
+        code.start([20.0, 0.0, 0.0])
+        for value in (*at, *curve.x):  # at the breaks, too
+            _, expected = model.step(model.init((20.0, 0.0, 0.0)), np.array([20.0, value, 0.0]), 0.0)
+            assert code.step([20.0, value, 0.0], 0.0) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@settings(max_examples=6, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(data=st.data(), rows=READINGS)
+def test_in_single_precision_it_says_nearly_the_same(
+    family: str, data: st.DataObject, rows: list[tuple[float, ...]]
+) -> None:
+    model: ErrorModel = data.draw(FAMILIES[family])
+    with tempfile.TemporaryDirectory() as folder:
+        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0], single=True)
+        code.start([rows[0][0], 20.0, 0.0])
+        state = model.init()
+        for *values, dt in rows:
+            state, expected = model.step(state, np.array(values), dt)
+            assert code.step(values, dt) == pytest.approx(float(expected), rel=1e-3, abs=0.05)

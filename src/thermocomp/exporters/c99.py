@@ -48,9 +48,9 @@ _SOURCE = """#include "{name}.h"
 
 #define TC(x) ((tc_real)(x))
 #ifdef TC_FLOAT
-#define TC_MATH(f) f##f
+#define TC_MATH(name) name##f
 #else
-#define TC_MATH(f) f
+#define TC_MATH(name) name
 #endif
 {helpers}{tables}{clocks}
 void {name}_start({name}_state *s, const tc_real zero[{n}])
