@@ -4,17 +4,19 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
-from families import CURVES, FAMILIES, HEAD, READINGS, SINGLES
+from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.additive import Additive, Curve
-from thermocomp.core.inputs import Input
+from thermocomp.core.inputs import Input, Support
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
@@ -108,3 +110,42 @@ def test_in_single_precision_it_says_nearly_the_same(
         for *values, dt in rows:
             state, expected = model.step(state, np.array(values), dt)
             assert code.step(values, dt) == pytest.approx(float(expected), rel=1e-3, abs=0.05)
+
+
+JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
+
+
+@pytest.mark.parametrize("joint", [None, JOINT, replace(JOINT, columns=(), scale=(), points=())])
+@pytest.mark.parametrize("policy", ["hold", "fade"])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(model=st.one_of(*FAMILIES.values()), over=st.sampled_from([0.1, 0.5, 2.0]), rows=READINGS)
+def test_beyond_the_trained_range(
+    policy: Literal["hold", "fade"], joint: JointSupport | None, model: ErrorModel, over: float, rows: list[Any]
+) -> None:
+    model = replace(model, support=Support(policy, fade_over=over), joint=joint)
+    with tempfile.TemporaryDirectory() as folder:
+        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0])
+        code.start([rows[0][0], 20.0, 0.0])
+        state = model.init()
+        for *values, dt in rows:
+            state, expected = model.step(state, np.array(values), dt)
+            assert code.step(values, dt) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+
+
+def test_an_input_that_did_not_move_in_training_is_inside_where_it_was() -> None:
+    still = replace(INPUTS[0], low=0.0, high=0.0)
+    model = Polynomial(
+        target="z_um",
+        unit="um",
+        inputs=(still,),
+        variables=(SINGLES[0],),
+        terms=(),
+        coefficients=(),
+        intercept=3.0,
+        support=Support("fade"),
+    )
+    for single in (False, True):
+        with tempfile.TemporaryDirectory() as folder:
+            code = Compiled(translate(model), 1, Path(folder), COMPILERS[0], single=single)
+            code.start([20.0])
+            assert [code.step([20.0], 0.0), code.step([20.5], 1.0)] == [3.0, 0.0]

@@ -440,6 +440,12 @@ class ErrorModel(ABC):
         span = np.array([i.high - i.low for i in self.inputs]) * self.support.fade_over
         return np.where(span > 0, span, np.finfo(np.float64).tiny)
 
+    @property
+    def bounds(self) -> tuple[list[float], list[float], list[float]]:
+        """Least and greatest change of each input with its margin, and over how much a deviation fades beyond it."""
+        low, high = self._bounds
+        return low.tolist(), high.tolist(), self._fade_span.tolist()
+
     def expression(self) -> Node:
         """Return what the model computes as a tree: what `step` gives with the support policy ``clip``."""
         bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)

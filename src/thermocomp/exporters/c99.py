@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.exporters.cexpression import Clock, Written, number
+from thermocomp.exporters.csupport import write_support
 
 _HEADER = """/* {title} */
 #ifndef {guard}
@@ -52,7 +53,7 @@ _SOURCE = """#include "{name}.h"
 #else
 #define TC_MATH(name) name
 #endif
-{helpers}{tables}{clocks}
+{helpers}{tables}{clocks}{support}
 void {name}_start({name}_state *s, const tc_real zero[{n}])
 {{
     static const {name}_state cold = {{0}};
@@ -67,10 +68,11 @@ void {name}_start({name}_state *s, const tc_real zero[{n}])
 tc_real {name}_step({name}_state *s, const tc_real in[{n}], tc_real dt)
 {{
 {body}
+{said}
     s->begun = 1;
     (void)in;
     (void)dt;
-    return {said};
+    return said;
 }}
 """
 
@@ -197,7 +199,7 @@ class Sources:
 def translate(model: ErrorModel) -> Sources:
     """Return a model in C99.
 
-    What it computes is `ErrorModel.expression`: what `ErrorModel.step` gives with the support policy ``clip``.
+    What it computes is what `ErrorModel.step` gives: `ErrorModel.expression`, and what the support policy lets pass.
 
     Parameters
     ----------
@@ -208,8 +210,8 @@ def translate(model: ErrorModel) -> Sources:
     InputError
         It is of a family that has no formula.
     """
-    written = Written()
-    said = written.value(model.expression())
+    written, support = Written(), write_support(model)
+    result = written.value(model.expression())
     name, n = identifier(model.target), len(model.inputs)
     body = "\n".join(f"    {line}" for line in written.lines)
     parts = {"name": name, "n": n}
@@ -230,8 +232,9 @@ def translate(model: ErrorModel) -> Sources:
             )
             for clock in written.clocks
         ),
+        support=support.functions,
         body=body,
-        said=said,
+        said="\n".join([f"    tc_real said = {result};", support.statements]).rstrip(),
     )
     memory = [f"    tc_real lag[{written.lags}];\n"] if written.lags else []
     memory += [f"    {name}_clock{c.index} clock{c.index};\n" for c in written.clocks]
@@ -242,7 +245,7 @@ def translate(model: ErrorModel) -> Sources:
         upper=name.upper(),
         inputs=_comment(", ".join(f"{i.name} [{i.unit}]" for i in model.inputs)),
         clocks="".join(_CLOCK_TYPE.format(**_sizes(clock, name)) for clock in written.clocks),
-        memory="".join(memory),
+        memory="".join(memory) + support.memory,
         unit=_comment(model.unit),
     )
     return Sources(name, header, source)
