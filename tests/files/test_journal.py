@@ -302,7 +302,8 @@ def check_kills(folder: Path, n: int) -> None:
             again = opened(folder, JournalLimits(size_bytes=2**16, files=1000))
             assert again.status().reason == ""
             again.close()
-    assert n / 3 < began < n
+    assert n / 3 < began
+    assert began < n or n < 100  # of few, all may have begun on a machine that is busy
     found = read(folder)
     texts = [r.text for r in found if isinstance(r, AlarmRow)]
     assert {alarm(k).text for k in confirmed} <= set(texts)
