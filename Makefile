@@ -20,7 +20,7 @@ demo: $(VENV)/.study
 	$(BIN)/thermocomp demo --output demo --overwrite
 
 test: $(VENV)/.dev
-	scripts/system_packages.sh chromium linuxcnc-uspace mosquitto
+	scripts/system_packages.sh chromium gcc libc6-dev linuxcnc-uspace mosquitto
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev

@@ -1,6 +1,11 @@
 """A configuration: all that is wrong with it at once, in words that help."""
 
+import random
+import tomllib
+from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -127,6 +132,50 @@ def test_a_key_of_a_wrong_type_hides_nothing(tmp_path: Path) -> None:
     )
     for line, start in zip(found, sorted(said), strict=True):
         assert line.startswith(start)
+
+
+def test_a_key_that_is_called_as_a_kind_is_a_key(tmp_path: Path) -> None:
+    text = GOOD.replace('names = {motor = "t_motor_C"}', "names = {motor = 1}\nmqtt = -1")
+    with pytest.raises(InputError) as caught:
+        read_config(written(tmp_path, text))
+    found = [line.strip() for line in str(caught.value).splitlines()[1:]]
+    assert found == [
+        "sources.1.names.motor: Input should be a valid string, found 1",
+        "sources.1.mqtt is no key that is known",
+    ]
+
+
+def spots(content: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    if path:
+        yield path
+    inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for k, value in inner:
+        yield from spots(value, (*path, k))
+
+
+def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = random.Random(1)
+    values = [0, -1, 1.5, "x", "", True, [], [1], ["a", {"b": 1}], {}, {"kind": "mqtt"}, {"file": {"b": []}}, [[1]]]
+    refused = 0
+    for _ in range(2000):
+        content = tomllib.loads(GOOD)
+        content["sinks"] += [{"kind": "linuxcnc", "socket": "s", "axes": {"z_um": "Z"}}]
+        for _ in range(rng.randint(1, 5)):
+            *way, last = rng.choice(list(spots(content)))
+            table: Any = content
+            for k in way:
+                table = table[k]
+            if isinstance(table, dict) and rng.random() < 0.3:
+                last = rng.choice(["mqtt", "file", "kind", "other"])
+            table[last] = deepcopy(rng.choice(values))
+        monkeypatch.setattr("thermocomp.service.config.read_toml", lambda *_, content=content: content)
+        try:
+            read_config("serve.toml")
+        except InputError as e:
+            first, *rest = str(e).splitlines()
+            assert first == f"serve.toml: {len(rest)} to mend:"
+            refused += 1
+    assert refused > 1500
 
 
 def test_all_that_does_not_fit_together_is_said_at_once(tmp_path: Path) -> None:

@@ -11,10 +11,13 @@ _HEADER = """/* {title} */
 #ifndef {guard}
 #define {guard}
 
+#ifndef TC_REAL
+#define TC_REAL
 #ifdef TC_FLOAT
 typedef float tc_real;
 #else
 typedef double tc_real;
+#endif
 #endif
 
 /* inputs: {inputs} */

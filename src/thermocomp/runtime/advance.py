@@ -53,7 +53,7 @@ def advance(
     for group in groups:
         first, known = group.members[0], True
         mine = [states[k] for k in group.members]
-        values = np.array([reading.values[name] for name in group.names], dtype=np.float64)
+        values = np.array(group.ranges.pick(reading.values), dtype=np.float64)
         if mine[0].memory is None and np.isnan(mine[0].reference).any():
             resting = group.lead.zeroing.stands(reading.values.get(group.lead.zeroing.speed))
             mine, begun, known, values = _zeroed(group, mine, begins[first], (time, values, resting))

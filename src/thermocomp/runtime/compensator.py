@@ -219,7 +219,7 @@ class Compensator:
         str
         """
         for group in self.groups:
-            values = [reading.values.get(name) for name in group.names]
+            values = group.ranges.pick(reading.values)
             reference = state.models[group.members[0]].reference
             if group.ranges.hold(values, reference):
                 continue

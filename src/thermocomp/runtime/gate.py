@@ -6,8 +6,9 @@ It comes first, because numbers that are not numbers are treacherous further dow
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
+from operator import itemgetter
 from statistics import median
 
 import numpy as np
@@ -129,7 +130,19 @@ class Ranges:
 
     def __init__(self, inputs: Sequence[Input]) -> None:
         self._inputs = tuple(inputs)
+        self.names = tuple(i.name for i in inputs)
+        several = len(self.names) > 1  # of one name `itemgetter` gives no tuple
+        self._all: Callable[[Mapping[str, object]], Sequence[object]] = (
+            itemgetter(*self.names) if several else lambda values: [values[name] for name in self.names]
+        )
         self._of: tuple[NDArray[np.float64] | None, list[tuple[float, float]]] = (None, [])
+
+    def pick(self, values: Mapping[str, object]) -> Sequence[object]:
+        """Return the values of the inputs as a source gave them; None for one that is missing."""
+        try:
+            return self._all(values)
+        except KeyError:
+            return [values.get(name) for name in self.names]
 
     def hold(self, values: Sequence[object], reference: NDArray[np.float64]) -> bool:
         """Return whether values are plausible beyond doubt: plain numbers, each in its range about a known zero.

@@ -30,7 +30,6 @@ class Group:
         self.members = tuple(members)
         self.models = tuple(models[k] for k in members)
         self.lead = self.models[0]
-        self.names = tuple(i.name for i in self.lead.inputs)
         paced = [m for m in self.models if isinstance(m, PacedDynamic)]
         self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
         self.ranges = Ranges(self.lead.inputs)
@@ -84,7 +83,7 @@ class Group:
     def beyond(self, states: Sequence[State], values: FloatArray) -> list[str]:
         """Return the inputs that are outside the trained range of a model."""
         if np.count_nonzero(states[0].outside):
-            return [name for name, out in zip(self.names, states[0].outside.tolist(), strict=True) if out]
+            return [name for name, out in zip(self.ranges.names, states[0].outside.tolist(), strict=True) if out]
         change = values - states[0].reference
         near = all(joint.distance(change) <= 1.0 for joint in self._apart)
         return [] if near else [TOGETHER]

@@ -20,7 +20,6 @@ class Lookout:
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
-        self._names = tuple(i.name for i in watch.inputs)
         self._ranges = Ranges(watch.inputs)
 
     def believe(
@@ -37,7 +36,7 @@ class Lookout:
         values : mapping of str to float
             As a source gave them, by channel.
         """
-        given = [values.get(name) for name in self._names]
+        given = self._ranges.pick(values)
         if is_quiet(state, time) and self._ranges.hold(given, state.reference):
             return state, values
         numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]

@@ -16,7 +16,18 @@ from thermocomp.files.machines import read_machine, read_models
 from thermocomp.files.protocols import read_protocol
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.service.clock import Clock
-from thermocomp.service.config import FileOut, In, LinuxCncOut, MqttIn, MqttProbing, Out, Probings, ReplayIn, Settings
+from thermocomp.service.config import (
+    FileOut,
+    In,
+    LinuxCncOut,
+    MqttIn,
+    MqttProbing,
+    Out,
+    Probings,
+    ReplayIn,
+    Settings,
+    SimulatedIn,
+)
 from thermocomp.service.loop import Service
 from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
@@ -90,6 +101,7 @@ def _missing(settings: Settings) -> Iterator[str]:
     config, folder = settings
     read = [*config.models, *([config.machine.file] if config.machine else [])]
     read += [s.file for s in config.sources if isinstance(s, ReplayIn)]
+    read += [s.experiment for s in config.sources if isinstance(s, SimulatedIn) and s.experiment.endswith(".toml")]
     read += [config.page.token_file] if config.page and config.page.token_file else []
     for path in (folder / name for name in read):
         if not path.is_file():

@@ -386,28 +386,29 @@ def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[Err
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
     for error in errors:
-        path = error["loc"][:-1]
-        if path and error["type"] not in ("value_error", "missing"):
+        keys = _keys(error["loc"])
+        if len(keys) > 1 and error["type"] not in ("value_error", "missing"):
             table: Any = content
-            for k in path:
-                if not (isinstance(table, dict) and k not in table):  # the kind of an entry is no key
-                    table = table[k]
-            if isinstance(table, dict) and table.pop(error["loc"][-1], None) is not None:
-                tables.add(path)
+            for k in keys[:-1]:
+                table = table[k]
+            if isinstance(table, dict) and table.pop(keys[-1], None) is not None:
+                tables.add(keys[:-1])
     try:
         _ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
-        return [x for x in e.errors(include_url=False) if x["type"] == "value_error" and x["loc"] in tables]
+        return [x for x in e.errors(include_url=False) if x["type"] == "value_error" and _keys(x["loc"]) in tables]
     return []
 
 
+def _keys(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """Return the keys and places in lists that lead to an error: the kind of an entry, behind its place, is none."""
+    kinds = ("mqtt", "simulated", "replay", "file", "linuxcnc")
+    pairs = zip((None, *loc), loc, strict=False)
+    return tuple(k for before, k in pairs if not (k in kinds and isinstance(before, int)))
+
+
 def _tell(error: dict[str, Any]) -> str:
-    kinds, parts, before = ("mqtt", "simulated", "replay", "file", "linuxcnc"), list[str](), object()
-    for k in error["loc"]:
-        if not (k in kinds and isinstance(before, int)):  # the kind of an entry is no key
-            parts.append(f"{k + 1}" if isinstance(k, int) else str(k))
-        before = k
-    place = ".".join(parts) or "file"
+    place = ".".join(f"{k + 1}" if isinstance(k, int) else k for k in _keys(error["loc"])) or "file"
     context = error.get("ctx", {})
     if error["type"] == "value_error":
         return str(context["error"]) if place == "file" else f"{place}: {context['error']}"
