@@ -5,6 +5,7 @@ trained ones. Here the distance to the nearest of a few training states counts, 
 nearest trained speed. How it is calibrated stands in `thermocomp.models.covering`.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -86,6 +87,8 @@ class JointSupport:
             its tolerance; nan for a state with a nan. Rounded to a millionth, so that a batch gives what each of its
             states gives alone.
         """
+        if change.ndim == 1:
+            return np.asarray(self._distance_of_one(change))
         columns, weights, points, squares = self._numbers
         far = np.zeros(change.shape[:-1])
         if self.columns:
@@ -96,6 +99,19 @@ class JointSupport:
             away = np.minimum.reduce(np.abs(change[..., k, None] - levels), axis=-1)
             far = np.maximum(far, away / tolerance)
         return np.asarray(np.rint(far * 1e6) / 1e6)
+
+    def _distance_of_one(self, change: FloatArray) -> float:
+        """Return the same of a single state, live, where the calls of numpy would take twice as long."""
+        columns, weights, points, squares = self._numbers
+        far = 0.0
+        if self.columns:
+            state = change.take(columns) * weights
+            far = math.sqrt(max(float((squares - state @ points).min() + state @ state), 0.0))
+        for k, levels, tolerance in zip(self.speeds, self.levels, self.tolerances, strict=True):
+            speed = float(change[k])
+            away = min([abs(speed - level) for level in levels]) / tolerance
+            far = math.nan if math.isnan(away + far) else max(far, away)
+        return round(far * 1e6) / 1e6 if math.isfinite(far) else far
 
     @cached_property
     def _levels(self) -> tuple[FloatArray, ...]:
