@@ -163,6 +163,7 @@ def test_a_worker_calculates_on_one_thread(running: DaskCluster) -> None:
 
 
 def test_the_keyboard_takes_the_tasks_off_the_scheduler(running: DaskCluster) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores the keyboard
     with Client(running.address) as watching:
 
         def known() -> int:
@@ -183,6 +184,7 @@ def test_the_keyboard_takes_the_tasks_off_the_scheduler(running: DaskCluster) ->
             assert next(abandoned) == 0
         wait_until(lambda: known() == 0)
     del abandoned  # its client is closed: nothing is raised
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("address", ["10.0.0.1:8786", "tcp://host", "http://host:8786", "tcp://host:port", ""])
