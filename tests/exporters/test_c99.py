@@ -1,115 +1,121 @@
-"""The C code of a model says what the model says: compiled by a real compiler, for every family."""
+"""The C code of a compensator does what the compensator does: compiled by a real compiler, for every family."""
 
-import ctypes
-import shutil
-import subprocess
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
+from compiledblock import COMPILERS, SANITIZED, CompiledBlock, Ran, run_compensator
+from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
+from watchedmachine import failing, watched_model
 
 from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.exporters.c99 import Sources, translate
+from thermocomp.core.zero import Zeroing
+from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.c99 import translate
+from thermocomp.runtime.compensator import Compensator
 
-FLAGS = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-fsanitize=undefined", "-fno-sanitize-recover"]
-COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
+FloatArray = NDArray[np.float64]
+FREE = Limits(magnitude=1e9, rate=1e9)
+SLOW: dict[str, Any] = {"max_examples": 10, "suppress_health_check": [HealthCheck.too_slow], "deadline": None}
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
 
-class Compiled:
-    """A model's C code that runs in this process."""
+def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
+    return replace(model, honest_error=ACCEPTED, **changes)
 
-    def __init__(self, sources: Sources, n_inputs: int, folder: Path, compiler: str, *, single: bool = False) -> None:
-        (folder / f"{sources.name}.h").write_text(sources.header, encoding="ascii")
-        code, library = folder / f"{sources.name}.c", folder / "model.so"
-        code.write_text(sources.source, encoding="ascii")
-        flags = [*FLAGS, *(["-DTC_FLOAT"] if single else [])]
-        subprocess.run([compiler, *flags, "-shared", "-fPIC", str(code), "-o", str(library), "-lm"], check=True)
-        kind: Any = ctypes.c_float if single else ctypes.c_double
-        found = ctypes.CDLL(str(library))
-        self._start, self._step = (getattr(found, f"{sources.name}_{verb}") for verb in ("start", "step"))
-        self._step.restype, self._kind = kind, kind
-        self._step.argtypes = [ctypes.c_void_p, kind * n_inputs, kind]
-        self._inputs, self._state = kind * n_inputs, ctypes.create_string_buffer(100_000)
 
-    def start(self, zero: list[float]) -> None:
-        self._start(self._state, self._inputs(*zero))
+def check_same(one: Ran, other: Ran, within: float = 1e-12) -> None:
+    """Compare what two said: decisions exactly, numbers to a share of their size."""
+    assert (one.passed == other.passed).all()
+    assert (one.status == other.status).all()
+    assert (one.fault == other.fault).all()
+    for a, b in ((one.correction, other.correction), (one.slope, other.slope), (one.deviation, other.deviation)):
+        assert np.isfinite(b).all()
+        assert (np.abs(a - b) <= within * np.maximum(1.0, np.abs(a))).all()
 
-    def step(self, values: list[float], dt: float) -> float:
-        return float(self._step(self._state, self._inputs(*values), dt))
+
+def check_block(
+    compensator: Compensator,
+    rows: FloatArray,
+    dt: FloatArray,
+    *,
+    age: FloatArray | None = None,
+    flags: tuple[str, ...] = SANITIZED,
+    within: float = 1e-12,
+    compiler: str = "",
+) -> Ran:
+    """Run a compensator and its C code over the same rows; return what they said."""
+    age = np.zeros(len(rows)) if age is None else age
+    with tempfile.TemporaryDirectory() as folder:
+        block = CompiledBlock(compensator, Path(folder), compiler or COMPILERS[0], flags)
+        expected = run_compensator(compensator, rows, age, dt)
+        check_same(expected, block.run(rows, age, dt), within)
+    return expected
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(data=st.data(), rows=READINGS)
-def test_the_code_is_the_model(family: str, compiler: str, data: st.DataObject, rows: list[tuple[float, ...]]) -> None:
-    model: ErrorModel = data.draw(FAMILIES[family])
-    with tempfile.TemporaryDirectory() as folder:
-        code = Compiled(translate(model), 3, Path(folder), compiler)
-        for repeat in (1, 40):  # a second run begins anew; long ones settle
-            code.start([rows[0][0], 20.0, 0.0])
-            state = model.init()
-            for *values, dt in rows:
-                state, expected = model.step(state, np.array(values), dt * repeat)
-                assert code.step(values, dt * repeat) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+@settings(**SLOW)
+@given(data=st.data(), rows=READINGS, zeroing=st.sampled_from([Zeroing(0.0, 0.0), Zeroing(60.0, 20.0, "n")]))
+def test_the_code_is_the_compensator(
+    family: str, compiler: str, data: st.DataObject, rows: list[tuple[float, ...]], zeroing: Zeroing
+) -> None:
+    model: ErrorModel = accepted(data.draw(FAMILIES[family]), zeroing=zeroing)
+    table = np.array(rows)
+    for slower in (1.0, 40.0):  # long steps settle
+        check_block(Compensator.of([model], FREE), table[:, :3], slower * table[:, 3], compiler=compiler)
 
 
-def test_a_name_that_would_end_a_comment_does_not(tmp_path: Path) -> None:
-    inputs = (Input("a*/ #error /*b", "temperature", "degC", 20.0, True, -3.0, 15.0),)
+def test_a_name_that_would_end_a_comment_does_not() -> None:
+    name = "a*/ #error /*b ??/ \u00b0"
     model = Polynomial(
         target="z 1*/",
         unit="um",
-        inputs=inputs,
-        variables=(Variable.single(inputs[0].name, 0),),
+        inputs=(Input(name, "temperature", "degC", 20.0, True, -3.0, 15.0),),
+        variables=(Variable.single(name, 0),),
         terms=((0,),),
         coefficients=(2.0,),
     )
-    sources = translate(model)
-    assert sources.name == "tc_z_1"
-    code = Compiled(sources, 1, tmp_path, COMPILERS[0])
-    code.start([20.0])
-    assert code.step([23.0], 0.0) == 6.0
+    compensator = Compensator.of([accepted(model)], FREE)
+    assert translate(gather(compensator), "z 1*/").name == "tc_z_1"
+    said = check_block(compensator, np.array([[20.0], [23.0]]), np.ones(2))
+    assert said.correction[-1].tolist() == [-6.0]
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow], deadline=None)
-@given(curve=CURVES, at=st.lists(st.floats(-12, 12), min_size=1, max_size=5))
+@settings(**SLOW)
+@given(curve=CURVES, at=st.lists(st.floats(-4.0, 9.0), min_size=1, max_size=5))
 def test_a_table_is_its_curve(curve: Curve, at: list[float]) -> None:
-    model = Additive(**HEAD, variables=(SINGLES[1],), curves=(curve,))
-    with tempfile.TemporaryDirectory() as folder:
-        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0])
-        code.start([20.0, 0.0, 0.0])
-        for value in (*at, *curve.x):  # at the breaks, too
-            _, expected = model.step(model.init((20.0, 0.0, 0.0)), np.array([20.0, value, 0.0]), 0.0)
-            assert code.step([20.0, value, 0.0], 0.0) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+    model = accepted(Additive(**HEAD, variables=(SINGLES[1],), curves=(curve,)))
+    values = 20.0 + np.array([*at, *curve.x])  # at the breaks, too
+    rows = np.column_stack([np.full(len(values), 20.0), values, np.zeros(len(values))])
+    check_block(Compensator.of([model], FREE), rows, np.ones(len(rows)))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@settings(max_examples=6, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(**SLOW | {"max_examples": 6})
 @given(data=st.data(), rows=READINGS)
 def test_in_single_precision_it_says_nearly_the_same(
     family: str, data: st.DataObject, rows: list[tuple[float, ...]]
 ) -> None:
-    model: ErrorModel = data.draw(FAMILIES[family])
-    with tempfile.TemporaryDirectory() as folder:
-        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0], single=True)
-        code.start([rows[0][0], 20.0, 0.0])
-        state = model.init()
-        for *values, dt in rows:
-            state, expected = model.step(state, np.array(values), dt)
-            assert code.step(values, dt) == pytest.approx(float(expected), rel=1e-3, abs=0.05)
+    model: ErrorModel = accepted(data.draw(FAMILIES[family]))
+    table = np.array(rows)
+    compensator = Compensator.of([model], FREE)
+    check_block(compensator, table[:, :3], table[:, 3], flags=(*SANITIZED, "-DTC_FLOAT"), within=1e-3)
 
 
 JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
@@ -117,35 +123,154 @@ JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 
 
 @pytest.mark.parametrize("joint", [None, JOINT, replace(JOINT, columns=(), scale=(), points=())])
 @pytest.mark.parametrize("policy", ["hold", "fade"])
-@settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(**SLOW)
 @given(model=st.one_of(*FAMILIES.values()), over=st.sampled_from([0.1, 0.5, 2.0]), rows=READINGS)
 def test_beyond_the_trained_range(
     policy: Literal["hold", "fade"], joint: JointSupport | None, model: ErrorModel, over: float, rows: list[Any]
 ) -> None:
-    model = replace(model, support=Support(policy, fade_over=over), joint=joint)
-    with tempfile.TemporaryDirectory() as folder:
-        code = Compiled(translate(model), 3, Path(folder), COMPILERS[0])
-        code.start([rows[0][0], 20.0, 0.0])
-        state = model.init()
-        for *values, dt in rows:
-            state, expected = model.step(state, np.array(values), dt)
-            assert code.step(values, dt) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+    model = accepted(model, support=Support(policy, fade_over=over), joint=joint)
+    table = np.array(rows)
+    check_block(Compensator.of([model], FREE), table[:, :3], table[:, 3])
 
 
-def test_an_input_that_did_not_move_in_training_is_inside_where_it_was() -> None:
-    still = replace(INPUTS[0], low=0.0, high=0.0)
+@pytest.mark.parametrize("flags", [SANITIZED, (*SANITIZED, "-DTC_FLOAT")])
+def test_an_input_that_did_not_move_in_training_is_inside_where_it_was(flags: tuple[str, ...]) -> None:
     model = Polynomial(
         target="z_um",
         unit="um",
-        inputs=(still,),
+        inputs=(replace(INPUTS[0], low=0.0, high=0.0),),
         variables=(SINGLES[0],),
         terms=(),
         coefficients=(),
         intercept=3.0,
         support=Support("fade"),
     )
-    for single in (False, True):
-        with tempfile.TemporaryDirectory() as folder:
-            code = Compiled(translate(model), 1, Path(folder), COMPILERS[0], single=single)
-            code.start([20.0])
-            assert [code.step([20.0], 0.0), code.step([20.5], 1.0)] == [3.0, 0.0]
+    said = check_block(Compensator.of([accepted(model)], FREE), np.array([[20.0], [20.5]]), np.ones(2), flags=flags)
+    assert said.deviation.ravel().tolist() == [3.0, 0.0]
+
+
+@settings(**SLOW | {"max_examples": 30})
+@given(
+    models=st.lists(st.one_of(*FAMILIES.values()), min_size=2, max_size=3),
+    waiting=st.lists(st.booleans(), min_size=3, max_size=3),
+    rows=READINGS,
+    limits=st.builds(Limits, st.floats(1, 30), st.floats(0.01, 3), st.sampled_from([0.0, 0.5]), st.floats(10, 90)),
+)
+def test_several_targets_some_of_which_count_from_nothing(
+    models: list[ErrorModel], waiting: list[bool], rows: list[Any], limits: Limits
+) -> None:
+    absolute = (replace(INPUTS[0], rezero=False), *INPUTS[1:])
+    models = [
+        accepted(m, target=f"t{k}", inputs=INPUTS if w else absolute, zeroing=Zeroing(30.0, 10.0, "n"))
+        for k, (m, w) in enumerate(zip(models, waiting, strict=False))
+    ]
+    table = np.array(rows)
+    check_block(Compensator.of(models, limits), table[:, :3], table[:, 3])
+
+
+NOTHING: dict[str, tuple[float, float | None]] = {}
+
+
+@pytest.mark.parametrize(
+    ("cuts", "found"),
+    [
+        (NOTHING, [0, 0, 0]),
+        ({"t1_C": (1.0, None)}, [1, 0, 0]),
+        ({"t2_C": (1.0, 3.0)}, [0, 2, 0]),
+        ({"t3_C": (1.0, None)}, [0, 0, 1]),
+        ({"t1_C": (1.0, 6.0), "t2_C": (4.0, -6.0)}, [2, 2, 0]),
+        ({"t1_C": (1.0, None), "t3_C": (2.0, None)}, [1, 0, 1]),
+    ],
+)
+@pytest.mark.parametrize("flags", [SANITIZED, ("-DTC_FLOAT", *SANITIZED)])
+def test_sensors_that_fail(cuts: dict[str, Any], found: list[int], flags: tuple[str, ...]) -> None:
+    compensator = Compensator.of([watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2))
+    day, within = failing(**cuts), 1e-12 if flags == SANITIZED else 1e-5
+    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64)
+    said = check_block(
+        compensator,
+        rows,
+        np.diff(day.time, prepend=day.time[0]),
+        flags=flags,
+        within=within * 20 if within > 1e-9 else within,
+    )
+    assert said.fault.max(axis=0).tolist() == found
+    assert (said.status[-1] > 1).all() == (found[2] > 0)  # without t3_C it does harm: held, then faded
+
+
+def _stuck(rows: FloatArray) -> None:
+    rows[200:, 0] = rows[200, 0]
+
+
+def _swapped(rows: FloatArray) -> None:
+    rows[:, [0, 1]] = rows[0, [0, 1]] + (rows - rows[0])[:, [1, 0]]
+
+
+def _drifting(rows: FloatArray) -> None:
+    rows[200:, 1] += np.linspace(0.0, 8.0, len(rows) - 200)
+
+
+def _spikes(rows: FloatArray) -> None:
+    rows[100::37, 0] += 7.0
+
+
+def _back(rows: FloatArray) -> None:
+    rows[150:260, 1] = np.nan
+
+
+def _dead_at_the_start(rows: FloatArray) -> None:
+    rows[:, 0] = 0.0
+
+
+def _no_speed(rows: FloatArray) -> None:
+    rows[40:90, 3] = np.nan
+
+
+def _fast(rows: FloatArray) -> None:
+    rows[300:302, 3] = 65535.0
+
+
+@pytest.mark.parametrize("damage", [_stuck, _swapped, _drifting, _spikes, _back, _dead_at_the_start, _no_speed, _fast])
+def test_every_failure_that_the_watch_knows(damage: Callable[[FloatArray], None]) -> None:
+    compensator = Compensator.of([watched_model("z_um")])
+    day = failing()
+    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64, copy=True)
+    assert [c.name for c in gather(compensator).channels][3] == "spindle_rpm"
+    damage(rows)
+    check_block(compensator, rows, np.diff(day.time, prepend=day.time[0]))
+
+
+HOSTILE = st.one_of(
+    st.floats(),
+    st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0.0, 85.0, -127.0, 0.0, 65535.0]),
+    st.floats(19.0, 30.0),
+)
+
+
+@pytest.fixture(scope="module")
+def limited(tmp_path_factory: pytest.TempPathFactory) -> tuple[Compensator, CompiledBlock]:
+    compensator = Compensator.of([watched_model("z_um")], Limits(magnitude=5.0, rate=0.05, hold=120.0, fade=60.0))
+    return compensator, CompiledBlock(compensator, tmp_path_factory.mktemp("limited"))
+
+
+@settings(**SLOW | {"max_examples": 400, "suppress_health_check": list(HealthCheck)})
+@given(
+    rows=st.lists(
+        st.tuples(*[st.one_of(st.just(21.0), st.floats(20, 26), HOSTILE)] * 4, HOSTILE, HOSTILE),
+        min_size=1,
+        max_size=60,
+    ),
+    quiet=st.booleans(),
+)
+def test_nothing_that_comes_in_moves_it_beyond_its_limits(
+    limited: tuple[Compensator, CompiledBlock], rows: list[tuple[float, ...]], quiet: bool
+) -> None:
+    compensator, block = limited
+    table = np.array(rows, dtype=np.float64)
+    age = np.abs(np.nan_to_num(table[:, 4], posinf=0, neginf=0)) % 5 if quiet else table[:, 4]
+    dt = np.abs(np.nan_to_num(table[:, 5], posinf=0, neginf=0)) % 90 if quiet else table[:, 5]
+    said = block.run(table[:, :4], age, dt)
+    check_same(run_compensator(compensator, table[:, :4], age, dt), said)
+    moved = np.abs(np.diff(said.correction[:, 0], prepend=0.0))
+    assert (np.abs(said.correction) <= 5.0).all()
+    assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()

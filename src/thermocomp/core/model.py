@@ -446,10 +446,16 @@ class ErrorModel(ABC):
         low, high = self._bounds
         return low.tolist(), high.tolist(), self._fade_span.tolist()
 
-    def expression(self) -> Node:
-        """Return what the model computes as a tree: what `step` gives with the support policy ``clip``."""
+    def expression(self, change: Sequence[Node] | None = None) -> Node:
+        """Return what the model computes as a tree: what `step` gives with the support policy ``clip``.
+
+        Parameters
+        ----------
+        change : sequence of Node, optional
+            What stands for the inputs minus their zero, clipped to the trained range.
+        """
         bounds = zip(self.inputs, *(b.tolist() for b in self._bounds), strict=True)
-        return self._expression([Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
+        return self._expression(change or [Clip(Leaf(k, i.name), low, high) for k, (i, low, high) in enumerate(bounds)])
 
     def formula(self) -> str:
         """Return the model as one line of text."""

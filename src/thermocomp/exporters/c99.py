@@ -1,11 +1,13 @@
-"""C99: one header and one source that say what a model says, without allocation and without globals."""
+"""C99: a compensator as one header and one source, without allocation and without globals."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from thermocomp.core.model import ErrorModel
+from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.cexpression import Clock, Written, number
-from thermocomp.exporters.csupport import write_support
+from thermocomp.exporters.cstatements import write_functions, write_tables, write_variables
+from thermocomp.exporters.csupport import Supports
 
 _HEADER = """/* {title} */
 #ifndef {guard}
@@ -20,19 +22,34 @@ typedef double tc_real;
 #endif
 #endif
 
-/* inputs: {inputs} */
-#define {upper}_INPUTS {n}
+/* readings that the zero is averaged of, at most; fewer take less memory, and then it is known earlier */
+#ifndef TC_ZERO_READINGS
+#define TC_ZERO_READINGS {most}
+#endif
 
-{clocks}typedef struct {{
-    tc_real zero[{n}]; /* what the inputs are counted from */
-    int begun;
-{memory}}} {name}_state;
+/* what it takes, in this order */
+enum {{
+{inputs}
+}};
 
-/* Begin: `zero` is what the inputs read when the machine was zeroed. */
-void {name}_start({name}_state *s, const tc_real zero[{n}]);
+/* what it corrects, in this order */
+enum {{
+{outputs}
+}};
 
-/* Take a reading in, `dt` seconds after the one before, and return the deviation [{unit}]. */
-tc_real {name}_step({name}_state *s, const tc_real in[{n}], tc_real dt);
+{clocks}/* what is kept between two calls: read it, change nothing */
+typedef struct {{
+{state}{memory}}} {name}_state;
+
+/* Begin: all corrections are zero. */
+void {name}_start({name}_state *s);
+
+/*
+ * Take values in, measured `age` seconds ago, and move the corrections; `dt` is the time since the call before [s].
+ * A value that is missing is given as NAN. Call it at every cycle: with values that are not new it waits, holds and
+ * at last lets the corrections go to zero.
+ */
+void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt);
 
 #endif
 """
@@ -50,32 +67,41 @@ _SOURCE = """#include "{name}.h"
 
 #include <math.h>
 
+#ifdef __FAST_MATH__
+#error "a value that is no number would not be noticed: compile without -ffast-math"
+#endif
+
 #define TC(x) ((tc_real)(x))
 #ifdef TC_FLOAT
 #define TC_MATH(name) name##f
 #else
 #define TC_MATH(name) name
 #endif
-{helpers}{tables}{clocks}{support}
-void {name}_start({name}_state *s, const tc_real zero[{n}])
+
+/* what is worked out anew in every call */
+typedef struct {{
+{work}}} {name}_work;
+
+{constants}{helpers}{tables}{clocks}{support}
+{functions}
+void {name}_start({name}_state *s)
 {{
     static const {name}_state cold = {{0}};
-    int k;
 
     *s = cold;
-    for (k = 0; k < {n}; k++) {{
-        s->zero[k] = zero[k];
-    }}
 }}
 
-tc_real {name}_step({name}_state *s, const tc_real in[{n}], tc_real dt)
+void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt)
 {{
-{body}
-{said}
-    s->begun = 1;
-    (void)in;
-    (void)dt;
-    return said;
+    {name}_work w;
+    int k;
+
+    for (k = 0; k < {n}; k++) {{
+        w.value[k] = value[k];
+    }}
+    w.age = age;
+    w.dt = dt;
+    tc_step(s, &w);
 }}
 """
 
@@ -86,11 +112,11 @@ static tc_real tc_clip(tc_real value, tc_real low, tc_real high)
     return value < low ? low : (value > high ? high : value);
 }
 """,
-    "tc_follow": """
-/* a first-order lag, `paces` time constants later; it rests in its first value */
-static tc_real tc_follow(tc_real *lag, tc_real value, tc_real paces, int begun)
+    "tc_lag": """
+/* a first-order lag; it rests in its first value */
+static tc_real tc_lag(tc_real *lag, tc_real value, tc_real gain, int begun)
 {
-    *lag = begun ? *lag - TC_MATH(expm1)(-paces) * (value - *lag) : value;
+    *lag = begun ? *lag + gain * (value - *lag) : value;
     return *lag;
 }
 """,
@@ -112,8 +138,8 @@ static tc_real tc_linear(tc_real at, const tc_real *x, const tc_real *y, int n)
     return y[k - 1] + (y[k] - y[k - 1]) / (x[k] - x[k - 1]) * (at - x[k - 1]);
 }
 """,
-    "tc_step": """
-static tc_real tc_step(tc_real at, const tc_real *x, const tc_real *y, int n)
+    "tc_stairs": """
+static tc_real tc_stairs(tc_real at, const tc_real *x, const tc_real *y, int n)
 {
     int k = 0;
 
@@ -185,7 +211,7 @@ static tc_real clock{index}_step({name}_clock{index} *s, const tc_real now[{leav
 
 @dataclass(frozen=True)
 class Sources:
-    """A model in C.
+    """A compensator in C.
 
     Parameters
     ----------
@@ -199,28 +225,35 @@ class Sources:
     source: str
 
 
-def translate(model: ErrorModel) -> Sources:
-    """Return a model in C99.
+def translate(tables: Tables, name: str) -> Sources:
+    """Return a compensator in C99.
 
-    What it computes is what `ErrorModel.step` gives: `ErrorModel.expression`, and what the support policy lets pass.
+    What it does with values is what `Compensator.step` does with a reading.
 
     Parameters
     ----------
-    model : ErrorModel
+    tables : Tables
+        Of the compensator.
+    name : str
+        Of the files and of all that is in them.
 
     Raises
     ------
     InputError
-        It is of a family that has no formula.
+        A model is of a family that has no formula.
     """
-    written, support = Written(), write_support(model)
-    result = written.value(model.expression())
-    name, n = identifier(model.target), len(model.inputs)
-    body = "\n".join(f"    {line}" for line in written.lines)
-    parts = {"name": name, "n": n}
+    name, n, sizes = identifier(name), len(tables.channels), tables.sizes
+    written, supports = Written(tables.values["channel"]), Supports(tables.ranges, tables.values["channel"])
+    bodies = {f"models_{when}": _body(tables, written, supports, when) for when in ("absolute", "rezeroed")}
+    functions = write_functions(sizes, name, bodies)
+    everything = "".join(bodies.values())
+    clocks = {c.index: _sizes(c, name) for c in written.clocks}
     source = _SOURCE.format(
-        **parts,
-        helpers="".join(text for word, text in _HELPERS.items() if f"{word}(" in body),
+        name=name,
+        n=n,
+        work=write_variables(sizes, "w", functions + "w->value w->age w->dt"),
+        constants=write_tables(sizes, tables.values, functions),
+        helpers="".join(text for word, text in _HELPERS.items() if word in everything + "".join(_ticks(written))),
         tables="".join(
             f"\nstatic const tc_real table{k}_{axis}[{len(row)}] = {{{', '.join(map(number, row))}}};\n"
             for k, table in enumerate(written.tables)
@@ -228,30 +261,64 @@ def translate(model: ErrorModel) -> Sources:
         ),
         clocks="".join(
             _CLOCK.format(
-                **_sizes(clock, name),
-                interval=clock.interval,
-                seconds=number(clock.interval),
-                tick="\n".join(f"    {line}" for line in clock.statements()),
+                **clocks[c.index],
+                interval=c.interval,
+                seconds=number(c.interval),
+                tick="\n".join(_indented(c.statements())),
             )
-            for clock in written.clocks
+            for c in written.clocks
         ),
-        support=support.functions,
-        body=body,
-        said="\n".join([f"    tc_real said = {result};", support.statements]).rstrip(),
+        support=supports.functions,
+        functions=functions,
     )
-    memory = [f"    tc_real lag[{written.lags}];\n"] if written.lags else []
+    memory = [f"    tc_real lag[{written.lags}]; /* of the models */\n"] if written.lags else []
     memory += [f"    {name}_clock{c.index} clock{c.index};\n" for c in written.clocks]
     header = _HEADER.format(
-        **parts,
-        title=_comment(f"{model.target} [{model.unit}], written by thermocomp"),
+        name=name,
+        n=n,
+        title=_comment(f"{', '.join(tables.targets)}: thermal compensation, written by thermocomp"),
         guard=f"{name.upper()}_H",
-        upper=name.upper(),
-        inputs=_comment(", ".join(f"{i.name} [{i.unit}]" for i in model.inputs)),
-        clocks="".join(_CLOCK_TYPE.format(**_sizes(clock, name)) for clock in written.clocks),
-        memory="".join(memory) + support.memory,
-        unit=_comment(model.unit),
+        most=sizes["MOST"],
+        inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
+        outputs=_enumerated(name, "OUT", [f"{t} [um]" for t in tables.targets]),
+        clocks="".join(_CLOCK_TYPE.format(**c) for c in clocks.values()),
+        state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside"),
+        memory="".join(memory),
     )
     return Sources(name, header, source)
+
+
+def _body(tables: Tables, written: Written, supports: Supports, when: str) -> str:
+    """Return the body of the function that works some models out: those that wait for their zero, or the others."""
+    mine = [(k, m) for k, m in enumerate(tables.models) if tables.waits(m) == (when == "rezeroed")]
+    worked_out = set[int]()
+    for k, model in mine:
+        written.lines.append(f"const tc_real said{k} = {written.value(tables.formula(model))};")
+        written.lines += supports.statements(model, k, worked_out)
+    lines = written.take_lines()
+    text = "\n".join(lines)
+    head = [f"const int begun = s->begun_{when};"] if "begun)" in text else []
+    head += ["const tc_real dt = (tc_real)w->step;"] if re.search(r"\bdt\b", text) else []
+    tail = [f"s->begun_{when} = 1;", *([] if "w->" in text + "".join(head) else ["(void)w;"])]
+    return "\n".join(_indented([*head, *lines, *tail]))
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+def _ticks(written: Written) -> list[str]:
+    return [line for c in written.clocks for line in c.statements()]
+
+
+def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
+    lines = []
+    for k, text in enumerate(texts):
+        word = re.sub(r"[^A-Za-z0-9]+", "_", text.split(" [")[0]).strip("_").upper() or "X"
+        lines.append(
+            f"    {name.upper()}_{kind}_{k}_{word} = {k}{',' if k < len(texts) - 1 else ''} /* {_comment(text)} */"
+        )
+    return "\n".join(lines)
 
 
 def identifier(name: str) -> str:
@@ -261,7 +328,9 @@ def identifier(name: str) -> str:
 
 
 def _comment(text: str) -> str:
-    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+    for sign in ("*/", "/*", "??"):
+        text = text.replace(sign, " ".join(sign))
+    return " ".join(text.encode("ascii", "backslashreplace").decode().split())
 
 
 def _sizes(clock: Clock, name: str) -> dict[str, object]:

@@ -1,18 +1,23 @@
 """The expression of a model as statements of C99: one local constant per part, states in a struct."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from thermocomp.core import expression as e
 
+#: functions that look a value up in a table
+_LOOKUPS = {"linear": "linear", "step": "stairs"}
+
 
 @dataclass
 class Written:
-    """Statements that work a tree out, and what they remember.
+    """Statements that work trees out, and what they remember.
 
     Parameters
     ----------
+    channels : sequence of int
+        Of the inputs: which of the values that are read each of them is.
     lines : list of str
         Of the body, in order.
     lags : int
@@ -23,11 +28,18 @@ class Written:
         ``table0_x`` and ``table0_y``, and so on.
     """
 
+    channels: Sequence[int]
     lines: list[str] = field(default_factory=list)
     lags: int = 0
     clocks: list["Clock"] = field(default_factory=list)
     tables: list[e.Lookup] = field(default_factory=list)
     _known: dict[e.Node, str] = field(default_factory=dict, init=False, repr=False)
+    _gains: dict[str, str] = field(default_factory=dict, init=False, repr=False)
+
+    def take_lines(self) -> list[str]:
+        """Return the statements so far; the next trees are worked out in a function of their own."""
+        lines, self.lines, self._known, self._gains = self.lines, [], {}, {}
+        return lines
 
     def value(self, node: e.Node) -> str:
         """Return the name of what a part says; a part that stands in several places is worked out once."""
@@ -47,7 +59,7 @@ class Written:
     def _text(self, node: e.Node) -> str:
         match node:
             case e.Input(index):
-                return f"in[{index}] - s->zero[{index}]"
+                return f"w->input[{self.channels[index]}] - s->zero[{index}]"
             case e.Lag(of, tau):
                 return self._lag(self.value(of), f"dt / {number(tau)}")
             case e.PacedLag(of, stopped, running, pace):
@@ -64,16 +76,19 @@ class Written:
                 self.clocks.append(clock)
                 now = ", ".join(map(self.value, clock.leaves))
                 self.lines.append(f"const tc_real now{clock.index}[{len(clock.leaves)}] = {{{now}}};")
-                return f"clock{clock.index}_step(&s->clock{clock.index}, now{clock.index}, dt, s->begun)"
+                return f"clock{clock.index}_step(&s->clock{clock.index}, now{clock.index}, dt, begun)"
             case e.Lookup(of, x, _, kind):
                 place = len(self.tables)
                 self.tables.append(node)
-                return f"tc_{kind}({self.value(of)}, table{place}_x, table{place}_y, {len(x)})"
+                return f"tc_{_LOOKUPS[kind]}({self.value(of)}, table{place}_x, table{place}_y, {len(x)})"
         return arithmetic(node, self.value)
 
     def _lag(self, signal: str, paces: str) -> str:
         place, self.lags = self.lags, self.lags + 1
-        return f"tc_follow(&s->lag[{place}], {signal}, {paces}, s->begun)"
+        if paces not in self._gains:
+            self._gains[paces] = f"gain{len(self._gains)}"
+            self.lines.append(f"const tc_real {self._gains[paces]} = -TC_MATH(expm1)(-({paces}));")
+        return f"tc_lag(&s->lag[{place}], {signal}, {self._gains[paces]}, begun)"
 
 
 @dataclass
