@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, SANITIZED, CompiledBlock, Ran, run_compensator
+from compiledblock import COMPILERS, SANITIZED, CompiledBlock
 from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
@@ -26,6 +26,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.c99 import translate
+from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]
@@ -39,7 +40,7 @@ def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
     return replace(model, honest_error=ACCEPTED, **changes)
 
 
-def check_same(one: Ran, other: Ran, within: float = 1e-12) -> None:
+def check_same(one: Answers, other: Answers, within: float = 1e-12) -> None:
     """Compare what two said: decisions exactly, numbers to a share of their size."""
     assert (one.passed == other.passed).all()
     assert (one.status == other.status).all()
@@ -58,13 +59,14 @@ def check_block(
     flags: tuple[str, ...] = SANITIZED,
     within: float = 1e-12,
     compiler: str = "",
-) -> Ran:
+) -> Answers:
     """Run a compensator and its C code over the same rows; return what they said."""
     age = np.zeros(len(rows)) if age is None else age
     with tempfile.TemporaryDirectory() as folder:
         block = CompiledBlock(compensator, Path(folder), compiler or COMPILERS[0], flags)
-        expected = run_compensator(compensator, rows, age, dt)
-        check_same(expected, block.run(rows, age, dt), within)
+        readings = Readings(rows, age, dt)
+        expected = replay(compensator, block.tables, readings)
+        check_same(expected, block.run(readings), within)
     return expected
 
 
@@ -168,6 +170,20 @@ def test_several_targets_some_of_which_count_from_nothing(
     check_block(Compensator.of(models, limits), table[:, :3], table[:, 3])
 
 
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("flags", [SANITIZED, ("-DTC_FLOAT", *SANITIZED)])
+def test_the_readings_of_the_test_vectors_show_all_that_it_does(flags: tuple[str, ...], compiler: str) -> None:
+    compensator = Compensator.of([watched_model("z_um")])
+    readings = make_readings(gather(compensator))
+    within = 1e-12 if flags == SANITIZED else 1e-5
+    said = check_block(compensator, readings.values, readings.dt, age=readings.age, flags=flags, within=within)
+    assert set(said.status.ravel()) == {0, 1, 2, 3}
+    assert {0, 1} <= set(said.fault.ravel())
+    assert 0.1 < said.passed.mean() < 0.9
+    assert np.abs(said.correction).max() > 10.0
+    assert abs(said.correction[-41, 0]) < 0.2 * np.abs(said.correction).max()  # faded before it comes back
+
+
 NOTHING: dict[str, tuple[float, float | None]] = {}
 
 
@@ -269,8 +285,9 @@ def test_nothing_that_comes_in_moves_it_beyond_its_limits(
     table = np.array(rows, dtype=np.float64)
     age = np.abs(np.nan_to_num(table[:, 4], posinf=0, neginf=0)) % 5 if quiet else table[:, 4]
     dt = np.abs(np.nan_to_num(table[:, 5], posinf=0, neginf=0)) % 90 if quiet else table[:, 5]
-    said = block.run(table[:, :4], age, dt)
-    check_same(run_compensator(compensator, table[:, :4], age, dt), said)
+    readings = Readings(table[:, :4], age, dt)
+    said = block.run(readings)
+    check_same(replay(compensator, block.tables, readings), said)
     moved = np.abs(np.diff(said.correction[:, 0], prepend=0.0))
     assert (np.abs(said.correction) <= 5.0).all()
     assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()

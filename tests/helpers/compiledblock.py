@@ -5,28 +5,24 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermocomp.core.reading import Reading
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.c99 import translate
+from thermocomp.exporters.vectors import Answers, Readings
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.watch import WORDS
 
-FloatArray = NDArray[np.float64]
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover")
 COMPILERS = [c for c in ("gcc", "clang") if shutil.which(c)]
-STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 _DRIVER = """
 #include "{name}.h"
 #include <stdlib.h>
 
 void *begin(void) {{ {name}_state *s = malloc(sizeof *s); {name}_start(s); return s; }}
+void end(void *s) {{ free(s); }}
 
 void run(void *at, int n, const tc_real *values, const double *age, const double *dt, double *said, int *told)
 {{
@@ -37,7 +33,7 @@ void run(void *at, int n, const tc_real *values, const double *age, const double
         {name}_step(s, values + k * {n}, age[k], dt[k]);
         for (j = 0; j < {targets}; j++) {{
             *said++ = s->correction[j];
-            *said++ = {slope};
+            *said++ = s->slope[j];
             *told++ = s->status[j];
         }}
         for (j = 0; j < {models}; j++) {{
@@ -51,17 +47,6 @@ void run(void *at, int n, const tc_real *values, const double *age, const double
     }}
 }}
 """
-
-
-class Ran(NamedTuple):
-    """What a block, or the compensator itself, said of each row."""
-
-    correction: FloatArray  #: (n_rows, n_targets), at the reference position
-    slope: FloatArray
-    status: FloatArray  #: by `STATUS`
-    deviation: FloatArray  #: of the models, (n_rows, n_models); of the compensator nan where a target is not driven
-    fault: FloatArray  #: (n_rows, n_sensors)
-    passed: NDArray[np.bool_]
 
 
 class CompiledBlock:
@@ -90,7 +75,6 @@ class CompiledBlock:
             targets=counts[1],
             models=counts[2],
             sensors=counts[3],
-            slope="s->slope[j]",
         )
         (folder / "driver.c").write_text(text, encoding="ascii")
         library = folder / "block.so"
@@ -103,47 +87,22 @@ class CompiledBlock:
         self._library = ctypes.CDLL(str(library))
         self._library.begin.restype = ctypes.c_void_p
 
-    def run(self, values: FloatArray, age: FloatArray, dt: FloatArray) -> Ran:
-        """Run it from the start; `values` (n_rows, n_channels) in the order of the tables' channels."""
+    def run(self, readings: Readings) -> Answers:
+        """Run it from the start."""
         _, targets, models, sensors = self._shape
-        n = len(values)
+        n = len(readings.age)
         said, told = np.empty((n, 2 * targets + models)), np.empty((n, targets + sensors + 2), dtype=np.int32)
-        given = np.ascontiguousarray(values, dtype=self._real)
-        pointers: list[Any] = [
-            ctypes.c_void_p(a.ctypes.data)
-            for a in (given, np.ascontiguousarray(age, float), np.ascontiguousarray(dt, float), said, told)
-        ]
-        self._library.run(ctypes.c_void_p(self._library.begin()), n, *pointers)
-        return Ran(
+        given = np.ascontiguousarray(readings.values, dtype=self._real)
+        age, dt = (np.ascontiguousarray(a, dtype=np.float64) for a in (readings.age, readings.dt))
+        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, age, dt, said, told)]
+        state = ctypes.c_void_p(self._library.begin())
+        self._library.run(state, n, *pointers)
+        self._library.end(state)
+        return Answers(
             said[:, 0 : 2 * targets : 2],
             said[:, 1 : 2 * targets : 2],
-            told[:, :targets].astype(float),
+            told[:, :targets].astype(int),
             said[:, 2 * targets :],
-            told[:, targets : targets + sensors].astype(float),
+            told[:, targets : targets + sensors].astype(int),
             told[:, -2] == 0,
         )
-
-
-def run_compensator(compensator: Compensator, values: FloatArray, age: FloatArray, dt: FloatArray) -> Ran:
-    """Return what the compensator itself says of the same rows."""
-    tables = gather(compensator)
-    names, targets = [c.name for c in tables.channels], tables.targets
-    state, clock, begun = compensator.start(), 0.0, False
-    rows = []
-    for row, old, passed in zip(values.tolist(), age.tolist(), dt.tolist(), strict=True):
-        good = 0.0 <= passed <= 1e10
-        clock, begun = clock + passed if good and begun else clock, begun or good
-        tick = clock if good else np.nan
-        state, said = compensator.step(state, Reading(tick - old, dict(zip(names, row, strict=True))), tick, None, tick)
-        rows.append(
-            (
-                [said.corrections[t].offset for t in targets],
-                [said.corrections[t].slope for t in targets],
-                [STATUS.index(said.states[t].word) for t in targets],
-                [float(s.deviation) for s in state.models],
-                [WORDS.index(said.failed.get(s, "good")) for s in tables.sensors],
-                not said.rejected,
-            )
-        )
-    columns = [np.array([r[k] for r in rows], dtype=np.float64) for k in range(5)]
-    return Ran(*columns, np.array([r[5] for r in rows], dtype=np.bool_))

@@ -44,6 +44,7 @@ COMMANDS = {
     "volumetric": "Tell the error of the tool's tip at a point and all over the work volume, and what corrections "
     "leave of it.",
     "revise": "Correct an NC program by the drift it will cause, before it is run.",
+    "export": "Write the models of a file as code for another controller, with test vectors and how to use it.",
     "serve": "Run the compensator live: sensors in, corrections out, with a page to watch.",
     "journal": "Tell what a journal of the live compensator holds, or export it as a recording.",
     "linuxcnc": "Write what a LinuxCNC needs to be corrected, and say what to change in its configuration.",

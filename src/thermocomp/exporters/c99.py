@@ -9,8 +9,7 @@ from thermocomp.exporters.cexpression import Clock, Written, number
 from thermocomp.exporters.cstatements import write_functions, write_tables, write_variables
 from thermocomp.exporters.csupport import Supports
 
-_HEADER = """/* {title} */
-#ifndef {guard}
+_HEADER = """{facts}#ifndef {guard}
 #define {guard}
 
 #ifndef TC_REAL
@@ -63,7 +62,7 @@ _CLOCK_TYPE = """typedef struct {{
 
 """
 
-_SOURCE = """#include "{name}.h"
+_SOURCE = """{facts}#include "{name}.h"
 
 #include <math.h>
 
@@ -225,7 +224,7 @@ class Sources:
     source: str
 
 
-def translate(tables: Tables, name: str) -> Sources:
+def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
     """Return a compensator in C99.
 
     What it does with values is what `Compensator.step` does with a reading.
@@ -236,6 +235,8 @@ def translate(tables: Tables, name: str) -> Sources:
         Of the compensator.
     name : str
         Of the files and of all that is in them.
+    facts : sequence of str
+        What stands above them.
 
     Raises
     ------
@@ -248,7 +249,9 @@ def translate(tables: Tables, name: str) -> Sources:
     functions = write_functions(sizes, name, bodies)
     everything = "".join(bodies.values())
     clocks = {c.index: _sizes(c, name) for c in written.clocks}
+    above = "".join(f"/* {_comment(line)} */\n" for line in facts)
     source = _SOURCE.format(
+        facts=above,
         name=name,
         n=n,
         work=write_variables(sizes, "w", functions + "w->value w->age w->dt"),
@@ -276,7 +279,7 @@ def translate(tables: Tables, name: str) -> Sources:
     header = _HEADER.format(
         name=name,
         n=n,
-        title=_comment(f"{', '.join(tables.targets)}: thermal compensation, written by thermocomp"),
+        facts=above,
         guard=f"{name.upper()}_H",
         most=sizes["MOST"],
         inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),

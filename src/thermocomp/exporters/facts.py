@@ -1,0 +1,59 @@
+"""What is said of an exported compensator before anything else: may it run, what it is, where it comes from."""
+
+from dataclasses import dataclass
+
+from thermocomp.runtime.compensator import Compensator
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Where an export comes from.
+
+    Parameters
+    ----------
+    source : str
+        Model file.
+    sha256 : str
+        Of that file.
+    version : str
+        thermocomp version that exports.
+    date : str
+        Of the export.
+    """
+
+    source: str
+    sha256: str
+    version: str
+    date: str
+
+    def lines(self, compensator: Compensator) -> list[str]:
+        """Return what is to be known, the verdict in the first line.
+
+        Parameters
+        ----------
+        compensator : Compensator
+        """
+        found, limits = [_verdict(compensator)], compensator.limits
+        found += [f"{target}: {status.reason}" for target, status in compensator.shadow.items()]
+        taken = {m.honest_error.taken for m in compensator.models if m.honest_error and m.honest_error.taken}
+        found += [f"unproven, taken by {who}" for who in sorted(taken)]
+        return [
+            *found,
+            f"Model: {self.source}, SHA-256 {self.sha256}",
+            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export anew",
+            f"Limits: {limits.in_words()}; nothing older than {limits.reading_age:g} s is used; without a reading a "
+            f"correction stays for {limits.hold:g} s and then goes to zero with a time constant of {limits.fade:g} s",
+            "Sign: a correction [um] is what the controller adds to the commanded position: minus the deviation, which "
+            "is actual minus commanded",
+            "Units: temperatures in degC, spindle speed in 1/min, positions in mm, time in s",
+        ]
+
+
+def _verdict(compensator: Compensator) -> str:
+    shadow, lines = compensator.shadow, compensator.lines
+    if len(shadow) == len(lines):
+        return f"SHADOW ONLY, {', '.join(lines)}: not proven on unseen cycles; all corrections stay zero"
+    running = ", ".join(t for t in lines if t not in shadow)
+    taken = [m for m in compensator.models if m.honest_error and m.honest_error.taken]
+    word = f"{running}: UNPROVEN, taken all the same" if taken else f"{running}: accepted on unseen cycles"
+    return f"{word}; SHADOW ONLY, {', '.join(shadow)}: corrections stay zero" if shadow else word

@@ -1,0 +1,123 @@
+"""Test vectors: readings, faults among them, and what the compensator itself makes of each."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.bounds import GAP
+from thermocomp.core.reading import Reading
+from thermocomp.exporters.block.tables import Tables
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.watch import WORDS
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+#: words of `thermocomp.runtime.state.Status`, as the block counts them
+STATUS = ("restarting", "active", "holding", "fading", "shadow")
+
+
+class Readings(NamedTuple):
+    """What a block is called with."""
+
+    values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
+    age: FloatArray  #: (n_calls,), of the values [s]
+    dt: FloatArray  #: (n_calls,), since the call before [s]
+
+
+class Answers(NamedTuple):
+    """What it says."""
+
+    correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
+    slope: FloatArray  #: (n_calls, n_targets) [um/m]
+    status: IntArray  #: (n_calls, n_targets), by `STATUS`
+    deviation: FloatArray  #: (n_calls, n_models)
+    fault: IntArray  #: (n_calls, n_sensors), by `thermocomp.runtime.watch.WORDS`
+    passed: NDArray[np.bool_]  #: (n_calls,), the reading was used
+
+
+def replay(compensator: Compensator, tables: Tables, readings: Readings) -> Answers:
+    """Return what a compensator says of readings, from its start.
+
+    Parameters
+    ----------
+    compensator : Compensator
+    tables : Tables
+        Of it.
+    readings : Readings
+    """
+    names, targets = [c.name for c in tables.channels], tables.targets
+    state, clock, begun, rows = compensator.start(), 0.0, False, []
+    for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
+        good = 0.0 <= dt <= GAP
+        clock, begun = clock + dt if good and begun else clock, begun or good
+        tick = clock if good else math.nan  # a clock that says nothing moves nothing
+        state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
+        rows.append(
+            (
+                [said.corrections[t].offset for t in targets],
+                [said.corrections[t].slope for t in targets],
+                [STATUS.index(said.states[t].word) for t in targets],
+                [float(s.deviation) for s in state.models],
+                [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors],
+                not said.rejected,
+            )
+        )
+
+    def table(k: int) -> FloatArray:
+        return np.array([r[k] for r in rows], dtype=np.float64).reshape(len(rows), -1)
+
+    passed = np.array([r[5] for r in rows], dtype=np.bool_)
+    return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
+
+
+def make_readings(tables: Tables) -> Readings:
+    """Return readings that take a compensator through all that it does.
+
+    A start at rest, a warm-up at changing speeds, values beyond the trained range, each of them missing, wild or
+    impossible for a while, readings that are late, old or out of order, a source that falls silent until corrections
+    have gone to zero, and a return.
+
+    Parameters
+    ----------
+    tables : Tables
+    """
+    rest = np.array([i.reference + min(max(0.0, i.low), i.high) for i in tables.channels])
+    low = np.array([i.reference + i.low for i in tables.channels])
+    high = np.array([i.reference + i.high for i in tables.channels])
+    heat = np.array([i.quantity == "temperature" for i in tables.channels])
+    age, silent = tables.values["reading_age"], tables.values["hold"] + 3 * tables.values["fade"]
+    rng = np.random.default_rng(0)
+    rows: list[tuple[FloatArray, float, float]] = []
+
+    def add(values: FloatArray, dt: float, old: float = 0.0) -> None:
+        noise = np.where(heat, 0.002 * rng.standard_normal(len(rest)), 0.0)
+        rows.append((np.round(values + noise, 4), old, dt))
+
+    warm = rest
+    for _ in range(45):
+        add(rest, 10.0, 0.5)
+    for k in range(120):  # heat follows what drives it
+        share = (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
+        warm = warm + np.where(heat, 0.06 * (rest + share * (high - rest) - warm), rest + share * (high - rest) - warm)
+        add(warm, 60.0 if k % 3 else 12.0, 0.25)
+    for k in range(24):
+        add(warm + 1.3 * (high - low) * math.sin(k / 4), 20.0)
+    for c in range(len(rest)):
+        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
+            hurt = warm.copy()
+            hurt[c] = wild
+            add(hurt, 15.0)
+        add(warm, 15.0)
+    for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
+        add(warm, 10.0, old)
+    for dt in (math.nan, -1.0, 0.0, 1e6):
+        add(warm, dt)
+    for k in range(min(math.ceil(silent / age), 400)):
+        rows.append((rows[-1][0], age * (k + 1.0), age))
+    for k in range(40):
+        add(warm + (rest - warm) * min(k / 20, 1.0), 60.0)
+    values, ages, steps = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(3))
+    return Readings(values, ages, steps)

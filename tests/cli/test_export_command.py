@@ -1,0 +1,127 @@
+"""`thermocomp export`: what it writes compiles, proves itself, and says what may run."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from driftmodels import ACCEPTED, growing
+from watchedmachine import watched_model
+
+from thermocomp.cli.app import run
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import HonestError
+from thermocomp.files import modelfile
+
+UNPROVEN = replace(ACCEPTED, verdict="unproven", reason="one cycle is not enough")
+REFUSED = replace(ACCEPTED, verdict="refused", reason="worse than nothing")
+CC = shutil.which("gcc") or shutil.which("cc")
+needs_compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+
+
+def written(folder: Path, *models: ErrorModel) -> Path:
+    modelfile.write(models, folder / "model.json")
+    return folder / "model.json"
+
+
+def judged(target: str, verdict: HonestError) -> ErrorModel:
+    return replace(growing(target, 2.0), honest_error=verdict)
+
+
+def prove(folder: Path, *flags: str) -> subprocess.CompletedProcess[str]:
+    """Compile and run as the README of the export says."""
+    line = re.search(r"^    cc (.*) && \./(\S+)$", (folder / "README.md").read_text(), re.M)
+    assert line is not None
+    assert CC is not None
+    strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-fsanitize=address,undefined"]
+    subprocess.run([CC, *strict, *flags, *line[1].split()], cwd=folder, check=True)
+    return subprocess.run([folder / line[2]], capture_output=True, text=True, check=False)
+
+
+@needs_compiler
+@pytest.mark.parametrize("flags", [(), ("-DTC_FLOAT",)])
+def test_what_is_written_proves_itself(tmp_path: Path, flags: tuple[str, ...]) -> None:
+    model = written(tmp_path, watched_model("z_um"), watched_model("x_um"))
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out"), "--dead-band", "0.2"]) == 0
+    done = prove(tmp_path / "out", *flags)
+    assert done.returncode == 0, done.stdout
+    assert ", 0 wrong;" in done.stdout
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("was", "becomes"),
+    [
+        (r"c_rate = TC\(0.1\)", "c_rate = TC(0.11)"),
+        (r"s->clock \+ w->dt", "s->clock + w->dt + 1e-6"),
+        (r"/ TC\(3600.0\)", "/ TC(3700.0)"),
+        (r"c_hold = 1800.0", "c_hold = 1900.0"),
+        (r"s->used\[i\] = w->x\[i\];", "s->used[i] = w->x[i] + TC(1e-6);"),
+    ],
+)
+def test_a_mistake_in_the_code_is_found(tmp_path: Path, was: str, becomes: str) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path), "--name", "mill"]) == 0
+    code = tmp_path / "tc_mill.c"
+    text, count = re.subn(was, becomes, code.read_text())
+    assert count
+    code.write_text(text)
+    done = prove(tmp_path)
+    assert (done.returncode, "call" in done.stdout) == (1, True)
+
+
+def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good, unproven, bad = judged("x_um", ACCEPTED), judged("y_um", UNPROVEN), judged("z_um", REFUSED)
+    model = written(tmp_path, good, unproven, bad)
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().out
+    assert "z_um is left out: worse than nothing" in said
+    first = (tmp_path / "out" / "tc_thermal.c").read_text().splitlines()[0]
+    assert first == "/* x_um: accepted on unseen cycles; SHADOW ONLY, y_um: corrections stay zero */"
+    for name in ("tc_thermal.h", "README.md"):
+        assert first.strip("/* ") in (tmp_path / "out" / name).read_text().splitlines()[0]
+    if CC:
+        assert prove(tmp_path / "out").returncode == 0
+
+    (tmp_path / "alone").mkdir()
+    alone = written(tmp_path / "alone", unproven)
+    assert run(["export", str(alone), "--to", "c99", "-o", str(tmp_path / "shadow")]) == 0
+    assert (tmp_path / "shadow" / "README.md").read_text().startswith("SHADOW ONLY, y_um: not proven")
+    line = ["export", str(alone), "--to", "c99", "-o", str(tmp_path / "taken"), "--accept-unproven", "M. Weber, trial"]
+    assert run(line) == 0
+    assert (tmp_path / "taken" / "README.md").read_text().startswith("y_um: UNPROVEN, taken all the same")
+
+    (tmp_path / "no").mkdir()
+    capsys.readouterr()
+    assert (
+        run(["export", str(written(tmp_path / "no", bad)), "--to", "c99", "-o", str(tmp_path / "none"), "--json"]) == 1
+    )
+    found = json.loads(capsys.readouterr().out)
+    assert (found["files"], found["refused"]) == ([], {"z_um": "worse than nothing"})
+    assert not (tmp_path / "none").exists()
+
+
+def test_the_same_model_gives_the_same_files_and_nothing_is_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    folders = [tmp_path / "a", tmp_path / "b"]
+    for folder in folders:
+        assert run(["export", str(model), "--to", "c99", "-o", str(folder), "--date", "2026-01-31"]) == 0
+    names = sorted(p.name for p in folders[0].iterdir())
+    assert names == ["README.md", "tc_thermal.c", "tc_thermal.h", "tc_thermal_test.c"]
+    assert all((folders[0] / n).read_bytes() == (folders[1] / n).read_bytes() for n in names)
+    capsys.readouterr()
+    assert run(["export", str(model), "--to", "c99", "-o", str(folders[0])]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert run(["export", str(model), "--to", "c99", "-o", str(folders[0]), "--overwrite"]) == 0
+
+
+def test_models_that_average_their_zero_in_different_ways(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = replace(judged("y_um", ACCEPTED), zeroing=watched_model("z_um").zeroing)
+    model = written(tmp_path, judged("x_um", ACCEPTED), other)
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
+    assert "export each file alone" in capsys.readouterr().err
