@@ -32,8 +32,8 @@ def judged(target: str, verdict: HonestError) -> ErrorModel:
 
 
 def prove(folder: Path, *flags: str) -> subprocess.CompletedProcess[str]:
-    """Compile and run as the README of the export says."""
-    line = re.search(r"^    cc (.*) && \./(\S+)$", (folder / "README.md").read_text(), re.M)
+    """Compile and run as the page of the export says."""
+    line = re.search(r"^    cc (.*) && \./(\S+)$", next(folder.glob("tc_*.md")).read_text(), re.M)
     assert line is not None
     assert CC is not None
     strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2", "-fsanitize=address,undefined"]
@@ -57,7 +57,7 @@ def test_what_is_written_proves_itself(tmp_path: Path, flags: tuple[str, ...]) -
     [
         (r"c_rate = TC\(0.1\)", "c_rate = TC(0.11)"),
         (r"s->clock \+ w->dt", "s->clock + w->dt + 1e-6"),
-        (r"/ TC\(3600.0\)", "/ TC(3700.0)"),
+        (r"/ 3600.0\)", "/ 3700.0)"),
         (r"c_hold = 1800.0", "c_hold = 1900.0"),
         (r"s->used\[i\] = w->x\[i\];", "s->used[i] = w->x[i] + TC(1e-6);"),
     ],
@@ -81,7 +81,7 @@ def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.Capture
     assert "z_um is left out: worse than nothing" in said
     first = (tmp_path / "out" / "tc_thermal.c").read_text().splitlines()[0]
     assert first == "/* x_um: accepted on unseen cycles; SHADOW ONLY, y_um: corrections stay zero */"
-    for name in ("tc_thermal.h", "README.md"):
+    for name in ("tc_thermal.h", "tc_thermal.md"):
         assert first.strip("/* ") in (tmp_path / "out" / name).read_text().splitlines()[0]
     if CC:
         assert prove(tmp_path / "out").returncode == 0
@@ -89,10 +89,10 @@ def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.Capture
     (tmp_path / "alone").mkdir()
     alone = written(tmp_path / "alone", unproven)
     assert run(["export", str(alone), "--to", "c99", "-o", str(tmp_path / "shadow")]) == 0
-    assert (tmp_path / "shadow" / "README.md").read_text().startswith("SHADOW ONLY, y_um: not proven")
+    assert (tmp_path / "shadow" / "tc_thermal.md").read_text().startswith("SHADOW ONLY, y_um: not proven")
     line = ["export", str(alone), "--to", "c99", "-o", str(tmp_path / "taken"), "--accept-unproven", "M. Weber, trial"]
     assert run(line) == 0
-    assert (tmp_path / "taken" / "README.md").read_text().startswith("y_um: UNPROVEN, taken all the same")
+    assert (tmp_path / "taken" / "tc_thermal.md").read_text().startswith("y_um: UNPROVEN, taken all the same")
 
     (tmp_path / "no").mkdir()
     capsys.readouterr()
@@ -112,7 +112,7 @@ def test_the_same_model_gives_the_same_files_and_nothing_is_overwritten(
     for folder in folders:
         assert run(["export", str(model), "--to", "c99", "-o", str(folder), "--date", "2026-01-31"]) == 0
     names = sorted(p.name for p in folders[0].iterdir())
-    assert names == ["README.md", "tc_thermal.c", "tc_thermal.h", "tc_thermal_test.c"]
+    assert names == ["tc_thermal.c", "tc_thermal.h", "tc_thermal.md", "tc_thermal_test.c"]
     assert all((folders[0] / n).read_bytes() == (folders[1] / n).read_bytes() for n in names)
     capsys.readouterr()
     assert run(["export", str(model), "--to", "c99", "-o", str(folders[0])]) == 2

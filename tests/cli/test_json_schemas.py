@@ -153,6 +153,11 @@ def test_a_linuxcnc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert held("linuxcnc", capsys, "setup", str(write_linuxcnc_mill(tmp_path)))["todo"]
 
 
+def test_an_export(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = held("export", capsys, "model.json", "--to", "c99", "-o", "out")
+    assert (len(found["files"]), found["refused"]) == (4, {})
+
+
 def test_a_revision(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert held("revise", capsys, "part.ngc", "--model", "model.json", "--cold", "-o", "out.ngc")["axes"]
 

@@ -40,6 +40,7 @@ WRITING = {
     "adapters/linuxcnc/halsetup.py",
     "adapters/linuxcnc/expansion/expand.py",
     "api/revision/job.py",
+    "cli/export.py",
     "cli/map.py",
     "cli/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",

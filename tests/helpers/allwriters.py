@@ -125,6 +125,15 @@ def _linuxcnc(folder: Path, version: int) -> None:
         halsetup.set_up(ini, folder, HalSettings(rate=1.0 + version), overwrite=True)
 
 
+def _export(folder: Path, version: int) -> None:
+    model = _inputs(PLATE, version) / "model.json"
+    line = ["export", str(model), "--to", "c99", "-o", str(folder), "--date", "2026-01-31", "--overwrite"]
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as told:
+        code = run(line)
+    if code:
+        raise InputError(told.getvalue())
+
+
 def _test(folder: Path, version: int) -> None:
     speed = 1000.0 + version
     trial = Trial("run", speed, ((0.0, 900.0), (speed, 7200.0)))
@@ -163,5 +172,6 @@ WRITERS: dict[str, Writer] = {
     ),
     "program": _revise("linuxcnc"),
     "program written out": _revise("fanuc"),
+    "export": Writer(_export, ("tc_thermal.c", "tc_thermal.h", "tc_thermal.md", "tc_thermal_test.c"), "tc_thermal.md"),
     "thermal test": Writer(_test, ("test.csv", "test.ngc", "test.png"), "test.ngc"),
 }

@@ -101,5 +101,5 @@ def export(
         if texts:
             console.print(words(next(iter(texts.values())).split("\n", 1)[0].strip("/* ")), soft_wrap=True)
             console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
-            console.print(words(f"Prove it as {output / 'README.md'} says."), soft_wrap=True)
+            console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
     return 1 if refused else 0

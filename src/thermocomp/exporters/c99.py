@@ -1,6 +1,7 @@
 """C99: a compensator as one header and one source, without allocation and without globals."""
 
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -288,7 +289,14 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
         state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside"),
         memory="".join(memory),
     )
-    return Sources(name, header, source)
+    return Sources(name, header, "".join(_wrapped(line) for line in source.splitlines(keepends=True)))
+
+
+def _wrapped(line: str) -> str:
+    """Return a long line as several: a compiler need not take more than 4,095 characters."""
+    if len(line) <= 200:
+        return line
+    return textwrap.fill(line, 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def _body(tables: Tables, written: Written, supports: Supports, when: str) -> str:

@@ -82,7 +82,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
         f"{name}_test.c": write_test(name, tables, readings, answers),
-        "README.md": _readme(compensator, tables, name, said, len(readings.age)),
+        f"{name}.md": _readme(compensator, tables, name, said, len(readings.age)),
     }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.vectors import Answers, Readings
 
-_PROGRAM = """/* runs {name}.c over its test vectors: README.md says how */
+_PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
 #include "{name}.h"
 
 #include <math.h>

@@ -7,7 +7,15 @@ from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
 
 
 def blame(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Take out of use what failed: two that are swapped if that explains all, and better than one; or each alone."""
+    """Take out of use what failed: two that are swapped if that explains all, and better than one; or each alone.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    elapsed : float
+        Since the last look [s].
+    """
     for i in range(t.SENSORS):
         w.able[i] = w.calm[i] or w.waiting[i]
         if not w.able[i]:
@@ -95,7 +103,15 @@ def weigh_one(s: Names, w: Names, t: Names) -> None:
 
 
 def weigh_swaps(s: Names, w: Names, t: Names, counts: float) -> None:
-    """Weigh whether two sensors have been swapped since the start, and find the two whose exchange leaves least."""
+    """Weigh whether two sensors have been swapped since the start, and find the two whose exchange leaves least.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    counts : float
+        Time that counts as evidence [s].
+    """
     differ(s, w, t)
     w.both = -1
     w.both_rest = 0.0

@@ -93,7 +93,15 @@ def check(s: Names, w: Names, t: Names) -> None:
 
 
 def check_start(s: Names, w: Names, t: Names, g: int) -> None:
-    """Say whether the temperatures of a model are those of a machine that starts."""
+    """Say whether the temperatures of a model are those of a machine that starts.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    g : int
+        Of the sets of ranges.
+    """
     w.rows = 0
     for m in range(t.set_begin[g], t.set_begin[g + 1]):
         r = t.set_range[m]
@@ -186,7 +194,15 @@ def gather(s: Names, w: Names, t: Names) -> None:
 
 
 def drive(s: Names, w: Names, t: Names, k: int) -> None:
-    """Move a correction to where its models want it, as far as the limits allow at both ends of the travel."""
+    """Move a correction to where its models want it, as far as the limits allow at both ends of the travel.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    k : int
+        Of the target.
+    """
     w.offset = 0.0
     w.tilt = 0.0
     for m in range(t.line_begin[k], t.line_begin[k + 1]):
@@ -213,7 +229,15 @@ def drive(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def idle(s: Names, w: Names, t: Names, k: int) -> None:
-    """Let a correction that nothing drives stay, and go to zero once it was held for long."""
+    """Let a correction that nothing drives stay, and go to zero once it was held for long.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    k : int
+        Of the target.
+    """
     s.idle[k] = s.idle[k] + w.travel
     if s.idle[k] > t.hold:
         s.status[k] = FADING
@@ -231,7 +255,17 @@ def idle(s: Names, w: Names, t: Names, k: int) -> None:
 
 
 def limit(wanted: float, current: float, travel: float, magnitude: float, rate: float, band: float) -> float:
-    """Return a correction after a move towards where it is wanted: no further, no faster, and not for a trifle [um]."""
+    """Return a correction after a move towards where it is wanted: no further, no faster, and not for a trifle [um].
+
+    Parameters
+    ----------
+    wanted, current : float
+        [um]
+    travel : float
+        Time it has had to move [s].
+    magnitude, rate, band : float
+        Of `thermocomp.core.correction.Limits`.
+    """
     aim = larger(-magnitude, smaller(magnitude, wanted))
     moved = current
     if travel > 0.0 and abs(aim - current) > band:

@@ -160,7 +160,15 @@ def look(s: Names, w: Names, t: Names) -> None:
 
 
 def find_jumps(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Find jumps, those that were spikes, and those that last."""
+    """Find jumps, those that were spikes, and those that last.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    elapsed : float
+        Since the last look [s].
+    """
     for i in range(t.SENSORS):
         slack = t.jump_limit[i]
         if elapsed > t.pace:
@@ -179,7 +187,15 @@ def find_jumps(s: Names, w: Names, t: Names, elapsed: float) -> None:
 
 
 def advance(s: Names, w: Names, t: Names, elapsed: float) -> None:
-    """Advance the lags of the temperatures and the states of the speed."""
+    """Advance the lags of the temperatures and the states of the speed.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    elapsed : float
+        Since the last look [s].
+    """
     for k in range(t.SPEEDS):
         w.change[t.speed_input[k]] = w.value[t.watch_channel[t.speed_input[k]]] - s.watch_zero[t.speed_input[k]]
     calm_down(s, w, t)
@@ -251,7 +267,15 @@ def believe_again(s: Names, w: Names, t: Names) -> None:
 
 
 def judge(s: Names, w: Names, t: Names, k: int) -> None:
-    """Hold a correction whose models were not judged without the sensors that failed, or do harm without them."""
+    """Hold a correction whose models were not judged without the sensors that failed, or do harm without them.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    k : int
+        Of the target.
+    """
     for m in range(t.line_begin[k], t.line_begin[k + 1]):
         lost = 0
         allowed = True
