@@ -20,11 +20,12 @@ demo: $(VENV)/.study
 	$(BIN)/thermocomp demo --output demo --overwrite
 
 test: $(VENV)/.dev
-	scripts/system_packages.sh chromium gcc libc6-dev linuxcnc-uspace mosquitto
+	scripts/system_packages.sh chromium clang gcc gcc-arm-none-eabi libc6-dev libclang-rt-dev libnewlib-arm-none-eabi linuxcnc-uspace \
+		mosquitto qemu-system-arm
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev
-	scripts/system_packages.sh linuxcnc-uspace mosquitto
+	scripts/system_packages.sh gcc libc6-dev linuxcnc-uspace mosquitto
 	HYPOTHESIS_PROFILE=thorough $(BIN)/python -m pytest -n 2 --dist loadfile -m long
 	$(BIN)/python -m pytest -m hours -rP
 

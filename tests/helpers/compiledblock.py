@@ -77,6 +77,8 @@ class CompiledBlock:
             sensors=counts[3],
         )
         (folder / "driver.c").write_text(text, encoding="ascii")
+        if compiler == "clang":  # its run-time library is for programs alone
+            flags = ["-fsanitize-trap=undefined" if f == "-fno-sanitize-recover" else f for f in flags]
         library = folder / "block.so"
         for code in (sources.name, "driver"):
             strict = FLAGS if code == sources.name else ("-O2",)

@@ -1,10 +1,12 @@
 """All files of an export to C99: the code, its test, and how to use it."""
 
+import numpy as np
+
 from thermocomp.exporters.block.tables import Tables, gather
 from thermocomp.exporters.c99 import translate
 from thermocomp.exporters.ctest import write_test
 from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.vectors import make_readings, replay
+from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 _README = """{facts}
@@ -81,9 +83,17 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     return {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(name, tables, readings, answers),
+        f"{name}_test.c": write_test(name, tables, readings, answers, _single(compensator, tables, readings, answers)),
         f"{name}.md": _readme(compensator, tables, name, said, len(readings.age)),
     }
+
+
+def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
+    """Return how far single precision may be off: a model whose terms cancel makes much of a rounded temperature."""
+    with np.errstate(over="ignore"):  # what is that large is no reading
+        rounded = readings._replace(values=readings.values.astype(np.float32).astype(np.float64))
+    moved = np.abs(replay(compensator, tables, rounded).correction - answers.correction)
+    return max(1e-5, 10.0 * float((moved / np.maximum(1.0, np.abs(answers.correction))).max(initial=0.0)))
 
 
 def _readme(compensator: Compensator, tables: Tables, name: str, facts: list[str], calls: int) -> str:

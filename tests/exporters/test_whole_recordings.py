@@ -1,0 +1,181 @@
+"""Whole recordings through the C code, and a million readings of sensors that fail in every way."""
+
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compiledblock import COMPILERS, CompiledBlock
+from driftmodels import ACCEPTED
+from numpy.typing import NDArray
+from watchedmachine import LOST, failing, watched_model
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.model import ErrorModel
+from thermocomp.datasets import virtual
+from thermocomp.exporters.cpackage import write_package
+from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.vectors import Answers, Readings, replay
+from thermocomp.files.recordings import read
+from thermocomp.models.training import train
+from thermocomp.models.watching import find_watch
+from thermocomp.recording.recording import Recording
+from thermocomp.recording.stacking import stack
+from thermocomp.runtime.compensator import Compensator
+
+FloatArray = NDArray[np.float64]
+Damage = Callable[[FloatArray, np.random.Generator], None]
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+
+def count_apart(one: Answers, other: Answers) -> tuple[int, float]:
+    """Return in how many calls a decision differs, and the largest difference of what goes out, by its size."""
+    decisions = (one.passed != other.passed) | (one.status != other.status).any(axis=1)
+    decisions |= (one.fault != other.fault).any(axis=1)
+    apart = [
+        np.abs(a - b) / np.maximum(1.0, np.abs(a))
+        for a, b in ((one.correction, other.correction), (one.slope, other.slope))
+    ]
+    assert all(np.isfinite(a).all() for a in apart)
+    return int(decisions.sum()), float(max(a.max() for a in apart))
+
+
+def models_of(recording: Recording, targets: list[str], method: str) -> list[ErrorModel]:
+    """Fit to everything, with a watch; they may run without every single sensor."""
+    samples = stack([recording], targets)
+    every = np.ones(len(samples), np.bool_)
+    watch = find_watch(samples, every)
+    assert watch is not None
+    judged = replace(ACCEPTED, lost=dict.fromkeys(watch.names, 2.0))
+    return [
+        replace(train(method, samples, k, every).model, watch=watch, honest_error=judged) for k in range(len(targets))
+    ]
+
+
+def spoiled(rows: FloatArray, seed: int) -> FloatArray:
+    """Return readings in which sensors fail one after the other, each in a way of its own."""
+    rng, table = np.random.default_rng(seed), rows.copy()
+    for damage in rng.permutation(np.array(DAMAGES, dtype=object))[: rng.integers(0, 4)]:
+        damage(table, rng)
+    return table
+
+
+def _sensor(rows: FloatArray, rng: np.random.Generator) -> tuple[slice, int]:
+    begin = int(rng.integers(0, len(rows)))
+    return slice(begin, begin + int(rng.integers(1, len(rows)))), int(rng.integers(0, rows.shape[1]))
+
+
+def _missing(rows: FloatArray, rng: np.random.Generator) -> None:
+    rows[_sensor(rows, rng)] = np.nan
+
+
+def _stuck(rows: FloatArray, rng: np.random.Generator) -> None:
+    span, k = _sensor(rows, rng)
+    rows[span, k] = rows[span.start, k]
+
+
+def _stepped(rows: FloatArray, rng: np.random.Generator) -> None:
+    rows[_sensor(rows, rng)] += rng.normal(0.0, 5.0)
+
+
+def _drifting(rows: FloatArray, rng: np.random.Generator) -> None:
+    span, k = _sensor(rows, rng)
+    rows[span, k] += np.linspace(0.0, rng.normal(0.0, 8.0), len(rows[span, k]))
+
+
+def _swapped(rows: FloatArray, rng: np.random.Generator) -> None:
+    a, b = rng.choice(rows.shape[1] - 1, 2, replace=False)
+    rows[:, [a, b]] = rows[0, [a, b]] + (rows - rows[0])[:, [b, a]]
+
+
+def _wild(rows: FloatArray, rng: np.random.Generator) -> None:
+    hit = rng.random(rows.shape) < 0.01
+    rows[hit] = rng.choice([np.nan, np.inf, -np.inf, 85.0, -127.0, 1e308, 0.0, 65535.0, -1e9], hit.sum())
+
+
+DAMAGES: list[Damage] = [_missing, _stuck, _stepped, _drifting, _swapped, _wild]
+
+
+def readings_of(recording: Recording, block: CompiledBlock) -> Readings:
+    rows = recording.table[[c.name for c in block.tables.channels]].to_numpy(dtype=np.float64)
+    return Readings(rows, np.zeros(len(rows)), np.diff(recording.time, prepend=recording.time[0]))
+
+
+def check_recording(recording: Recording, targets: list[str], method: str, folder: Path, every: int = 1) -> None:
+    """Run a recording as it is, and with sensors that fail, through a compensator and its code."""
+    compensator = Compensator.of(models_of(recording, targets, method), Limits(rate=0.5))
+    (folder / "double").mkdir()
+    (folder / "single").mkdir()
+    double = CompiledBlock(compensator, folder / "double")
+    single = CompiledBlock(compensator, folder / "single", flags=("-DTC_FLOAT",))
+    whole = readings_of(recording, double)
+    whole = Readings(whole.values[::every], whole.age[::every], every * whole.dt[::every])
+    for seed in range(3):
+        readings = whole._replace(values=spoiled(whole.values, seed) if seed else whole.values)
+        said = replay(compensator, double.tables, readings)
+        decisions, apart = count_apart(said, double.run(readings))
+        assert decisions == 0
+        assert apart < 1e-12
+        assert seed or np.abs(said.correction).max() > 5.0
+        decisions, apart = count_apart(said, single.run(readings))
+        assert decisions == 0
+        assert apart < (3e-5 if method == "averaged" else 5e-4)  # a temperature in single precision is off by 1e-6 degC
+
+
+@pytest.mark.parametrize("flags", [[], ["-DTC_FLOAT"]])
+def test_the_vectors_of_a_model_whose_terms_cancel(shared_data: Path, tmp_path: Path, flags: list[str]) -> None:
+    recording = read(shared_data / "fl_thermal" / "recording.csv")
+    targets = [c.name for c in recording.channels if c.quantity == "displacement"][:1]
+    compensator = Compensator.of(models_of(recording, targets, "mra"))
+    for name, text in write_package(compensator, "mra", Facts("model.json", "", "0", "2026-01-31")).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    code = ["tc_mra.c", "tc_mra_test.c", "-lm", "-o", "mra"]
+    subprocess.run([COMPILERS[0], "-std=c99", "-O2", *flags, *code], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "mra"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("method", ["averaged", "mra"])
+def test_fl_thermal_with_faults(shared_data: Path, tmp_path: Path, method: str) -> None:
+    recording = read(shared_data / "fl_thermal" / "recording.csv")
+    targets = [c.name for c in recording.channels if c.quantity == "displacement"][:2]
+    check_recording(recording, targets, method, tmp_path)
+
+
+def test_the_virtual_machine_with_faults(tmp_path: Path) -> None:
+    check_recording(virtual.record("demo")[0], ["z_um", "y1_um"], "averaged", tmp_path, every=3)
+
+
+@pytest.mark.long
+def test_a_million_readings_of_sensors_that_fail(tmp_path: Path) -> None:
+    """1,250 days of 800 readings; no decision differs, and nothing moves beyond its limits."""
+    limits = Limits(magnitude=15.0, rate=0.05, dead_band=0.1, hold=600.0, fade=600.0)
+    model = watched_model("z_um")
+    assert model.honest_error is not None
+    assert set(model.honest_error.lost) == set(LOST)
+    compensator = Compensator.of([model], limits)
+    block, rng = CompiledBlock(compensator, tmp_path), np.random.default_rng(7)
+    day, calls, most, statuses, faults = failing(), 0, 0.0, set[int](), set[int]()
+    whole = readings_of(day, block)
+    for seed in range(1250):
+        dt = whole.dt * rng.choice([0.1, 0.5, 1.0])
+        odd = rng.random(len(dt)) < 0.01
+        dt[odd] = rng.choice([np.nan, -1.0, 0.0, 1e3, 1e12, np.inf], odd.sum())
+        age = np.where(rng.random(len(dt)) < 0.01, rng.choice([100.0, -3.0, np.nan, 30.0, 59.9], len(dt)), 0.2)
+        readings = Readings(spoiled(whole.values, seed), age, dt)
+        said, code = replay(compensator, block.tables, readings), block.run(readings)
+        decisions, apart = count_apart(said, code)
+        assert decisions == 0, seed
+        most, calls = max(most, apart), calls + len(dt)
+        moved = np.abs(np.diff(code.correction[:, 0], prepend=0.0))
+        assert (np.abs(code.correction) <= 15.0).all()
+        assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()
+        statuses |= set(code.status.ravel().tolist())
+        faults |= set(code.fault.ravel().tolist())
+    assert calls == 1_000_000
+    assert most < 1e-12
+    assert statuses == {0, 1, 2, 3}
+    assert faults == {0, 1, 2, 3, 4, 5}
