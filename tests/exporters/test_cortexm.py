@@ -27,7 +27,7 @@ def test_its_vectors_pass_on_a_cortex_m7(tmp_path: Path, precision: list[str]) -
     compensator = Compensator.of([watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2))
     texts = write_package(compensator, "mill", Facts("model.json", "", "0", "2026-01-31"))
     for name, text in texts.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+        (tmp_path / name).write_bytes(text)
     board = ["-T", str(BOARD / "memory.ld"), str(BOARD / "startup.c")]
     code = ["tc_mill.c", "tc_mill_test.c", "-lm", "-o", "mill.elf"]
     subprocess.run(["arm-none-eabi-gcc", *STRICT, *precision, *TARGET, *board, *code], cwd=tmp_path, check=True)

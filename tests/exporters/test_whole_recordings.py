@@ -131,7 +131,7 @@ def test_the_vectors_of_a_model_whose_terms_cancel(shared_data: Path, tmp_path: 
     targets = [c.name for c in recording.channels if c.quantity == "displacement"][:1]
     compensator = Compensator.of(models_of(recording, targets, "mra"))
     for name, text in write_package(compensator, "mra", Facts("model.json", "", "0", "2026-01-31")).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+        (tmp_path / name).write_bytes(text)
     code = ["tc_mra.c", "tc_mra_test.c", "-lm", "-o", "mra"]
     subprocess.run([COMPILERS[0], "-std=c99", "-O2", *flags, *code], cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "mra"], capture_output=True, text=True, check=False)

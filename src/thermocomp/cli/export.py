@@ -1,5 +1,6 @@
 """`thermocomp export`: a model file as code for another controller, with its proof."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -12,17 +13,22 @@ from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters.cpackage import write_package
+from thermocomp.exporters import cpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
+
+Target = Literal["c99"]
+
+#: all files of an export by their names, the page how to use it the last
+WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {"c99": cpackage.write_package}
 
 
 def export(
     model: Path,
     /,
     *,
-    to: Literal["c99"],  # noqa: ARG001 - there is one
+    to: Target,
     output: Output,
     name: str = "thermal",
     hold: float = 1800.0,
@@ -75,7 +81,7 @@ def export(
     models = [m.taken(accept_unproven) for m in modelfile.read(model)]
     refused = [m for m in models if m.honest_error is not None and m.honest_error.word == "refused"]
     left = [m for m in models if m not in refused]
-    texts: dict[str, str] = {}
+    texts: dict[str, bytes] = {}
     if left:
         limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
         facts = Facts(
@@ -84,13 +90,13 @@ def export(
             __version__,
             date or datetime.now(UTC).astimezone().date().isoformat(),
         )
-        texts = write_package(Compensator.of(left, limits, watching=True), name, facts)
+        texts = WRITERS[to](Compensator.of(left, limits, watching=True), name, facts)
         if output.exists() and not output.is_dir():
             raise InputError(f"{output}: is no folder")
         output.mkdir(parents=True, exist_ok=True)
         with drafts([output / file for file in texts], overwrite=overwrite) as written:
             for file, text in texts.items():
-                written[output / file].write_text(text, encoding="utf-8")
+                written[output / file].write_bytes(text)
             written.publish()
     reasons = {m.target: m.honest_error.reason for m in refused if m.honest_error is not None}
     if json:
@@ -99,7 +105,7 @@ def export(
         for target, why in reasons.items():
             console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
         if texts:
-            console.print(words(next(iter(texts.values())).split("\n", 1)[0].strip("/* ")), soft_wrap=True)
+            console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
             console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
             console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
     return 1 if refused else 0

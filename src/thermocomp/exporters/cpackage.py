@@ -60,8 +60,8 @@ controller must not compensate for temperature itself at the same time.
 """
 
 
-def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, str]:
-    """Return the texts of all files by their names.
+def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
+    """Return all files by their names.
 
     Parameters
     ----------
@@ -80,12 +80,13 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
     name = sources.name
-    return {
+    texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
         f"{name}_test.c": write_test(name, tables, readings, answers, _single(compensator, tables, readings, answers)),
         f"{name}.md": _readme(compensator, tables, name, said, len(readings.age)),
     }
+    return {file: text.encode() for file, text in texts.items()}
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
