@@ -73,3 +73,80 @@ def larger(one: float, other: float) -> float:
 def follow(lag: float, value: float, paces: float) -> float:
     """Return a first-order lag so many time constants later."""
     return lag - math.expm1(-paces) * (value - lag)
+
+
+def clip(value: float, low: float, high: float) -> float:
+    """Return a value between two bounds."""
+    return low if value < low else high if value > high else value
+
+
+def find_linear(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
+    """Look a value up in a table of straight lines, constant beyond its ends: `found`.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    at : float
+        Where.
+    first, end : int
+        Points of the table.
+    """
+    find_place(s, w, t, at, first, end)
+    k = w.place
+    if k == first:
+        w.found = t.table_y[first]
+    elif k == end:
+        w.found = t.table_y[end - 1]
+    else:
+        rise = (t.table_y[k] - t.table_y[k - 1]) / (t.table_x[k] - t.table_x[k - 1])
+        w.found = t.table_y[k - 1] + rise * (at - t.table_x[k - 1])
+
+
+def find_step(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
+    """Look a value up in a table of stairs: `found`.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    at : float
+        Where.
+    first, end : int
+        Points of the table, the last beyond everything.
+    """
+    find_place(s, w, t, at, first, end)
+    w.found = t.table_y[w.place]
+
+
+def find_place(s: Names, w: Names, t: Names, at: float, first: int, end: int) -> None:
+    """Leave the first point of a table that is beyond a value in `place`.
+
+    Parameters
+    ----------
+    s, w, t : Names
+        Variables that are kept, worked out anew, and known.
+    at : float
+        The value.
+    first, end : int
+        Points of the table.
+    """
+    w.place = first
+    going = True
+    while going:
+        going = False
+        if w.place < end:
+            if t.table_x[w.place] <= at:
+                w.place = w.place + 1
+                going = True
+
+
+def exp_less_one(x: float) -> float:
+    """Return exp(x) - 1, as exactly for a small x: of a language that has none."""
+    small = x * (1.0 + x / 2.0 * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0)))))
+    return small if abs(x) < 0.01 else math.exp(x) - 1.0
+
+
+def power(base: float, exponent: float) -> float:
+    """Return a power of a number that is not negative, the exponent being positive: of a language that has none."""
+    return 0.0 if base <= 0.0 else math.exp(exponent * math.log(base))

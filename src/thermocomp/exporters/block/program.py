@@ -4,11 +4,12 @@ import ast
 import inspect
 from collections.abc import Mapping
 from functools import cache
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import NamedTuple
 
-from thermocomp.exporters.block import blaming, formulas, numbers, steps, watching
+from thermocomp.exporters.block import blaming, clocks, distances, formulas, numbers, steps, watching
 from thermocomp.exporters.block.layout import STATE, TABLES, WATCH, WATCH_WORK, WORK, Kind, Var
+from thermocomp.exporters.block.tables import Tables
 
 #: variables by the name of what they are in
 VARIABLES: dict[str, dict[str, Var]] = {"s": STATE | WATCH, "w": WORK | WATCH_WORK, "t": TABLES}
@@ -39,7 +40,7 @@ class Function(NamedTuple):
 
 @cache
 def _all() -> dict[str, Function]:
-    modules: tuple[ModuleType, ...] = (numbers, formulas, blaming, watching, steps)
+    modules: tuple[ModuleType, ...] = (numbers, distances, clocks, blaming, watching, steps)
     return {
         node.name: Function(node.name, node, vars(module))
         for module in modules
@@ -53,26 +54,38 @@ def called(node: ast.Call) -> str:
     return node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id  # type: ignore[attr-defined]
 
 
-def functions(sizes: Mapping[str, int]) -> list[Function]:
+def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> list[Function]:
     """Return the functions that a block needs, each behind those that it calls; `step` is the last.
 
     Parameters
     ----------
-    sizes : mapping of str to int
-        Of `Tables`: an ``if`` that one of them decides is decided here.
+    tables : Tables
+        Of the compensator: an ``if`` that one of their sizes decides is decided here.
+    own : mapping of str to str
+        Functions of the block that stand for those of a library, by the names of these.
     """
+    known = _all() | {name: _made(name, text) for name, text in tables.formulas.items()}
+    known |= {name: known[of]._replace(name=name) for name, of in own.items()}
     found: dict[str, Function] = {}
 
     def add(name: str) -> None:
-        function = _all()[name]
-        tree = _Decided(sizes).visit(ast.parse(ast.unparse(function.tree)).body[0])
+        function = known[name]
+        tree = _Decided(tables.sizes).visit(ast.parse(ast.unparse(function.tree)).body[0])
         for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and called(node) in _all() and called(node) not in found:
+            if isinstance(node, ast.Call) and called(node) in known and called(node) not in found:
                 add(called(node))
         found[name] = function._replace(tree=tree)
 
     add("step")
     return list(found.values())
+
+
+def _made(name: str, text: str) -> Function:
+    tree = ast.parse(text).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    about = ast.Expr(ast.Constant(inspect.getdoc(getattr(formulas, name)) or ""))
+    tree.body.insert(0, about)
+    return Function(name, tree, {})
 
 
 class _Decided(ast.NodeTransformer):
@@ -145,7 +158,7 @@ def _in_order(node: ast.AST) -> list[ast.AST]:
 
 
 #: of the parameters of functions
-PARAMETER: dict[str, Kind] = {"int": "int", "float": "real"}
+PARAMETER: dict[str, Kind] = {"int": "int", "float": "real", "bool": "bool"}
 
 
 def parameters_of(function: Function) -> dict[str, Kind]:

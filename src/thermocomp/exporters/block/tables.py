@@ -11,6 +11,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import MOST
+from thermocomp.exporters.block.models import Formulas
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 
@@ -28,16 +29,7 @@ class Tables(NamedTuple):
     models: tuple[ErrorModel, ...]
     sizes: dict[str, int]  #: by the names in the dimensions of the variables, and what the block does without
     values: dict[str, Any]  #: numbers, or nested lists of them, by the names of `layout.TABLES`
-
-    def formula(self, model: ErrorModel) -> Node:
-        """Return what a model computes, its inputs being numbered as the ranges are."""
-        low, high, _ = model.bounds
-        leaves = (Leaf(self.ranges.index(i), i.name) for i in model.inputs)
-        return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
-
-    def waits(self, model: ErrorModel) -> bool:
-        """Return whether a model counts from the start."""
-        return any(i.rezero for i in model.inputs)
+    formulas: dict[str, str]  #: functions that are made of the models' formulas, in Python
 
 
 def gather(compensator: Compensator) -> Tables:
@@ -84,6 +76,12 @@ def gather(compensator: Compensator) -> Tables:
         **_judged(models, sensors),
         **_watch(watch, place),
     }
+    formulas = Formulas(ranges, values["channel"])
+    for name, waits in (("absolute", False), ("rezeroed", True)):
+        mine = [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
+        formulas.add(name, [(k, m, _formula(m, ranges)) for k, m in mine])
+    own_sizes, own_values = formulas.finish()
+    values |= own_values
     sizes = {
         "CHANNELS": len(channels),
         "RANGES": len(ranges),
@@ -101,8 +99,16 @@ def gather(compensator: Compensator) -> Tables:
         "has_zero": int(any(values["model_rezeroed"])),
         "has_absolute": int(not all(values["model_rezeroed"])),
         **_watch_sizes(watch),
+        **own_sizes,
     }
-    return Tables(channels, ranges, sensors, tuple(lines), models, sizes, values)
+    return Tables(channels, ranges, sensors, tuple(lines), models, sizes, values, formulas.functions)
+
+
+def _formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
+    """Return what a model computes, its inputs being numbered as the ranges are."""
+    low, high, _ = model.bounds
+    leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)
+    return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
 
 
 def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: dict[str, int]) -> dict[str, Any]:
