@@ -13,15 +13,19 @@ from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters import cpackage
+from thermocomp.exporters import cpackage, stpackage
 from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.ststatements import Dialect
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99"]
+Target = Literal["c99", "st"]
 
 #: all files of an export by their names, the page how to use it the last
-WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {"c99": cpackage.write_package}
+WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
+    "c99": cpackage.write_package,
+    "st": stpackage.write_package,
+}
 
 
 def export(
@@ -31,6 +35,7 @@ def export(
     to: Target,
     output: Output,
     name: str = "thermal",
+    dialect: Dialect | None = None,
     hold: float = 1800.0,
     fade: float = 3600.0,
     reading_age: float = 60.0,
@@ -50,12 +55,15 @@ def export(
     ----------
     model : Path
         Model file from ``thermocomp fit``.
-    to : {'c99'}
-        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer.
+    to : {'c99', 'st'}
+        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st is a function block
+        in structured text, IEC 61131-3.
     output : Path
         Folder to write into.
     name : str
         Of the files and functions, behind tc_.
+    dialect : {'codesys', 'twincat', 'scl'}
+        Of structured text; codesys if not given.
     hold : float
         So long a correction stays without a usable reading [s].
     fade : float
@@ -78,6 +86,8 @@ def export(
     int
         0 done, 1 a model was refused and left out, 2 unusable input.
     """
+    if dialect is not None and to != "st":
+        raise InputError(f"--dialect {dialect}: is of --to st alone")
     models = [m.taken(accept_unproven) for m in modelfile.read(model)]
     refused = [m for m in models if m.honest_error is not None and m.honest_error.word == "refused"]
     left = [m for m in models if m not in refused]
@@ -90,7 +100,8 @@ def export(
             __version__,
             date or datetime.now(UTC).astimezone().date().isoformat(),
         )
-        texts = WRITERS[to](Compensator.of(left, limits, watching=True), name, facts)
+        made = Compensator.of(left, limits, watching=True)
+        texts = stpackage.write_package(made, name, facts, dialect) if dialect else WRITERS[to](made, name, facts)
         if output.exists() and not output.is_dir():
             raise InputError(f"{output}: is no folder")
         output.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,7 @@ from thermocomp.exporters.block.tables import Tables, gather
 from thermocomp.exporters.c99 import translate
 from thermocomp.exporters.ctest import write_test
 from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.pages import describe
 from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
@@ -48,9 +49,7 @@ Call it in a cycle, every second or ten, with the time since the call before, me
 |---|---|---|
 {corrections}
 
-{zero} `state.status[k]` says how a correction is: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow; `state.rejected`
-why a reading was not used: 0 it was, 1 its time, 2 a value missing or not plausible, 3 no start of a machine;
-`state.outside` how many inputs are beyond the trained range.{sensors}
+{zero} {status}{sensors}
 
 ## Switch it off
 
@@ -84,7 +83,9 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
         f"{name}_test.c": write_test(name, tables, readings, answers, _single(compensator, tables, readings, answers)),
-        f"{name}.md": _readme(compensator, tables, name, said, len(readings.age)),
+        f"{name}.md": _README.format(
+            facts="  \n".join(said), name=name, calls=len(readings.age), **describe(compensator, tables, "state.")
+        ),
     }
     return {file: text.encode() for file, text in texts.items()}
 
@@ -95,37 +96,3 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
         rounded = readings._replace(values=readings.values.astype(np.float32).astype(np.float64))
     moved = np.abs(replay(compensator, tables, rounded).correction - answers.correction)
     return max(1e-5, 10.0 * float((moved / np.maximum(1.0, np.abs(answers.correction))).max(initial=0.0)))
-
-
-def _readme(compensator: Compensator, tables: Tables, name: str, facts: list[str], calls: int) -> str:
-    slopes = any(tables.values["to_slope"])
-    zeroing = compensator.models[0].zeroing
-    zero = (
-        f"Temperatures count from the mean over the first {zeroing.otherwise:g} s, or over {zeroing.at_rest:g} s while "
-        "the spindle stands; until then the correction stays where it is."
-        if tables.sizes["has_zero"]
-        else "Nothing counts from the start."
-    )
-    sensors = (
-        "\n\nThe temperatures are watched: what is missing, stuck, off, stepped or swapped is replaced by what the "
-        "others say, if the model was judged without it; otherwise the correction holds and fades. `state.fault[k]`, "
-        f"of {', '.join(tables.sensors)}: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped."
-        if tables.sensors
-        else "\n\nThe temperatures are not watched: one that is not plausible stops the correction, a wrong one not."
-    )
-    positions = zip(tables.targets, tables.values["position"], strict=True)
-    line = "add `slope[k]` [um/m] by the distance from" if slopes else "the same at every position"
-    return _README.format(
-        facts="  \n".join(facts),
-        name=name,
-        calls=calls,
-        inputs=len(tables.channels),
-        values="\n".join(f"| `value[{k}]` | {c.name} | {c.unit} |" for k, c in enumerate(tables.channels)),
-        line=line,
-        corrections="\n".join(
-            f"| `correction[{k}]` [um] | {t} | {f'{p:g} mm' if slopes else ''} |" for k, (t, p) in enumerate(positions)
-        ),
-        zero=zero,
-        sensors=sensors,
-        hold=compensator.limits.hold,
-    )

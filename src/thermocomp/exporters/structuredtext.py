@@ -133,8 +133,8 @@ def _block(tables: Tables, name: str, scl: bool) -> Unit:
     kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
     numbered = [f"{k}: {c.name} [{c.unit}]" for k, c in enumerate(tables.channels)]
     parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(["VERSION : 0.1"] if scl else [])]
-    parts += [wrapped(f"(* Thermal compensation. value, by number: {_comment('; '.join(numbered))} *)")]
-    parts += [wrapped(f"(* correction [um], by number: {_comment(_listed(tables.targets))} *)")]
+    parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
+    parts += [wrapped(f"(* correction [um], by number: {comment(_listed(tables.targets))} *)")]
     parts += [
         section(
             "VAR_INPUT",
@@ -178,7 +178,8 @@ def _listed(names: Sequence[str]) -> str:
     return "; ".join(f"{k}: {n}" for k, n in enumerate(names))
 
 
-def _comment(text: str) -> str:
+def comment(text: str) -> str:
+    """Return a text that ends no comment."""
     for sign in ("*)", "(*"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.encode("ascii", "backslashreplace").decode().split())

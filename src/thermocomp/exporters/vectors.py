@@ -88,7 +88,7 @@ def make_readings(tables: Tables) -> Readings:
     low = np.array([i.reference + i.low for i in tables.channels])
     high = np.array([i.reference + i.high for i in tables.channels])
     heat = np.array([i.quantity == "temperature" for i in tables.channels])
-    age, silent = tables.values["reading_age"], tables.values["hold"] + 3 * tables.values["fade"]
+    age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
     rows: list[tuple[FloatArray, float, float]] = []
 
@@ -115,8 +115,16 @@ def make_readings(tables: Tables) -> Readings:
         add(warm, 10.0, old)
     for dt in (math.nan, -1.0, 0.0, 1e6):
         add(warm, dt)
-    for k in range(min(math.ceil(silent / age), 400)):
-        rows.append((rows[-1][0], age * (k + 1.0), age))
+    # silence: just before and just behind the end of the hold, then until all has faded
+    held = min(math.ceil(hold / age), 200)
+    waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * min(math.ceil(3 * fade / age), 200)
+    for dt in waits:
+        rows.append((rows[-1][0], rows[-1][1] + dt + age, dt))
+    for _ in range(8):  # there and back as fast as it may
+        add(warm, 7.0)
+    add(rest, 4 * 3600.0)
+    for _ in range(8):
+        add(rest, 7.0)
     for k in range(40):
         add(warm + (rest - warm) * min(k / 20, 1.0), 60.0)
     values, ages, steps = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(3))

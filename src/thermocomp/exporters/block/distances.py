@@ -7,7 +7,7 @@ from thermocomp.exporters.block.numbers import larger, smaller
 
 
 def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
-    """Leave `excess`, of each input alone, and `far`, of all together.
+    """Leave `excess`, of each input alone, and `distance`, of all together.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
         if beyond > 0.0:
             beyond = 1.0 if beyond >= t.member_span[m] else beyond / t.member_span[m]
         w.excess = larger(w.excess, beyond)
-    w.far = 0.0
+    w.distance = 0.0
     columns = t.column_begin[k + 1] - t.column_begin[k]
     if columns > 0:
         find_nearest(s, w, t, k, columns)
@@ -32,13 +32,13 @@ def find_distances(s: Names, w: Names, t: Names, k: int) -> None:
         least = abs(change - t.level[t.level_begin[j]])
         for m in range(t.level_begin[j] + 1, t.level_begin[j + 1]):
             least = smaller(least, abs(change - t.level[m]))
-        w.far = larger(w.far, least / t.tolerance[j])
+        w.distance = larger(w.distance, least / t.tolerance[j])
     # the same on every processor
-    w.far = math.floor(smaller(w.far, 1000.0) * 1000000.0 + 0.5) / 1000000.0
+    w.distance = math.floor(smaller(w.distance, 1000.0) * 1000000.0 + 0.5) / 1000000.0
 
 
 def find_nearest(s: Names, w: Names, t: Names, k: int, columns: int) -> None:
-    """Leave the distance to the nearest training state in `far`; 1 is the limit.
+    """Leave the distance to the nearest training state in `distance`; 1 is the limit.
 
     Parameters
     ----------
@@ -58,4 +58,4 @@ def find_nearest(s: Names, w: Names, t: Names, k: int, columns: int) -> None:
             apart = scaled - t.point[t.point_begin[k] + p * columns + j]
             square = square + apart * apart
         nearest = square if p == 0 else smaller(nearest, square)
-    w.far = math.sqrt(nearest)
+    w.distance = math.sqrt(nearest)

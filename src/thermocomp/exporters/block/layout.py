@@ -111,7 +111,7 @@ WORK = {
     "found": Var("real", "in a table, or of a clock"),
     "place": Var("int", "in a table"),
     "excess": Var("real", "how far an input is beyond its range, in spans over which a deviation fades"),
-    "far": Var("real", "how far the inputs together are from the training; 1 is the limit"),
+    "distance": Var("real", "how far the inputs together are from the training; 1 is the limit"),
     "offset": Var("real", "where a correction wants to be, at the reference position [um]"),
     "tilt": Var("real", "the same, slope [um/m]"),
     "end": Var("real", "corrections at the ends of the travel [um]", ("ENDS",)),

@@ -47,7 +47,7 @@ class Supports:
             self._models.append(model)
         if k not in worked_out:
             worked_out.add(k)
-            lines = [f"find_distances(s, w, t, {k})", f"excess{k} = w.excess", f"far{k} = w.far"]
+            lines = [f"find_distances(s, w, t, {k})", f"excess{k} = w.excess", f"far{k} = w.distance"]
         if policy == "hold":
             return [*lines, f"if not (excess{k} > 0.0 or far{k} > 1.0):", f"    {own} = {said}"]
         most = f"larger((far{k} - 1.0) / {float(model.support.fade_over)!r}, excess{k})"

@@ -1,0 +1,138 @@
+"""All files of an export to structured text: the blocks, their test, and how to use them."""
+
+from collections.abc import Sequence
+from uuid import NAMESPACE_URL, uuid5
+
+from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.c99 import identifier
+from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.pages import describe
+from thermocomp.exporters.structuredtext import Unit, comment, translate
+from thermocomp.exporters.ststatements import Dialect
+from thermocomp.exporters.sttest import TOLERANCE, write_test
+from thermocomp.exporters.vectors import make_readings, replay
+from thermocomp.runtime.compensator import Compensator
+
+_INSTALL: dict[Dialect, str] = {
+    "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
+Make an object of each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration above,
+statements below), and the same with `{name}_test.st`.""",
+    "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project: Add > Existing item, all of
+them.""",
+    "scl": """`{name}.scl` is an external source. TIA Portal: External source files > Add new external file, then
+Generate blocks from source; the same with `{name}_test.scl`. For S7-1500 (LReal, and data blocks of this size).""",
+}
+
+_README = """{facts}
+
+# {name}: thermal compensation in structured text ({dialect})
+
+{install}
+**Not confirmed:** the text was parsed and run outside the vendor's tools; nobody has compiled it in them
+yet.
+
+## Prove it
+
+Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE: `wrong` has
+to be 0 then, and `largest`, the largest difference to thermocomp as a share of a correction (in um below 1 um), below
+{tolerance:g}. Faults are among the vectors. Remove the test and its vectors afterwards.
+
+## Run it
+
+Call one instance of `{name}` in a cyclic task of a second or ten seconds:
+
+| input | what it is |
+|---|---|
+| `value[k]` | see below |
+| `good[k]` | FALSE for a sensor that says nothing or reports a failure |
+| `age` | seconds since the values were measured |
+| `elapsed` | seconds since the call before, measured or the cycle time of the task |
+| `restart` | TRUE for one call: temperatures count from now on; corrections stay and move from where they are |
+
+| value | what it is | unit |
+|---|---|---|
+{values}
+
+| correction | of | {line} |
+|---|---|---|
+{corrections}
+
+{zero} {status}{sensors}
+
+## Switch it off
+
+Do not set the correction to zero at once: the axis would jump. Call the block with an age of 1.0E+9: the correction
+stays where it is for {hold:g} s and then goes to zero, slowly. The controller must not compensate for temperature
+itself at the same time.
+"""
+
+_OBJECT = """<?xml version="1.0" encoding="utf-8"?>
+<TcPlcObject Version="1.1.0.1">
+  <{kind} Name="{name}" Id="{{{guid}}}"{special}>
+    <Declaration><![CDATA[{declaration}
+]]></Declaration>{implementation}
+  </{kind}>
+</TcPlcObject>
+"""
+
+
+def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
+    """Return all files by their names.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    dialect : {'codesys', 'twincat', 'scl'}
+
+    Raises
+    ------
+    InputError
+        A model has no formula, or the models do not go together.
+    """
+    tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
+    readings = make_readings(tables)
+    answers = replay(compensator, tables, readings)
+    units = translate(tables, name, dialect)
+    tests = write_test(tables, name, dialect, readings, answers)
+    head = "".join(f"(* {comment(line)} *)\n" for line in said)
+    page = _README.format(
+        facts="  \n".join(said),
+        name=name,
+        dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL"}[dialect],
+        install=_INSTALL[dialect].format(name=name),
+        calls=len(readings.age),
+        tolerance=TOLERANCE,
+        **describe(compensator, tables),
+    )
+    if dialect == "twincat":
+        files = dict(_object(unit, head) for unit in [*units, *tests])
+    else:
+        suffix = "scl" if dialect == "scl" else "st"
+        files = {
+            f"{name}.{suffix}": _joined(units, head, dialect),
+            f"{name}_test.{suffix}": _joined(tests, head, dialect),
+        }
+    return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
+
+
+def _joined(units: Sequence[Unit], head: str, dialect: Dialect) -> str:
+    return "\n".join([head, *(unit.text(dialect) for unit in units)])
+
+
+def _object(unit: Unit, head: str) -> tuple[str, str]:
+    """Return name and text of a file of TwinCAT 3."""
+    body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
+    kind = "POU" if unit.end else "DUT"
+    first, rest = unit.declaration.split("\n", 1)
+    text = _OBJECT.format(
+        kind=kind,
+        name=unit.name,
+        guid=uuid5(NAMESPACE_URL, f"thermocomp/{unit.name}"),
+        special=' SpecialFunc="None"' if unit.end else "",
+        declaration=f"{first}\n{head}{rest}",
+        implementation=body,
+    )
+    return f"{unit.name}.Tc{kind}", text

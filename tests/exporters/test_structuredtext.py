@@ -1,0 +1,270 @@
+"""Structured text: parsed by blark, types checked, run over readings, and the same as the compensator."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from blark.parse import parse
+from driftmodels import ACCEPTED
+from families import FAMILIES, READINGS
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from stmachine import Machine, parsed
+from watchedmachine import watched_model
+
+from thermocomp.core.correction import Limits
+from thermocomp.core.inputs import Support
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.zero import Zeroing
+from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.stpackage import write_package
+from thermocomp.exporters.structuredtext import NOTHING, Unit, translate
+from thermocomp.exporters.ststatements import RESERVED
+from thermocomp.exporters.sttest import write_test
+from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
+from thermocomp.runtime.compensator import Compensator
+
+FREE = Limits(magnitude=1e9, rate=1e9)
+SLOW: dict[str, Any] = {
+    "suppress_health_check": list(HealthCheck),
+    "deadline": None,
+    "phases": [Phase.explicit, Phase.reuse, Phase.generate],
+}
+FACTS = Facts("model.json", "0" * 64, "0", "2026-01-31")
+
+
+def finite(value: float) -> float:
+    return float(value) if np.isfinite(value) else NOTHING
+
+
+def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
+    """Call a block with readings; what is no number is not good."""
+    said, told, found, passed = [], [], [], []
+    for values, age, dt in zip(*readings, strict=True):
+        good = [bool(np.isfinite(v)) for v in values]
+        seen = machine.call(
+            value=[float(v) if g else 0.0 for v, g in zip(values, good, strict=True)],
+            good=good,
+            age=finite(age),
+            elapsed=finite(dt),
+            restart=False,
+        )
+        said.append([*seen.correction, *seen.slope])
+        told.append(list(seen.status))
+        found.append(list(seen.fault) if sensors else [])
+        passed.append(seen.rejected == 0)
+    table = np.array(said)
+    return Answers(
+        table[:, :targets],
+        table[:, targets:],
+        np.array(told),
+        np.empty((len(told), 0)),
+        np.array(found, dtype=int).reshape(len(found), -1),
+        np.array(passed),
+    )
+
+
+def check_same(expected: Answers, said: Answers) -> None:
+    """Compare decisions exactly, numbers to 1e-9 of their size."""
+    assert (expected.passed == said.passed).all()
+    assert (expected.status == said.status).all()
+    assert (expected.fault == said.fault).all()
+    for a, b in ((expected.correction, said.correction), (expected.slope, said.slope)):
+        assert (np.abs(a - b) <= 1e-9 * np.maximum(1.0, np.abs(a))).all()
+
+
+def check_block(compensator: Compensator, readings: Readings) -> Answers:
+    tables = gather(compensator)
+    machine = Machine(translate(tables, "tc_x", "codesys"))
+    expected = replay(compensator, tables, readings)
+    check_same(expected, run(machine, readings, len(tables.targets), len(tables.sensors)))
+    return expected
+
+
+def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
+    return replace(model, honest_error=ACCEPTED, **changes)
+
+
+@pytest.fixture(scope="module")
+def watched() -> Compensator:
+    return Compensator.of([watched_model("z_um")], Limits(magnitude=20.0, rate=0.05, hold=120.0, fade=60.0))
+
+
+@pytest.fixture(scope="module")
+def units(watched: Compensator) -> list[Unit]:
+    return translate(gather(watched), "tc_x", "codesys")
+
+
+def test_it_says_what_the_compensator_says(watched: Compensator) -> None:
+    said = check_block(watched, make_readings(gather(watched)))
+    assert set(said.status.ravel()) == {0, 1, 2, 3}
+    assert {0, 1} <= set(said.fault.ravel())
+
+
+def proof(watched: Compensator, units: list[Unit]) -> Any:
+    """Run the block that runs the vectors."""
+    tables = gather(watched)
+    readings = make_readings(tables)
+    machine = Machine([*units, *write_test(tables, "tc_x", "codesys", readings, replay(watched, tables, readings))])
+    for _ in readings.age:
+        assert not machine.memory.done
+        machine.call()
+    assert machine.memory.done
+    return machine.memory
+
+
+def test_its_own_test_passes(watched: Compensator, units: list[Unit]) -> None:
+    said = proof(watched, units)
+    assert (said.wrong, said.largest < 1e-9) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("block", "was", "becomes"),
+    [
+        ("tc_x_check", "w.passes := FALSE", "w.passes := TRUE"),
+        ("tc_x_tell_time", "s.clock + w.tc_dt", "s.clock + w.tc_dt + 1.0E-06"),
+        ("tc_x_limit", "current + reach", "current + reach * 1.001"),
+        ("tc_x_look", "3600.0", "3700.0"),
+        ("tc_x_tables", "hold : LREAL := 120.0", "hold : LREAL := 121.0"),
+    ],
+)
+def test_its_own_test_finds_a_mistake(
+    watched: Compensator, units: list[Unit], block: str, was: str, becomes: str
+) -> None:
+    broken = []
+    for unit in units:
+        if unit.name == block:
+            assert was in unit.statements + unit.declaration
+            unit = replace(  # noqa: PLW2901
+                unit,
+                statements=unit.statements.replace(was, becomes),
+                declaration=unit.declaration.replace(was, becomes),
+            )
+        broken.append(unit)
+    assert proof(watched, broken).wrong > 0
+
+
+def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Unit]) -> None:
+    tables, machine = gather(watched), Machine(units)
+    readings = make_readings(tables)
+    warm = Readings(*(a[:165] for a in readings))
+    run(machine, warm, 1, len(tables.sensors))
+    before = machine.memory.correction[0]
+    assert abs(before) > 5.0
+    values = [float(v) for v in readings.values[164]]
+    again = {"value": values, "good": [True] * len(values), "age": 0.0, "elapsed": 10.0}
+    said = machine.call(**again, restart=True)
+    assert said.status[0] == 0
+    assert said.correction[0] == before
+    fresh, moved = Machine(units), [before]
+    fresh.call(**again, restart=False)
+    for _ in range(200):
+        moved.append(machine.call(**again, restart=False).correction[0])
+        assert list(fresh.call(**again, restart=False).status) == list(machine.memory.status)
+    assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
+    assert moved[-1] == fresh.memory.correction[0]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@settings(**SLOW, max_examples=2)
+@given(data=st.data(), rows=READINGS, zeroing=st.sampled_from([Zeroing(0.0, 0.0), Zeroing(60.0, 20.0, "n")]))
+def test_of_every_family(family: str, data: st.DataObject, rows: list[tuple[float, ...]], zeroing: Zeroing) -> None:
+    model: ErrorModel = accepted(data.draw(FAMILIES[family]), zeroing=zeroing)
+    table = np.array(rows)
+    for slower in (1.0, 40.0):
+        readings = Readings(table[:, :3], np.zeros(len(rows)), slower * table[:, 3])
+        check_block(Compensator.of([model], FREE), readings)
+
+
+JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
+
+
+@pytest.mark.parametrize("policy", ["hold", "fade"])
+@settings(**SLOW, max_examples=3)
+@given(model=FAMILIES["polynomial"], joint=st.sampled_from([None, JOINT]), rows=READINGS)
+def test_beyond_the_trained_range(policy: Any, joint: JointSupport | None, model: ErrorModel, rows: list[Any]) -> None:
+    model = accepted(model, support=Support(policy, fade_over=0.5), joint=joint)
+    table = np.array(rows)
+    check_block(Compensator.of([model], FREE), Readings(table[:, :3], np.zeros(len(rows)), table[:, 3]))
+
+
+ODD = st.one_of(st.floats(), st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0.0, 85.0, -127.0, 65535.0]))
+
+
+@settings(**SLOW, max_examples=150)
+@given(
+    rows=st.lists(
+        st.tuples(*[st.one_of(st.just(21.0), st.floats(20, 26), ODD)] * 4, ODD, ODD), min_size=1, max_size=60
+    ),
+    quiet=st.booleans(),
+)
+def test_nothing_that_comes_in_moves_it_beyond_its_limits(
+    watched: Compensator, units: list[Unit], rows: list[tuple[float, ...]], quiet: bool
+) -> None:
+    table = np.array(rows, dtype=np.float64)
+    age = np.abs(np.nan_to_num(table[:, 4], posinf=0, neginf=0)) % 5 if quiet else table[:, 4]
+    dt = np.abs(np.nan_to_num(table[:, 5], posinf=0, neginf=0)) % 90 if quiet else table[:, 5]
+    readings, tables = Readings(table[:, :4], age, dt), gather(watched)
+    said = run(Machine(units), readings, 1, len(tables.sensors))
+    check_same(replay(watched, tables, readings), said)
+    moved = np.abs(np.diff(said.correction[:, 0], prepend=0.0))
+    assert (np.abs(said.correction) <= 20.0).all()
+    assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()
+
+
+def test_scl_is_the_same_but_for_its_marks(watched: Compensator) -> None:
+    tables = gather(watched)
+    readings = make_readings(tables)
+    answers = replay(watched, tables, readings)
+    plain, scl = (
+        [*translate(tables, "tc_x", dialect), *write_test(tables, "tc_x", dialect, readings, answers)]
+        for dialect in ("codesys", "scl")
+    )
+
+    def bare(text: str) -> str:
+        text = re.sub(r"(TYPE \"\w+\")\n", r"\1 :\n", text)
+        text = " ".join(re.sub(r'[#"]|VERSION : 0.1\n|\bBEGIN\n', "", text).split())
+        text = re.sub(r"SEL\(G := (.*?), IN0 := (.*?), IN1 := (.*?)\)", r"SEL(\1, \2, \3)", text)
+        text = text.replace(": Void", ": BOOL").replace("VAR_TEMP", "VAR").replace("END_STRUCT;", "END_STRUCT")
+        return text.replace("END_VAR VAR ", "")  # a block has two sections of its own in one dialect
+
+    for one, other in zip(plain, scl, strict=True):
+        assert "#" in other.statements or not other.end
+        # a block has two sections of variables of its own in one dialect
+        assert bare(other.text("scl")) == bare(one.text("codesys"))
+
+
+def test_names_are_no_words_of_the_language(units: list[Unit]) -> None:
+    declared = {n for u in units for n in re.findall(r"^    (\w+) : ", u.declaration, re.M)}
+    assert {"tc_time", "tc_step"} <= declared
+    assert not {n for n in declared if n.lower() in RESERVED}
+    assert all(re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", n) for n in declared)
+
+
+def test_the_files_of_twincat_are_read_by_blark(tmp_path: Path, watched: Compensator) -> None:
+    files = write_package(watched, "x", FACTS, "twincat")
+    assert {Path(f).suffix for f in files} == {".TcPOU", ".TcDUT", ".md"}
+    for name in ("tc_x.TcPOU", "tc_x_limit.TcPOU", "tc_x_gather.TcPOU", "tc_x_test.TcPOU", "tc_x_work.TcDUT"):
+        (tmp_path / name).write_bytes(files[name])
+        found = list(parse(tmp_path / name))
+        assert len(found) == (2 if name.endswith("POU") else 1)
+        assert [result.exception for result in found] == [None] * len(found)
+    again = write_package(watched, "x", FACTS, "twincat")
+    assert files == again
+
+
+def test_the_first_line_is_the_verdict(watched: Compensator) -> None:
+    for dialect in ("codesys", "scl"):
+        for name, text in write_package(watched, "x", FACTS, dialect).items():
+            assert text.decode().split("\n")[0].strip("(* )") == "z_um: accepted on unseen cycles", name
+
+
+def test_a_name_that_would_end_a_comment_does_not() -> None:
+    model = replace(watched_model("z_um"), target="z *) (* um")
+    units = translate(gather(Compensator.of([model])), "tc_x", "codesys")
+    parsed(units[-1].text("codesys"))

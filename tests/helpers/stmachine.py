@@ -1,0 +1,307 @@
+"""A machine that runs structured text: blark parses it, types are checked strictly, Python runs it.
+
+No value is converted unless the text says so, both sides of AND and OR are worked out, an index beyond an array, a
+number of 32 bits that overflows and a variable that is read before it is set are errors.
+"""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+from blark import transform as b
+from blark.parse import parse_source_code
+
+from thermocomp.exporters.structuredtext import Unit
+
+_PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}
+_COMPARE = {"=": "==", "<>": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
+_NUMBERS = {"EXP": math.exp, "LN": math.log, "SQRT": math.sqrt}
+#: numbers of a list that blark is given: it takes half a minute for a hundred and sixty
+_PIECE = 12
+
+Type = Any  #: 'LREAL', 'DINT', 'BOOL', the name of a structure, or ('ARRAY', Type, size)
+
+
+class Array(list[Any]):
+    """An array that knows its ends."""
+
+    def __getitem__(self, at: Any) -> Any:
+        assert 0 <= at < len(self), f"index {at} of {len(self)}"
+        return super().__getitem__(at)
+
+    def __setitem__(self, at: Any, value: Any) -> None:
+        assert 0 <= at < len(self), f"index {at} of {len(self)}"
+        super().__setitem__(at, value)
+
+
+@cache
+def parsed(text: str) -> Any:
+    """Parse one block or type."""
+    found = parse_source_code(text)
+    assert found.exception is None, found.exception
+    return found.transform().items[0]
+
+
+def declared(text: str) -> dict[str, tuple[Type, Any]]:
+    """Return types and initial values of a structure; a long list is parsed in pieces."""
+    text = re.sub(r"\(\*.*?\*\)", "", text, flags=re.DOTALL)
+    members: dict[str, tuple[Type, Any]] = {}
+    body = re.search(r"STRUCT\n(.*)END_STRUCT", text, re.DOTALL)
+    assert body
+    for name, what, start in re.findall(r"(\w+) : (.*?)(?: := (.*?))?;", " ".join(body.group(1).split())):
+        sized = re.fullmatch(r"ARRAY\[0\.\.(\d+)\] OF (\w+)", what)
+        kind: Type = ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else what
+        texts = start.strip("[]").split(", ") if start else []
+        for k in dict.fromkeys((0, max(len(texts) - _PIECE, 0))):  # the first and the last of a long list
+            piece = texts[k : k + _PIECE]
+            shown = f"[{', '.join(piece)}]" if sized else "".join(piece)
+            parsed(f"TYPE x :\nSTRUCT\n    {name} : {what}{f' := {shown}' if piece else ''};\nEND_STRUCT\nEND_TYPE\n")
+        scalar = _PYTHON[sized.group(2) if sized else what]
+        numbers = [t == "TRUE" if scalar is bool else _number(t, scalar) for t in texts]
+        if sized:
+            assert len(texts) in (0, kind[2]), name
+            members[name] = (kind, Array(numbers or [scalar()] * kind[2]))
+        else:
+            members[name] = (kind, numbers[0] if numbers else scalar())
+    return members
+
+
+def _number(text: str, scalar: Callable[[str], Any]) -> Any:
+    assert re.fullmatch(r"-?\d+" if scalar is int else r"-?\d+\.\d+(E[-+]?\d+)?", text), text
+    return scalar(text)
+
+
+class Machine:
+    """A function block, and what it calls.
+
+    Parameters
+    ----------
+    units : sequence of Unit
+        The function block is the last.
+    """
+
+    def __init__(self, units: Sequence[Unit]) -> None:
+        self._structs = {u.name: declared(u.declaration) for u in units if not u.end}
+        blocks = [parsed(u.text("codesys")) for u in units if u.end]
+        self._heads = {str(block.name): _head(block) for block in blocks}
+        self._space: dict[str, Any] = {
+            "Array": Array,
+            "SEL": lambda g, one, other: other if g else one,
+            "TRUNC": _trunc,
+            **_NUMBERS,
+        }
+        for block in blocks:
+            exec(_Function(self, block).source(), self._space)
+        self._name = str(blocks[-1].name)
+        self.memory = self._memory(self._name)
+
+    def _memory(self, block: str) -> SimpleNamespace:
+        """Return an instance of a function block."""
+        head = self._heads[block]
+        return SimpleNamespace(**{n: self._new(k) for part in ("in", "out", "own") for n, k in head[part].items()})
+
+    def _new(self, kind: Type) -> Any:
+        if isinstance(kind, tuple):
+            return Array([_PYTHON[kind[1]]()] * kind[2])
+        if kind in self._heads:
+            return self._memory(kind)
+        if kind in self._structs:
+            return SimpleNamespace(
+                **{n: v if not isinstance(v, Array) else Array(v) for n, (_, v) in self._structs[kind].items()}
+            )
+        return _PYTHON[kind]()
+
+    def call(self, **inputs: Any) -> SimpleNamespace:
+        """Call the function block; returns all that is in it."""
+        for name, value in inputs.items():
+            setattr(self.memory, name, Array(value) if isinstance(value, list) else value)
+        self._space[self._name](self.memory)
+        return self.memory
+
+    def kind_of(self, struct: str, member: str) -> Type:
+        """Return the type of a member of a structure, or of what a function block shows."""
+        if struct in self._heads:
+            return {**self._heads[struct]["in"], **self._heads[struct]["out"]}[member]
+        return self._structs[struct][member][0]
+
+    def head(self, name: str) -> dict[str, Any]:
+        """Return what a function takes and gives."""
+        return self._heads[name]
+
+
+def _trunc(value: float) -> int:
+    assert abs(value) < 2**31
+    return int(value)
+
+
+def _head(block: Any) -> dict[str, Any]:
+    """Return names and types of a block's variables, by section."""
+    found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}}
+    words = {
+        b.InputDeclarations: "in",
+        b.InputOutputDeclarations: "inout",
+        b.OutputDeclarations: "out",
+        b.VariableDeclarations: "own",
+        b.FunctionVariableDeclarations: "own",
+    }
+    for section in block.declarations:
+        for item in section.items:
+            kind = _type(str(item.init).split(":=")[0])
+            for variable in item.variables:
+                found[words[type(section)]][str(variable.variable if hasattr(variable, "variable") else variable)] = (
+                    kind
+                )
+    returned = getattr(block, "return_type", None)
+    found["gives"] = str(returned) if returned is not None else None
+    return found
+
+
+def _type(text: str) -> Type:
+    sized = re.fullmatch(r"ARRAY ?\[0\.\.(\d+)\] OF (\w+)", text.strip())
+    return ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else text.strip()
+
+
+class _Function:
+    """Writes a block as Python."""
+
+    def __init__(self, machine: Machine, block: Any) -> None:
+        self._machine, self._block, self._name = machine, block, str(block.name)
+        head = machine.head(self._name)
+        self._is_block = isinstance(block, b.FunctionBlock)
+        self._types: dict[str, Type] = {**head["in"], **head["inout"], **head["out"], **head["own"]}
+        self._given = [*head["inout"], *head["in"]]
+        if not self._is_block:
+            self._types[self._name] = head["gives"]
+
+    def source(self) -> str:
+        given = "self" if self._is_block else ", ".join(self._given)
+        lines = [f"def {self._name}({given}):", *self._block_of(self._block.body, 1)]
+        if not self._is_block:
+            lines += [f"    return {self._name}_"] if self._types[self._name] == "LREAL" else ["    return False"]
+        return "\n".join(lines)
+
+    def _block_of(self, body: Any, depth: int) -> list[str]:
+        statements = body.statements if body else []
+        return [line for s in statements for line in self._statement(s, depth)] or ["    " * depth + "pass"]
+
+    def _instance(self, s: Any, pad: str) -> list[str]:
+        """Return a call of an instance of a function block."""
+        name, kind = self._value(s.name)
+        head = self._machine.head(kind)
+        assert [str(p.name) for p in s.parameters] == list(head["in"]), s
+        lines = []
+        for p, (parameter, wanted) in zip(s.parameters, head["in"].items(), strict=True):
+            value = self._as(p.value, wanted)
+            lines.append(f"{pad}{name}.{parameter} = {f'Array({value})' if isinstance(wanted, tuple) else value}")
+        return [*lines, f"{pad}{kind}({name})"]
+
+    def _statement(self, s: Any, depth: int) -> list[str]:
+        pad = "    " * depth
+        match s:
+            case b.AssignmentStatement():
+                target, kind = self._value(s.variables[0])
+                value, given = self._value(s.expression)
+                assert kind == given, f"{s}: {given} for {kind}"
+                return [f"{pad}{target} = {value}"]
+            case b.IfStatement():
+                lines = [f"{pad}if {self._as(s.if_expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
+                for other in s.else_ifs:
+                    lines += [f"{pad}elif {self._as(other.if_expression, 'BOOL')}:"]
+                    lines += self._block_of(other.statements, depth + 1)
+                if s.else_clause:
+                    lines += [f"{pad}else:", *self._block_of(s.else_clause.statements, depth + 1)]
+                return lines
+            case b.ForStatement():
+                begin, end = self._as(s.from_, "DINT"), self._as(s.to, "DINT")
+                target = self._value(s.control)[0]
+                return [f"{pad}for {target} in range({begin}, {end} + 1):", *self._block_of(s.statements, depth + 1)]
+            case b.WhileStatement():
+                return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
+            case b.FunctionCallStatement() | b.FunctionCall():
+                if str(s.name.name) in self._types:
+                    return self._instance(s, pad)
+                return [f"{pad}{self._value(s)[0]}"]
+        raise TypeError(f"{type(s)}: {s}")
+
+    def _as(self, node: Any, kind: Type) -> str:
+        text, given = self._value(node)
+        assert given == kind, f"{node}: {given}, want {kind}"
+        return text
+
+    def _value(self, node: Any) -> tuple[str, Type]:  # noqa: PLR0911, PLR0912 - a case for every kind of node
+        match node:
+            case b.ParenthesizedExpression():
+                return self._value(node.expr)
+            case b.Boolean():
+                return str(str(node.value).upper() == "TRUE"), "BOOL"
+            case b.Integer():
+                return str(int(node.value)), "DINT"
+            case b.Real():
+                return repr(float(node.value)), "LREAL"
+            case b.SimpleVariable():
+                name = str(node.name)
+                if name == self._name:
+                    return f"{name}_", self._types[name]
+                return (f"self.{name}" if self._is_block else name), self._types[name]
+            case b.MultiElementVariable():
+                text, kind = self._value(node.name)
+                for element in node.elements:
+                    if isinstance(element, b.FieldSelector):
+                        member = str(element.field.name)
+                        text, kind = f"{text}.{member}", self._machine.kind_of(kind, member)
+                    else:
+                        assert kind[0] == "ARRAY", node
+                        text, kind = f"{text}[{self._as(element.subscripts[0], 'DINT')}]", kind[1]
+                return text, kind
+            case b.UnaryOperation():
+                text, kind = self._value(node.expr)
+                if str(node.op).upper() == "NOT":
+                    assert kind == "BOOL", node
+                    return f"(not {text})", "BOOL"
+                assert kind in ("DINT", "LREAL"), node
+                return f"(-{text})", kind
+            case b.BinaryOperation():
+                return self._operation(str(node.op).upper(), node)
+            case b.FunctionCallStatement() | b.FunctionCall():
+                return self._call(node)
+        raise TypeError(f"{type(node)}: {node}")
+
+    def _operation(self, op: str, node: Any) -> tuple[str, Type]:
+        (one, kind), (other, second) = self._value(node.left), self._value(node.right)
+        assert kind == second, f"{node}: {kind} {op} {second}"
+        if op in ("AND", "OR"):
+            assert kind == "BOOL", node
+            return f"({one} {'&' if op == 'AND' else '|'} {other})", "BOOL"
+        if op in _COMPARE:
+            assert kind != "BOOL" or op in ("=", "<>"), node
+            return f"({one} {_COMPARE[op]} {other})", "BOOL"
+        assert kind in ("DINT", "LREAL"), node
+        if kind == "DINT":
+            op = {"/": "//", "MOD": "%"}.get(op, op)
+        return f"({one} {op} {other})", kind
+
+    def _call(self, node: Any) -> tuple[str, Type]:
+        name, given = str(node.name.name), node.parameters
+        values = [p.value for p in given]
+        if name in _NUMBERS:
+            return f"{name}({self._as(values[0], 'LREAL')})", "LREAL"
+        if name == "ABS":
+            text, kind = self._value(values[0])
+            assert kind in ("DINT", "LREAL"), node
+            return f"abs({text})", kind
+        if name == "TRUNC":
+            return f"TRUNC({self._as(values[0], 'LREAL')})", "DINT"
+        if name == "DINT_TO_LREAL":
+            return f"float({self._as(values[0], 'DINT')})", "LREAL"
+        if name == "SEL":
+            (one, kind), (other, second) = self._value(values[1]), self._value(values[2])
+            assert kind == second, node
+            return f"SEL({self._as(values[0], 'BOOL')}, {one}, {other})", kind
+        head = self._machine.head(name)
+        wanted = {**head["inout"], **head["in"]}
+        assert [str(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
+        texts = [self._as(v, kind) for v, kind in zip(values, wanted.values(), strict=True)]
+        return f"{name}({', '.join(texts)})", head["gives"]
