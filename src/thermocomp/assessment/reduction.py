@@ -109,6 +109,8 @@ def reduce_model(
     if not heat:
         raise InputError(f"{recordings[0].name}: no temperature, so there is nothing a controller could go by")
     judging, known = _judging(samples), samples.only(sensors or heat)
+    taken = {"", model.target, *(c.name for c in known.inputs)}
+    known = replace(known, trouble=tuple(t for t in known.trouble if t[0] in taken))
     estimator = LinearReduction(max_sensors=shape.sensors, fit_intercept=shape.constant and not samples.rezero)
     named = NamedEstimator(NAME, estimator)
     found = compare(
@@ -136,6 +138,7 @@ def reduce_model(
         _left(overall),
         tuple(_left_outs(blocks, full)),
         _of(known.deviations[rows, 0] - said),
+        float(max(np.abs(a).max(initial=0.0) for a in (said, *(b.predicted for b in blocks)))),
     )
     return Reduction(reduced, blocks, full, tuple(r.time for r in recordings))
 

@@ -76,6 +76,8 @@ class Reduced:
         One by one; empty where the model was of that shape already.
     replayed : Left or None
         With the model as it is written, over all rows of the recordings that it was fitted to.
+    most : float
+        Largest deviation that was said in all of this [um].
     """
 
     model: ErrorModel
@@ -86,6 +88,7 @@ class Reduced:
     reduced: Left
     cycles: tuple[LeftOut, ...] = ()
     replayed: Left | None = None
+    most: float = 0.0
 
     @property
     def loss(self) -> float:
@@ -127,6 +130,17 @@ class Reduced:
         return [(i, f) for i, f in zip(self.model.inputs, factors, strict=True) if f]
 
 
+    @property
+    def zeros(self) -> list[float]:
+        """What each of the temperatures counts from in a formula that knows no start [degC]."""
+        return [round(i.reference, 2) if i.rezero else i.reference for i, _ in self.terms]
+
+    def deviation(self, temperatures: Sequence[float]) -> float:
+        """Return what the formula says of the temperatures in `terms` [um]."""
+        parts = zip(self.terms, temperatures, self.zeros, strict=True)
+        return self.model.intercept + sum(f * (t - zero) for (_, f), t, zero in parts)
+
+
 def linear_factors(model: ErrorModel) -> list[float] | None:
     """Return what a degree of each input makes [um/K]; None if a model is no sum of present temperatures."""
     if not isinstance(model, Polynomial) or any(len(t) != 1 for t in model.terms):
@@ -154,6 +168,20 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
     none = Left(math.nan if found is None else found.none_rms, math.nan)
     own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
     return Reduced(model, axis, "the model is of that shape already; its error is that in the model file", none, own, own)
+
+
+def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
+    """Return temperatures that a formula is tried with, in the order of its terms: each alone, all, far beyond."""
+    inputs, zeros = [i for i, _ in reduced.terms], reduced.zeros
+    rows = [tuple(zeros)]
+    for k, i in enumerate(inputs):
+        for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+            row = list(zeros)
+            row[k] += i.low + share * (i.high - i.low)
+            rows.append(tuple(row))
+    for share in (-1.5, -0.2, 0.3, 0.8, 1.2, 2.5):  # beyond the trained range below 0 and above 1
+        rows.append(tuple(z + i.low + share * (i.high - i.low) for i, z in zip(inputs, zeros, strict=True)))
+    return [tuple(round(t, 2) for t in row) for row in dict.fromkeys(rows)]
 
 
 def find_axis(target: str, named: dict[str, str]) -> str:
