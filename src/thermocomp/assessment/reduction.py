@@ -113,9 +113,7 @@ def reduce_model(
     known = replace(known, trouble=tuple(t for t in known.trouble if t[0] in taken))
     estimator = LinearReduction(max_sensors=shape.sensors, fit_intercept=shape.constant and not samples.rezero)
     named = NamedEstimator(NAME, estimator)
-    found = compare(
-        known, [named], judging, rules=rules, support=UNBOUNDED, limits=None, jobs=jobs, progress=progress
-    )
+    found = compare(known, [named], judging, rules=rules, support=UNBOUNDED, limits=None, jobs=jobs, progress=progress)
     (overall,) = found.overall()
     every = np.ones(len(known), dtype=np.bool_)
     honest = honest_error(overall, judging)
@@ -190,7 +188,7 @@ def _left_outs(blocks: Sequence[Assessment], full: Sequence[Assessment]) -> list
 
 def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
     if method:
-        return f"{method}, fitted anew, both judged alike: {judging.name}"
+        return f"{method}, fitted anew for this; both are judged alike: {judging.name}"
     if model.honest_error is None:
         return "the model's method is not known here, and it was never judged on cycles it has not seen"
     return (

@@ -97,7 +97,7 @@ def export(
     refused = [m for m in models if m.honest_error is not None and m.honest_error.word == "refused"]
     left = [m for m in models if m not in refused]
     reasons = {m.target: m.honest_error.reason for m in refused if m.honest_error is not None}
-    texts: dict[str, bytes] = {}
+    texts, elsewhere = dict[str, bytes](), dict[str, str]()
     if recordings and to not in reducing.WRITERS:
         raise InputError(f"{to} holds the whole model: it wants no recording, found {recordings[0]}")
     if left:
@@ -109,8 +109,8 @@ def export(
             date or datetime.now(UTC).astimezone().date().isoformat(),
         )
         if to in reducing.WRITERS:
-            texts, more = reducing.export_reduced(
-                to, left, recordings or [], reduction, beginning, limits, name, facts, accept_unproven
+            texts, more, elsewhere = reducing.export_reduced(
+                to, left, recordings or [], reduction, beginning, limits, name, facts, accept_unproven, hidden=json
             )
             reasons |= more
         else:
@@ -124,10 +124,12 @@ def export(
                 written[output / file].write_bytes(text)
             written.publish()
     if json:
-        print_json({"files": [str(output / file) for file in texts], "refused": reasons})
+        print_json({"files": [str(output / file) for file in texts], "refused": reasons | elsewhere})
     else:
         for target, why in reasons.items():
             console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
+        for target, why in elsewhere.items():
+            console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
         if texts:
             console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
             console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from cyclopts import Parameter
 
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.options import read_recordings, tell_trouble
+from thermocomp.cli.progress import show_steps
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -38,13 +39,16 @@ class ReductionOptions:
     most_loss : float
         Largest loss that is let pass: RMS on unseen cycles over that of the full model.
     axes : list of str
-        Which targets are written and along which axes they go, such as ch5_um=Z; by their names if not given: z_um is Z.
+        Which targets are written and along which axes they go, such as ch5_um=Z; by their names if not given: z_um is
+        Z.
     sensors : list of str
         Temperatures that the controller has, to choose from; all of the recordings if not given.
     mapping : Path
         TOML file that says what the columns of the recordings are.
     harm_margin : float
         Harm in a single cycle that is let pass [um]; as in ``thermocomp fit`` if not given.
+    jobs : int
+        Processes to share the work among; -1 takes all cores.
     """
 
     most_loss: float = 2.0
@@ -52,6 +56,7 @@ class ReductionOptions:
     sensors: list[str] | None = None
     mapping: Path | None = None
     harm_margin: float | None = None
+    jobs: int = -1
 
     def named(self) -> dict[str, str]:
         """Return the axes by target."""
@@ -64,6 +69,14 @@ class ReductionOptions:
         return found
 
 
+class Outcome(NamedTuple):
+    """What comes of an export."""
+
+    texts: dict[str, bytes]  #: files by their names
+    refused: dict[str, str]  #: targets that may not be written, and why
+    elsewhere: dict[str, str]  #: targets that the controller does not correct, and why
+
+
 def export_reduced(
     to: str,
     models: Sequence[ErrorModel],
@@ -74,8 +87,10 @@ def export_reduced(
     name: str,
     facts: Facts,
     accept_unproven: str | None,
-) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return the files of an export by their names, and why targets are left out.
+    *,
+    hidden: bool,
+) -> Outcome:
+    """Make the files of an export.
 
     Parameters
     ----------
@@ -93,56 +108,64 @@ def export_reduced(
     facts : Facts
     accept_unproven : str or None
         Who takes an unproven model, and why.
+    hidden : bool
+        Show no progress.
 
     Raises
     ------
     InputError
         A model has to be reduced, and there is no recording; or the correction would run into its limit.
     """
-    shape, axes, left = SHAPES[to], _find_axes(models, options), dict[str, str]()
-    wanted = []
-    for m in models:
-        axis = axes[m.target]
-        if m.unit != "um":
-            left[m.target] = f"it predicts {m.unit}, and a correction is in um"
-        elif not axis:
-            left[m.target] = f"its name says no axis, or --axes does not name it: --axes {m.target}=Z says Z"
-        elif axis not in shape.axes:
-            left[m.target] = f"it is of {axis}, and {to} corrects {shape.axes} alone"
-        else:
-            wanted.append(m)
-    letters = [axes[m.target] for m in wanted]
-    if twice := {a for a in letters if letters.count(a) > 1}:
-        of = ", ".join(m.target for m in wanted if axes[m.target] in twice)
-        raise InputError(f"{of} are of the same axis: name those that are meant with --axes, such as --axes {of[:12]}")
-    whole = [m for m in wanted if not fits(m, shape)]
-    if whole and not recordings:
+    shape, axes = SHAPES[to], _find_axes(models, options)
+    elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to))}
+    wanted = [m for m in models if m.target not in elsewhere]
+    _refuse_twice([(m.target, axes[m.target]) for m in wanted])
+    more = [m for m in wanted if not fits(m, shape)]
+    if more and not recordings:
         raise InputError(
-            f"{to} holds {_told(shape.sensors)}, and the model of {', '.join(m.target for m in whole)} is more than that: "
-            f"name recordings to reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
+            f"{to} holds {_told(shape.sensors)}, and the model of {', '.join(m.target for m in more)} is more than that"
+            f": name recordings to reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
         )
-    reductions = _reduce(whole, axes, recordings, options, beginning, to) if whole else {}
-    found: list[Reduced] = []
+    reductions = _reduce(more, axes, recordings, options, beginning, to, hidden=hidden) if more else {}
+    refused, found = dict[str, str](), list[Reduced]()
     for m in wanted:
         r = reductions[m.target].reduced if m.target in reductions else as_it_is(m, axes[m.target])
         r = replace(r, model=r.model.taken(accept_unproven))
         if why := r.why_not(options.most_loss):
-            left[m.target] = why
+            refused[m.target] = why
         else:
             found.append(r)
-    for r in found if to != "heidenhain" else ():
-        if r.most > limits.magnitude:
-            raise InputError(
-                f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was judged "
-                f"so; give --magnitude {1.2 * r.most:.0f}, for {to} would stop at {limits.magnitude:g} um"
-            )
+            _check_limit(r, limits, to)
     if not found:
-        return {}, left
+        return Outcome({}, refused, elsewhere)
     name = f"tc_{mark(name)}"
     drawn = [reductions[r.model.target] for r in found if r.model.target in reductions]
     figure = f"{name}_reduced.svg" if drawn else ""
     texts = WRITERS[to](found, limits, name, facts, figure=figure)
-    return (_figure(figure, drawn) if drawn else {}) | texts, left
+    return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
+
+
+def _why_elsewhere(model: ErrorModel, axis: str, to: str) -> str:
+    if model.unit != "um":
+        return f"it predicts {model.unit}, and a correction is in um"
+    if not axis:
+        return f"its axis is not known: --axes {model.target}=Z would say that it is Z"
+    return "" if axis in SHAPES[to].axes else f"it is of {axis}, and {to} corrects {SHAPES[to].axes} alone"
+
+
+def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
+    letters = [axis for _, axis in wanted]
+    if twice := [target for target, axis in wanted if letters.count(axis) > 1]:
+        raise InputError(f"{', '.join(twice)} are of one axis: name those that are meant, such as --axes {twice[0]}=Z")
+
+
+def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
+    """Refuse a limit that the reduced model, which was judged without one, would run into."""
+    if to != "heidenhain" and r.most > limits.magnitude:
+        raise InputError(
+            f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
+            f"judged so; {to} would stop at {limits.magnitude:g} um: give --magnitude {1.2 * r.most:.0f}, if so much is right"
+        )
 
 
 def _find_axes(models: Sequence[ErrorModel], options: ReductionOptions) -> dict[str, str]:
@@ -160,6 +183,8 @@ def _reduce(
     options: ReductionOptions,
     beginning: Beginning,
     to: str,
+    *,
+    hidden: bool,
 ) -> "dict[str, Reduction]":
     tests = read_recordings(paths, options.mapping)
     tell_trouble(tests)
@@ -167,13 +192,15 @@ def _reduce(
     from thermocomp.assessment.results import Rules
 
     starts = beginning.of(tests, options.mapping)
-    return {
-        m.target: reduce_model(
-            m, axes[m.target], tests, SHAPES[to],
-            sensors=options.sensors, starts=starts, rules=Rules(options.harm_margin), jobs=-1,
-        )
-        for m in models
-    }  # fmt: skip
+    found = {}
+    with show_steps(len(models), hidden=hidden) as progress:
+        for m in models:
+            found[m.target] = reduce_model(
+                m, axes[m.target], tests, SHAPES[to],
+                sensors=options.sensors, starts=starts, rules=Rules(options.harm_margin), jobs=options.jobs,
+            )  # fmt: skip
+            progress(f"{m.target} reduced")
+    return found
 
 
 def _figure(name: str, reductions: "Sequence[Reduction]") -> dict[str, bytes]:

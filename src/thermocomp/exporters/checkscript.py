@@ -1,15 +1,15 @@
 """A script that runs test vectors through what was written for a poor controller; it needs Python alone."""
 
-KLIPPER = '''
+KLIPPER = """
 def answers(text, rows):
     numbers = dict(re.findall(r"^(temp_coeff|max_z_adjustment)\\s*[:=]\\s*(\\S+)", text, re.M))
     coefficient, most = float(numbers["temp_coeff"]), 1e3 * float(numbers["max_z_adjustment"])
     for row in rows:
         said = -1e3 * coefficient * (float(row["now_degC"]) - float(row["homing_degC"]))
         yield min(max(said, -most), most), float(row["adjustment_um"])
-'''
+"""
 
-HEIDENHAIN = '''
+HEIDENHAIN = """
 def answers(text, rows):
     formulas = dict(re.findall(r"^([XYZ]) formula: (.*)$", text, re.M))
     for row in rows:
@@ -19,7 +19,7 @@ def answers(text, rows):
                 formula = formula.replace(f"W<{name[:-5]}>", f"({value or 0})")
         assert not re.search(r"[^-+*().0-9 ]", formula), formula
         yield -1e3 * eval(formula), float(row["correction_um"])
-'''
+"""
 
 FANUC = '''
 def run(lines, numbers):
@@ -57,8 +57,9 @@ def answers(text, rows):
         for axis, place in zip("XYZ", (5201, 5202, 5203)):
             numbers[place] = 0.0
         for number, name in inputs.items():
-            if row[name + "_degC"]:
-                numbers[int(number[1:])] = float(row[name + "_degC"])
+            value = {key.upper(): value for key, value in row.items()}[name + "_DEGC"]
+            if value:
+                numbers[int(number[1:])] = float(value)
         for _ in range(1000):  # calls, until it has arrived
             run(lines, numbers)
         place = {axis: int(number[1:]) for number, axis in forces.items()}[row["axis"]]

@@ -12,13 +12,15 @@ from thermocomp.exporters.reduced import Reduced, head, in_mm, in_um, vectors
 from thermocomp.exporters.reducedpage import write_page
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
-SIGN = "Sign: the correction, minus the deviation (actual minus commanded), is added to the external workpiece zero offset"
+SIGN = (
+    "Sign: the correction, minus the deviation (actual minus commanded), is added to the external workpiece zero offset"
+)
 UNITS = "Units: offsets in mm, temperatures in degC"
 #: what nobody has confirmed, told first and at its place
 UNCONFIRMED = (
     "UNCONFIRMED: no line of this was tried on a Fanuc control, nor confirmed by its manuals here",
-    "UNCONFIRMED: #5201, #5202, #5203 as external workpiece zero offset of X, Y, Z in mm, and that a program may write it",
-    "UNCONFIRMED: how the builder's PMC brings temperatures in degC into #501 and on; these numbers stand for yours",
+    "UNCONFIRMED: #5201, #5202, #5203 as external workpiece zero offset of X, Y, Z in mm, which a program may write",
+    "UNCONFIRMED: how the PMC brings temperatures in degC into #501 and on; these numbers stand for yours",
     "UNCONFIRMED: that IF...THEN is known to your control, and that it waits for a new offset before the next move",
 )
 _OFFSETS = {"X": 5201, "Y": 5202, "Z": 5203}
@@ -29,37 +31,43 @@ _ROOM = _FORCE["X"] - _FIRST
 #: a call at least so often [s]: what the rate allows in it is the largest change of a call
 INTERVAL = 60.0
 
-_ABOUT = """The macro works out the formula of the temperatures in common variables and moves the external workpiece zero
-offset towards it: within {most:g} um of zero and by at most {step:g} um a call, which is {rate:g} um/s at a call every
+_ABOUT = """\
+The macro works out the formula of the temperatures in common variables and moves the external workpiece zero offset
+towards it: within {most:g} um of zero and by at most {step:g} um a call, which is {rate:g} um/s at a call every
 {interval:g} s. If a temperature is vacant or beyond what is plausible, the axis keeps the correction that it has.
 
-What counts as zero is fixed: the temperatures in the macro, where the recording began. Set datums with the correction in
-force: they take in what it says then, and only changes count from there on. Nothing else may write that offset while
-it runs; what stands in it before is kept, for the macro adds."""
+What counts as zero is fixed: the temperatures in the macro, where the recording began. Set datums with the
+correction in force: they take in what it says then, and only changes count from there on. Nothing else may write
+that offset while it runs; what stands in it before is kept, for the macro adds."""
 
-_INSTALL = """All of this is **UNCONFIRMED** on a control: have the machine builder look at it.
+_INSTALL = """\
+All of this is **UNCONFIRMED** on a control: have the machine builder look at it.
 
-1. Choose free common variables that are kept at power-off in place of #500 to #{last} and, in the macro, put theirs.
-2. Have the PMC write the temperatures in degC: {sensors}. It must write vacant, or leave the value alone, if a sensor
-   fails; a zero within the plausible range is believed.
+1. Choose free common variables that are kept at power-off in place of #500 to #{last} and, in the macro, put
+   theirs.
+2. Have the PMC write the temperatures in degC: {sensors}. It must write vacant, or leave the value alone, if a
+   sensor fails; a zero within the plausible range is believed.
 3. Load `{name}.nc` under a free number in place of O9701.
-4. Call it (`M98 P9701` or `G65 P9701`) where the axes are clear and no cutter compensation is active, such as at every
-   start of a part: at least every {interval:g} s for it to keep up, and never more often for the rate to hold.
-5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the same
-   position again: the tool has to stand 0.1 mm further in its plus direction. Take it away again.
+4. Call it (`G65 P9701`, which gives it local variables of its own) where the axes are clear and no cutter
+   compensation is active, such as at every start of a part: at least every {interval:g} s for it to keep up, and
+   never more often for the rate to hold.
+5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the
+   same position again: the tool has to stand 0.1 mm further in its plus direction. Take it away again.
 6. `#500 = 1` switches it on. Set the datums anew once it has arrived.
 
 """
 
-_CHECK = """`{name}_vectors.csv` holds temperatures [degC], the deviation that the formula says ("growth") [mm], the correction
-that the offset has to arrive at [um], and its tolerance: the control rounds to 1 um. Rows beyond the trained range and
-the limit are among them, and some with a temperature that is not plausible: there nothing may move. `python3
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures [degC], the deviation that the formula says ("growth") [mm], the correction
+that the offset has to arrive at [um], and its tolerance: the control rounds to 1 um. Rows beyond the trained range
+and the limit are among them, and some with a temperature that is not plausible: there nothing may move. `python3
 {name}_check.py` (Python alone) runs the macro's own lines, a thousand calls each, and compares: exit code 0 if all
 agree. On the control: put a row's temperatures into the variables by MDI, #500 = 1, call the macro until nothing
 moves, and read the external offset. Then back to the true ones."""
 
-_OFF = """`#500 = 0`, and go on calling the macro: it takes its correction back by at most {step:g} um a call. When
-{forces} are 0 it has gone, and the calls may go, too. Never clear the external offset by hand while the macro is called."""
+_OFF = """\
+`#500 = 0`, and go on calling the macro: it takes its correction back by at most {step:g} um a call. When {forces}
+are 0 it has gone, and the calls may go, too. Never clear the external offset by hand while the macro is called."""
 
 
 def write_fanuc(
@@ -89,9 +97,10 @@ def write_fanuc(
     place = {sensor: _FIRST + k for k, sensor in enumerate(marks)}
     step = limits.rate * INTERVAL
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
-    lines = ["%", "O9701", *(f"({line})" for line in map(_comment, first))]
+    told = [f"({line})" for line in map(_comment, first)]
+    lines = ["%", f"O9701 {told[0]}", *told[1:]]
     lines += [f"(#{_ON}: 1 IS ON. ANYTHING ELSE TAKES THE CORRECTION BACK)"]
-    lines += [f"(#{place[s]}: {m} IN DEGC. UNCONFIRMED: FROM THE PMC)" for s, m in marks.items()]
+    lines += [f"(#{place[s]}: {m.upper()} IN DEGC. UNCONFIRMED: FROM THE PMC)" for s, m in marks.items()]
     for r in reductions:
         lines += _axis(r, place, limits.magnitude, step)
     page = write_page(
@@ -100,10 +109,10 @@ def write_fanuc(
         reductions,
         what="a custom macro of a Fanuc control",
         about=_ABOUT.format(most=limits.magnitude, step=step, rate=limits.rate, interval=INTERVAL),
-        limits=f"at most {limits.magnitude:g} um and {step:g} um a call are in the macro; the errors above are those of the "
-        "formula alone.",
-        failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the plausible range "
-        "moves them.",
+        limits=f"at most {limits.magnitude:g} um and {step:g} um a call are in the macro; the errors above are those of "
+        "the formula alone.",
+        failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the "
+        "plausible range moves them.",
         install=_INSTALL.format(
             name=name,
             last=_FORCE["Z"],
@@ -136,7 +145,7 @@ def _axis(r: Reduced, place: dict[str, int], most: float, step: float) -> Iterat
         yield f"IF[#{place[i.name]}EQ#0]GOTO{label + 3} ({_comment(i.name)}: VACANT. NOTHING CHANGES)"
         yield f"IF[#{place[i.name]}LT{_real(low)}]GOTO{label + 3} (NOT PLAUSIBLE)"
         yield f"IF[#{place[i.name]}GT{_real(high)}]GOTO{label + 3}"
-    yield f"#1={_real(in_mm(-r.model.intercept))} (WANTED IN MM)"
+    yield f"#1={_real(in_mm(0.0 - r.model.intercept))} (WANTED IN MM)"
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
         yield f"#1=#1-[{_real(in_mm(factor))}*[#{place[i.name]}-[{_real(zero)}]]]"
     yield from _within("#1", most)
@@ -171,13 +180,13 @@ def _vectors(reductions: Sequence[Reduced], marks: dict[str, str], most: float) 
         tried: list[tuple[float | None, ...]] = [*vectors(r)]
         for k, (low, high) in enumerate(ranges):
             warm: list[float | None] = [z + 0.5 * i.high for (i, _), z in zip(r.terms, r.zeros, strict=True)]
-            tried += [tuple(warm[:k] + [bad] + warm[k + 1 :]) for bad in (None, low - 0.1, high + 0.1, 850.0)]
+            tried += [(*warm[:k], bad, *warm[k + 1 :]) for bad in (None, low - 0.1, high + 0.1, 850.0)]
         for row in tried:
             good = [t for t, (low, high) in zip(row, ranges, strict=True) if t is not None and low <= t <= high]
             said = r.deviation(good) if len(good) == len(row) else 0.0
             known = dict(zip(names, row, strict=True))
             values = ["" if known.get(n) is None else f"{known[n]:g}" for n in marks]
-            wanted = min(max(-said, -most), most)
+            wanted = min(max(0.0 - said, -most), most)
             rows.append(",".join([r.axis, *values, f"{said / 1e3:.7f}", f"{wanted:.4f}", "1"]))
     return "\n".join(rows) + "\n"
 
@@ -191,4 +200,4 @@ def _real(number: float | str) -> str:
 def _comment(text: str) -> str:
     """Return what may stand in a comment: no brackets, no small letters, nothing beyond ASCII."""
     plain = text.upper().encode("ascii", "replace").decode()
-    return re.sub(r"[%&@;\[\]?]", ".", plain.replace("(", " ").replace(")", " "))
+    return re.sub(r"[^-+#*/=:,. 0-9A-Z_]", ".", plain.replace("(", " ").replace(")", " "))

@@ -9,14 +9,14 @@ from thermocomp.exporters.reduced import Reduced, head, in_mm, in_um, mark, vect
 from thermocomp.exporters.reducedpage import write_page
 
 SIGN = (
-    "Sign: a formula is a dimension as it is: present dimension <L> plus the deviation (actual minus commanded) in mm; a "
-    "TNC 360 word is the correction in um, minus the deviation"
+    "Sign: a formula is a dimension as it is: present dimension <L> plus the deviation (actual minus commanded) in mm; "
+    "a TNC 360 word is the correction in um, minus the deviation"
 )
 UNITS = "Units: formula in mm, TNC 360 word in whole um, W<...> in degC"
 #: what nobody has confirmed, told first and at its place
 UNCONFIRMED = (
-    "UNCONFIRMED: which way a dimension counts in your kinematics table (the wrong way doubles the error: try it as the "
-    "page says)",
+    "UNCONFIRMED: which way a dimension counts in your kinematics table; the wrong way doubles the error: try it as "
+    "the page says",
     "UNCONFIRMED: which PLC word holds which temperature, and in which unit; W<...> stands for it",
     "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 is of which axis",
     "UNCONFIRMED: whether your software takes as many digits and brackets as the formula has",
@@ -24,32 +24,37 @@ UNCONFIRMED = (
 #: of a TNC 360 [um]
 _WORD = 32_767
 
-_ABOUT = """A TNC 426/430 works out a dimension in its kinematics table by a formula (MP7530, TEMPCOMP), such as
-`300+3.45e-3*(W486-20)`: 300 mm, and 3.45e-3 mm more per degC of a PLC word. `{name}.txt` holds one per axis. A TNC 360
-takes words from the PLC, W576 to W582, of up to +-32,767 um, and follows them at 1 um/s; the display does not show it.
-An iTNC 530 (KinematicsComp, .COM tables) is not written for.
+_ABOUT = """\
+A TNC 426/430 works out a dimension in its kinematics table by a formula (MP7530, TEMPCOMP), such as
+`300+3.45e-3*(W486-20)`: 300 mm, and 3.45e-3 mm more per degC of a PLC word. `{name}.txt` holds one per axis. A TNC
+360 takes words from the PLC, W576 to W582, of up to +-32,767 um, and follows them at 1 um/s; the display does not
+show it. An iTNC 530 (KinematicsComp, .COM tables) is not written for.
 
-What counts as zero is fixed: the temperatures in the formula, where the recording began. Set datums with the formula in
-force: they take in what it says then, and only changes count from there on."""
+What counts as zero is fixed: the temperatures in the formula, where the recording began. Set datums with the
+formula in force: they take in what it says then, and only changes count from there on."""
 
-_INSTALL = """1. Ask the machine builder which dimension of the kinematics table goes along the axis, and which PLC words hold the
+_INSTALL = """\
+1. Ask the machine builder which dimension of the kinematics table goes along the axis, and which PLC words hold the
    temperatures {sensors}: **UNCONFIRMED** here. The PLC has to give them in degC; if a word holds tenths of it,
    `W<...>` is that word divided by 10. Whole degrees are too coarse: {step} um per degC.
 2. Note the old line. Put its dimension for `<L>` and the words for `W<...>`, and enter the formula.
 3. Which way it counts is **UNCONFIRMED**; find out in two minutes: with an indicator at the tool, add 0.1 mm to the
-   dimension alone and have the axis go to the same position again. If the tool stands 0.1 mm further in the **minus**
-   direction of the axis, the formula is right as it is; if in the plus direction, turn every sign behind `<L>`.
+   dimension alone and have the axis go to the same position again. If the tool stands 0.1 mm further in the
+   **minus** direction of the axis, the formula is right as it is; if in the plus direction, turn every sign behind
+   `<L>`.
 4. Set the datums anew.
 
-TNC 360: the PLC works out `word` of `{name}.txt`, rounds it to whole um, keeps it within +-{most:g} um, and writes it
-every few seconds. Try the sign with +100 um: the axis has to go 0.1 mm in its plus direction."""
+TNC 360: the PLC works out `word` of `{name}.txt`, rounds it to whole um, keeps it within +-{most:g} um, and writes
+it every few seconds. Try the sign with +100 um: the axis has to go 0.1 mm in its plus direction."""
 
-_CHECK = """`{name}_vectors.csv` holds temperatures [degC], the growth that the formula has to say beyond `<L>` [mm], the
-correction that comes of it [um], and its tolerance; beyond the trained range, too. `python3 {name}_check.py` (Python
-alone) puts them into the formulas of `{name}.txt` and compares: exit code 0 if all agree. At the control: have the PLC
-write the temperatures of a row into the words, and read the dimension, or the way that the axis goes."""
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures [degC], the growth that the formula has to say beyond `<L>` [mm], the
+correction that comes of it [um], and its tolerance; beyond the trained range, too. `python3 {name}_check.py`
+(Python alone) puts them into the formulas of `{name}.txt` and compares: exit code 0 if all agree. At the control:
+have the PLC write the temperatures of a row into the words, and read the dimension, or the way that the axis goes."""
 
-_OFF = """Move the axes clear, put the old dimension back in place of the formula (TNC 360: let the PLC write 0, which the
+_OFF = """\
+Move the axes clear, put the old dimension back in place of the formula (TNC 360: let the PLC write 0, which the
 axis follows at 1 um/s), and set the datums anew: a dimension that changes moves the tool at once."""
 
 
@@ -89,8 +94,8 @@ def write_heidenhain(
         what="a formula of a Heidenhain control",
         about=_ABOUT.format(name=name),
         limits="the formula has none: neither magnitude nor rate. A TNC 360 follows at 1 um/s.",
-        failed="the formula takes whatever a word holds: one that reads 0 degC moves the axis by its whole term. Let the "
-        "PLC keep the last good value.",
+        failed="the formula takes whatever a word holds: one that reads 0 degC moves the axis by its whole term. Let "
+        "the PLC keep the last good value.",
         install=_INSTALL.format(
             name=name,
             sensors=", ".join(marks),
@@ -146,7 +151,7 @@ def write_vectors(reductions: Sequence[Reduced], marks: dict[str, str], toleranc
         for temperatures in vectors(r):
             said, known = r.deviation(temperatures), dict(zip(names, temperatures, strict=True))
             values = [f"{known[n]:g}" if n in known else "" for n in marks]
-            rows.append(",".join([r.axis, *values, f"{said / 1e3:.7f}", f"{-said:.4f}", f"{tolerance:g}"]))
+            rows.append(",".join([r.axis, *values, f"{said / 1e3:.7f}", f"{0.0 - said:.4f}", f"{tolerance:g}"]))
     return "\n".join(rows) + "\n"
 
 

@@ -41,26 +41,32 @@ max_temp: {high:g}
 # degC. Klipper stops the printer outside: check them
 """
 
-_ABOUT = """Klipper computes `z_adjust = -temp_coeff * (temperature - temperature_at_homing)` [mm] and adds it to the
-commanded Z of every move in X or Y, not by less than a motor step at a time. What counts as zero is the smoothed
-temperature when Z was homed."""
+_ABOUT = """\
+Klipper computes `z_adjust = -temp_coeff * (temperature - temperature_at_homing)` [mm] and adds it to the commanded
+Z of every move in X or Y, not by less than a motor step at a time. What counts as zero is the smoothed temperature
+when Z was homed."""
 
-_INSTALL = """1. Copy `[z_thermal_adjust]` from `{name}.cfg` into `printer.cfg` and fill in `sensor_type`, `sensor_pin`, `min_temp`
-   and `max_temp` of the sensor that the recording calls {sensor}. A `[temperature_sensor]` of the same pin has to go.
+_INSTALL = """\
+1. Copy `[z_thermal_adjust]` from `{name}.cfg` into `printer.cfg` and fill in `sensor_type`, `sensor_pin`,
+   `min_temp` and `max_temp` of the sensor that the recording calls {sensor}. A `[temperature_sensor]` of the same
+   pin has to go.
 2. No other macro may shift Z by that temperature.
 3. `RESTART`, `G28`. Home again whenever Z is to count from the present temperature.
 4. Once, in two minutes: `SET_Z_THERMAL_ADJUST REF_TEMP=R` with R = the present temperature minus 10, then `G1` by a
-   millimetre in X and `SET_Z_THERMAL_ADJUST` alone: it tells "Applied Z adjustment", which has to be {ten} mm, and the
-   nozzle has to have gone {way}. `G28` ends the trial.
+   millimetre in X and `SET_Z_THERMAL_ADJUST` alone: it tells "Applied Z adjustment", which has to be {ten} mm, and
+   the nozzle has to have gone {way}. `G28` ends the trial.
 
 Leave it out if the sign is wrong: then the printer's Z counts otherwise than Klipper's documentation says."""
 
-_CHECK = """`{name}_vectors.csv` holds temperatures at homing and now [degC], the adjustment of Z that has to come out [um]
-and its tolerance; beyond the trained range, too. `python3 {name}_check.py` (Python alone) reads `temp_coeff` and
-`max_z_adjustment` out of `{name}.cfg`, or out of the file named behind it (`printer.cfg`), and compares: exit code 0 if
-all agree. On the printer: `SET_Z_THERMAL_ADJUST REF_TEMP=` the temperature at homing of a row near the present one."""
+_CHECK = """\
+`{name}_vectors.csv` holds temperatures at homing and now [degC], the adjustment of Z that has to come out [um] and
+its tolerance; beyond the trained range, too. `python3 {name}_check.py` (Python alone) reads `temp_coeff` and
+`max_z_adjustment` out of `{name}.cfg`, or out of the file named behind it (`printer.cfg`), and compares: exit code
+0 if all agree. On the printer: `SET_Z_THERMAL_ADJUST REF_TEMP=` the temperature at homing of a row near the present
+one."""
 
-_OFF = """`SET_Z_THERMAL_ADJUST ENABLE=0`: the adjustment stays as it is, without a jump, and is gone after the next `G28`.
+_OFF = """\
+`SET_Z_THERMAL_ADJUST ENABLE=0`: the adjustment stays as it is, without a jump, and is gone after the next `G28`.
 For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
 
 
@@ -110,7 +116,7 @@ def write_klipper(
         reductions,
         what="Klipper's [z_thermal_adjust]",
         about=_ABOUT,
-        limits=f"at most {limits.magnitude:g} um; no rate limit: what changes between two moves comes with the next one.",
+        limits=f"at most {limits.magnitude:g} um; no rate: what changes between two moves comes with the next one.",
         failed="Klipper stops the printer if the temperature is beyond `min_temp` and `max_temp`; a wrong one within "
         "them moves Z.",
         install=_INSTALL.format(
@@ -138,6 +144,6 @@ def _vectors(r: Reduced, limits: Limits) -> str:
     pairs = [(home, now) for home in (zero, round(zero + 7.5, 2)) for (now,) in vectors(r)]
     far = round(zero + 1.25 * limits.magnitude / abs(factor), 2)  # beyond the limit
     for home, now in [*pairs, (zero, far), (far, zero)]:
-        said = -factor * (now - home)
+        said = factor * (home - now)
         rows.append(f"{home:g},{now:g},{min(max(said, -limits.magnitude), limits.magnitude):.4f},0.01")
     return "\n".join(rows) + "\n"

@@ -129,7 +129,6 @@ class Reduced:
         assert factors is not None
         return [(i, f) for i, f in zip(self.model.inputs, factors, strict=True) if f]
 
-
     @property
     def zeros(self) -> list[float]:
         """What each of the temperatures counts from in a formula that knows no start [degC]."""
@@ -167,7 +166,9 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
     found = model.honest_error
     none = Left(math.nan if found is None else found.none_rms, math.nan)
     own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
-    return Reduced(model, axis, "the model is of that shape already; its error is that in the model file", none, own, own)
+    return Reduced(
+        model, axis, "the model is of that shape already; its error is that in the model file", none, own, own
+    )
 
 
 def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
@@ -208,9 +209,10 @@ def _plain(value: Decimal) -> str:
 
 
 def mark(name: str, taken: Sequence[str] = ()) -> str:
-    """Return a name as letters, digits and ``_`` alone, other than those taken."""
+    """Return a name as letters, digits and ``_`` alone, other than those taken, whatever the case."""
     found = re.sub(r"[^0-9A-Za-z_]", "_", name) or "_"
-    return found if found not in taken else f"{found}_{len(taken)}"
+    used = {t.upper() for t in taken}
+    return found if found.upper() not in used else f"{found}_{len(taken)}"
 
 
 def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> list[str]:

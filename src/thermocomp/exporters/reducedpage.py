@@ -12,11 +12,13 @@ _PAGE = """{head}
 
 ## What it leaves
 
-On cycles that it has not seen, of {beside}:
+On cycles that it has not seen:
 
 | [um] | no compensation | full model | reduced |
 |---|---|---|---|
 {errors}
+
+{beside}
 {more}
 ## What is lost
 
@@ -75,15 +77,14 @@ def write_page(
         File of the figure; empty if there is none.
     """
     ranges = "; ".join(
-        f"{r.model.target}: " + ", ".join(f"{i.name} {i.low:+.1f} to {i.high:+.1f} degC from its zero" for i, _ in r.terms)
-        for r in reductions
-    )  # fmt: skip
+        ", ".join(f"{i.name} {i.low:+.1f} to {i.high:+.1f} degC from its zero" for i, _ in r.terms) for r in reductions
+    )
     return _PAGE.format(
         head="  \n".join(head),
         name=name,
         what=what,
         about=about,
-        beside="; of ".join(dict.fromkeys(f"{r.model.target}, {r.beside}" for r in reductions)),
+        beside="\n".join(f"The full model of {r.model.target}: {r.beside}.  " for r in reductions).rstrip(),
         errors="\n".join(line for r in reductions for line in _errors(r)),
         more="\n".join(["", *_more(reductions, figure)]),
         lost=_LOST.format(limits=limits, failed=failed, ranges=ranges).strip(),
@@ -104,8 +105,8 @@ def _more(reductions: Sequence[Reduced], figure: str) -> Iterator[str]:
     for r in reductions:
         if r.replayed is not None:
             yield (
-                f"{r.model.target}: over the recordings that it was fitted to, the numbers as they are written leave RMS "
-                f"{r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but whoever "
+                f"{r.model.target}: over the recordings that it was fitted to, the numbers as they are written leave "
+                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but whoever "
                 "replays them must find it.\n"
             )
         if r.cycles:

@@ -43,8 +43,10 @@ def residuals(reductions: Sequence[Reduction]) -> Drawn:
             for text, colour, rms in lines:
                 ax.plot([], [], color=colour, label=f"{text}: RMS {rms:.2f} um")
             ax.set_ylabel(f"{shorten(r.model.target.removesuffix('_um'), LONGEST)} [um]")
-            ax.set_title(f"{r.axis}, {shorten(r.model.target, LONGEST)}: what is left of unseen cycles")
-            add_legend(ax, loc="center left", bbox_to_anchor=(1.0, 0.5))
+            ax.set_title(r.axis)
+            add_legend(ax, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(lines), borderaxespad=0.0)
             ax.margins(x=0)
-        panels[-1].set_xlabel("hours of unseen cycles, one after the other, each judged without having been learned from")
+        panels[-1].set_xlabel(
+            "unseen cycles, one after the other [h]: none of them was learned from where it is judged"
+        )
         return svg(figure)
