@@ -164,7 +164,7 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
     if to != "heidenhain" and r.most > limits.magnitude:
         raise InputError(
             f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
-            f"judged so; {to} would stop at {limits.magnitude:g} um: give --magnitude {1.2 * r.most:.0f}, if so much is right"
+            f"judged so; {to} would stop at {limits.magnitude:g} um: give --magnitude {1.2 * r.most:.0f}, if it may"
         )
 
 

@@ -109,8 +109,8 @@ def write_fanuc(
         reductions,
         what="a custom macro of a Fanuc control",
         about=_ABOUT.format(most=limits.magnitude, step=step, rate=limits.rate, interval=INTERVAL),
-        limits=f"at most {limits.magnitude:g} um and {step:g} um a call are in the macro; the errors above are those of "
-        "the formula alone.",
+        limits=f"at most {limits.magnitude:g} um and {step:g} um a call are in the macro; the errors above are those "
+        "of the formula alone.",
         failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the "
         "plausible range moves them.",
         install=_INSTALL.format(

@@ -106,8 +106,8 @@ def _more(reductions: Sequence[Reduced], figure: str) -> Iterator[str]:
         if r.replayed is not None:
             yield (
                 f"{r.model.target}: over the recordings that it was fitted to, the numbers as they are written leave "
-                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but whoever "
-                "replays them must find it.\n"
+                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but "
+                "whoever replays them must find it.\n"
             )
         if r.cycles:
             yield f"{r.model.target}: what was fitted without each cycle, and the RMS [um] that it leaves there:\n"

@@ -14,6 +14,8 @@ Sets = NDArray[np.intp]
 
 #: a further sensor has to lessen the RMS on the cycles left out by this share
 GAIN = 0.05
+#: a set that does no harm with an input lost may leave so many times what one leaves that does
+DEAR = 2.0
 #: of more sets than this of one size only those are tried that hold the best set of the size before
 _MOST_SETS = 50_000
 #: keeps what depends on itself solvable, beside columns scaled to 1
@@ -24,9 +26,9 @@ class LinearReduction(TermRegressor):
     """Least squares on the one to `max_sensors` inputs that predict best what they have not seen, in printed digits.
 
     Every set is fitted without each thermal cycle in turn and looked at on that cycle, whole and with each input lost:
-    nothing at a poor controller notices that, so sets are passed over that leave more than no model then. The smallest
-    set is taken that no larger one beats by `GAIN`; then it is fitted to all cycles, and its numbers are rounded to
-    those that a controller's file has: what is judged is what is printed.
+    nothing at a poor controller notices that, so sets that leave more than no model then are passed over, unless the
+    others are `DEAR`. The smallest set is taken that no larger one beats by `GAIN`; then it is fitted to all cycles,
+    and its numbers are rounded to those that a controller's file has: what is judged is what is printed.
 
     Parameters
     ----------
@@ -108,19 +110,25 @@ class LinearReduction(TermRegressor):
         scale = np.sqrt((X[:, moving] ** 2).mean(axis=0))
         table = np.column_stack([X[:, moving] / scale, *([np.ones(len(y))] if self.fit_intercept else []), y])
         parts = np.stack([table[folds == k].T @ table[folds == k] for k in range(int(folds.max()) + 1)])
+        safe, any_ = (self._best(parts, moving.size, len(y), fragile=fragile) for fragile in (False, True))
+        best, least = safe if safe[1] <= DEAR * any_[1] else any_
+        return tuple(moving[best].tolist()), least
+
+    def _best(self, parts: FloatArray, n: int, rows: int, *, fragile: bool) -> tuple[Sets, float]:
+        """Return the best set of n columns, also of those that do harm with an input lost if `fragile`."""
         none = float(parts[:, -1, -1].sum())
         best: Sets = np.empty(0, np.intp)
         least = np.inf
-        for size in range(1, min(self.max_sensors, moving.size) + 1):
-            sets = _sets(moving.size, size, best)
+        for size in range(1, min(self.max_sensors, n) + 1):
+            sets = _sets(n, size, best)
             unseen, lost = _unseen(parts, sets, intercept=self.fit_intercept)
-            squares = np.where((size == 1) | (lost <= none), np.maximum(unseen, 0.0), np.inf)
-            left = np.sqrt(squares / len(y))
+            squares = np.where(fragile | (size == 1) | (lost <= none), np.maximum(unseen, 0.0), np.inf)
+            left = np.sqrt(squares / rows)
             first = int(np.argmin(left))
             if size > 1 and not left[first] < (1 - GAIN) * least:
                 break
             best, least = sets[first], float(left[first])
-        return tuple(moving[best].tolist()), least
+        return best, least
 
 
 def _sets(n: int, size: int, best: Sets) -> Sets:
