@@ -1,4 +1,4 @@
-"""`thermocomp export` to controllers that hold less than a model: what is written, what is refused, and what is said."""
+"""`thermocomp export` to controllers that hold less than a model: what is written, and what is refused."""
 
 import json
 from dataclasses import replace
@@ -114,10 +114,10 @@ def test_recordings_where_they_are_needed(tmp_path: Path, capsys: pytest.Capture
 def test_axes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = written(tmp_path, growing("ch1_um", 1.0), growing("ch5_um", 3.0), growing("tilt", 1.0, "urad"))
     line = ["export", model, "--to", "heidenhain", "-o", str(tmp_path / "out"), *DATE]
-    assert run(line) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "ch5_um is left out: its axis is not known" in said
-    assert "tilt is left out: it predicts urad" in said
+    assert run(line) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "nothing to write: ch1_um: its axis is not known" in said
+    assert "tilt: it predicts urad" in said
     assert not (tmp_path / "out").exists()
     assert run([*line, "--axes", "ch5_um=z"]) == 0
     text = (tmp_path / "out" / "tc_thermal.txt").read_text()

@@ -91,6 +91,6 @@ def test_nothing_moves() -> None:
 
 def test_bad_settings_are_refused() -> None:
     X, y, _ = drift()
-    for settings in ({"max_sensors": 0}, {"digits": 0}, {"digits": 18}):
+    for sensors, digits in ((0, 5), (1, 0), (1, 18)):
         with pytest.raises(InputError, match="max_sensors"):
-            LinearReduction(**settings).fit(X, y)
+            LinearReduction(max_sensors=sensors, digits=digits).fit(X, y)

@@ -114,11 +114,14 @@ def export_reduced(
     Raises
     ------
     InputError
-        A model has to be reduced, and there is no recording; or the correction would run into its limit.
+        None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
+        no recording; or the correction would run into its limit.
     """
     shape, axes = SHAPES[to], _find_axes(models, options)
     elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to))}
     wanted = [m for m in models if m.target not in elsewhere]
+    if not wanted:
+        raise InputError(f"nothing to write: {'; '.join(f'{t}: {why}' for t, why in elsewhere.items())}")
     _refuse_twice([(m.target, axes[m.target]) for m in wanted])
     more = [m for m in wanted if not fits(m, shape)]
     if more and not recordings:

@@ -56,7 +56,8 @@ _INSTALL = """\
    millimetre in X and `SET_Z_THERMAL_ADJUST` alone: it tells "Applied Z adjustment", which has to be {ten} mm, and
    the nozzle has to have gone {way}. `G28` ends the trial.
 
-Leave it out if the sign is wrong: then the printer's Z counts otherwise than Klipper's documentation says."""
+That says that Klipper takes the sign as it is meant here. That the recording counts as it should, you know: its
+deviation is actual minus commanded, positive where a warm nozzle stands further from the bed than it was told to."""
 
 _CHECK = """\
 `{name}_vectors.csv` holds temperatures at homing and now [degC], the adjustment of Z that has to come out [um] and

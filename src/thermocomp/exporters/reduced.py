@@ -49,7 +49,17 @@ class Left(NamedTuple):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A cycle, what was fitted without it, and the RMS of what is left there [um]."""
+    """What was fitted without a cycle, and how it did there.
+
+    Parameters
+    ----------
+    name : str
+        Of the cycle.
+    model : ErrorModel
+        Reduced.
+    none, full, reduced : float
+        RMS without compensation, with the full model and with this one [um]; nan if it is not known.
+    """
 
     name: str
     model: ErrorModel
