@@ -1,6 +1,7 @@
 """A reduced model: judged on what it has not seen, beside the full one, by the numbers that are printed."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.exporters.reduced import SHAPES, as_it_is, find_axis, fits, in_mm, linear_factors, mark
+from thermocomp.files.mapping import read_mapping
+from thermocomp.files.recordings import read
 from thermocomp.models.training import train
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.stacking import stack
@@ -124,6 +127,24 @@ def test_a_single_cycle_proves_nothing() -> None:
     assert "--accept-unproven" in r.why_not(2.0)
     taken = replace(r, model=r.model.taken("M. Weber, trial"))
     assert taken.why_not(2.0) == ""
+
+
+def test_a_measured_printer(shared_data: Path) -> None:
+    """Its frame, with the bed hot: its maker finds -33.35 um/K (R, with the bed as a second input)."""
+    night = shared_data / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv"
+    whole = read(night, read_mapping(Path(__file__).parents[1] / "files" / "voron.toml"))
+    hot = np.flatnonzero(whole.table["bed_t"] > 104)[30:]
+    table = whole.table.iloc[hot].reset_index(drop=True)
+    table["z"] -= table["z"].iloc[0]
+    one = (replace(whole.cycles[0], start=0, stop=len(hot)),)
+    warm = replace(whole, table=table, time=whole.time[hot] - whole.time[hot[0]], cycles=one)
+    r = reduce_model(full(warm, "ols", "z"), "Z", [warm], SHAPES["klipper"], sensors=["frame_t"]).reduced
+    ((_, factor),) = r.terms
+    assert factor == pytest.approx(-33.35, rel=0.03)
+    assert r.none.rms > 200
+    assert r.reduced.rms == pytest.approx(6.7, abs=0.2)
+    assert r.loss < 1.5
+    assert "--accept-unproven" in r.why_not(2.0)
 
 
 def test_sensors_that_the_controller_has() -> None:

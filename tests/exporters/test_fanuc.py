@@ -57,7 +57,9 @@ def call(text: str, numbers: dict[int, float]) -> None:
 
 def settle(text: str, numbers: dict[int, float]) -> float:
     """Return the external offset of Z after many calls [um]."""
-    for _ in range(200):
+    before: dict[int, float] = {}
+    while numbers != before:
+        before = dict(numbers)
         call(text, numbers)
     return 1e3 * numbers[Z]
 

@@ -60,7 +60,9 @@ def answers(text, rows):
             value = {key.upper(): value for key, value in row.items()}[name + "_DEGC"]
             if value:
                 numbers[int(number[1:])] = float(value)
-        for _ in range(1000):  # calls, until it has arrived
+        before = None
+        while numbers != before:  # calls, until it has arrived
+            before = dict(numbers)
             run(lines, numbers)
         place = {axis: int(number[1:]) for number, axis in forces.items()}[row["axis"]]
         yield 1e3 * numbers[place], float(row["correction_um"])

@@ -61,7 +61,7 @@ _CHECK = """\
 `{name}_vectors.csv` holds temperatures [degC], the deviation that the formula says ("growth") [mm], the correction
 that the offset has to arrive at [um], and its tolerance: the control rounds to 1 um. Rows beyond the trained range
 and the limit are among them, and some with a temperature that is not plausible: there nothing may move. `python3
-{name}_check.py` (Python alone) runs the macro's own lines, a thousand calls each, and compares: exit code 0 if all
+{name}_check.py` (Python alone) runs the macro's own lines until nothing moves, and compares: exit code 0 if all
 agree. On the control: put a row's temperatures into the variables by MDI, #500 = 1, call the macro until nothing
 moves, and read the external offset. Then back to the true ones."""
 
