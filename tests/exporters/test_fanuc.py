@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from poorcontroller import exported, growing_machine, left, page_numbers, temper
 from thermocomp.core.correction import Limits
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.fanuc import UNCONFIRMED, write_fanuc
+from thermocomp.exporters.heidenhain import write_heidenhain
+from thermocomp.exporters.klipper import write_klipper
 from thermocomp.exporters.reduced import as_it_is
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
@@ -133,6 +136,23 @@ def test_what_is_not_confirmed_is_marked() -> None:
     assert page.index("UNCONFIRMED") < page.index("# tc")
     assert all(line.isascii() and line.upper() == line for line in lines)
     assert all(re.sub(r"\([^()]*\)", "", line).count("(") == 0 for line in lines)
+
+
+@pytest.mark.parametrize("name", ["t (front) #1", "Lager \u00d6l %", "[x]; ] M30", "a|b <c>"])
+def test_a_name_ends_no_comment(name: str, tmp_path: Path) -> None:
+    """What somebody called a sensor stands in comments alone, whatever the controller."""
+    model = growing("z_um", 12.0)
+    model = replace(model, inputs=(replace(model.inputs[0], name=name),))
+    for write in (write_fanuc, write_heidenhain, write_klipper):
+        for file, content in write([as_it_is(model, "Z")], Limits(), "tc", FACTS).items():
+            (tmp_path / file).write_bytes(content)
+        done = subprocess.run(
+            [sys.executable, str(tmp_path / "tc_check.py")], check=True, capture_output=True, text=True
+        )
+        assert ", 0 wrong" in done.stdout
+    code = [re.sub(r"\([^()]*\)", "", line) for line in (tmp_path / "tc.nc").read_text().splitlines()]
+    plain = macro(12.0)["tc.nc"].decode().splitlines()
+    assert code == [re.sub(r"\([^()]*\)", "", line) for line in plain]
 
 
 def test_the_vectors_hold_and_find_a_mistake(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_what_is_not_confirmed_is_marked() -> None:
     texts = write_heidenhain([as_it_is(growing("z_um", 2.0), "Z")], Limits(), "tc", FACTS)
     lines, page = texts["tc.txt"].decode().splitlines(), texts["tc.md"].decode()
     first = lines.index("")
-    assert lines[0] == "; z_um: accepted on unseen cycles; reduced to what the controller holds"
+    assert lines[0] == "; z_um: accepted on unseen cycles; the model as it is"
     assert all(f"; {line}" in lines[:first] for line in UNCONFIRMED)
     for k, line in enumerate(lines):
         if line.startswith(("Z formula", "Z word")):

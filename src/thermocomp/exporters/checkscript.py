@@ -78,8 +78,8 @@ from pathlib import Path
 here = Path(__file__).parent
 {answers}
 
-text = Path(sys.argv[1] if len(sys.argv) > 1 else here / "{file}").read_text()
-with open(here / "{name}_vectors.csv", newline="") as file:
+text = Path(sys.argv[1] if len(sys.argv) > 1 else here / "{file}").read_text(encoding="utf-8")
+with open(here / "{name}_vectors.csv", newline="", encoding="utf-8") as file:
     rows = list(csv.DictReader(file))
 worst = wrong = 0
 for row, (found, expected) in zip(rows, answers(text, rows)):

@@ -242,4 +242,5 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
         words.append(f"{r.model.target}: {'UNPROVEN, taken all the same' if taken else 'accepted on unseen cycles'}")
         more += [f"{r.model.target}: unproven, taken by {taken}"] if taken else []
         more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
-    return [f"{'; '.join(words)}; reduced to what the controller holds", *more, *facts.origin(), sign, units]
+    kind = "reduced to what the controller holds" if any(r.cycles for r in reductions) else "the model as it is"
+    return [f"{'; '.join(words)}; {kind}", *more, *facts.origin(), sign, units]
