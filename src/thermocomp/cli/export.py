@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from thermocomp import __version__
+from thermocomp.cli import reducing
+from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
@@ -19,7 +21,7 @@ from thermocomp.exporters.ststatements import Dialect
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99", "st"]
+Target = Literal["c99", "st", "klipper", "heidenhain", "fanuc"]
 
 #: all files of an export by their names, the page how to use it the last
 WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
@@ -30,6 +32,7 @@ WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
 
 def export(
     model: Path,
+    recordings: list[Path] | None = None,
     /,
     *,
     to: Target,
@@ -40,6 +43,8 @@ def export(
     fade: float = 3600.0,
     reading_age: float = 60.0,
     compensator: CompensatorOptions = CompensatorOptions(),  # noqa: B008 - frozen
+    reduction: reducing.ReductionOptions = reducing.ReductionOptions(),  # noqa: B008 - frozen
+    beginning: Beginning = Beginning(),  # noqa: B008 - frozen
     accept_unproven: str | None = None,
     date: str | None = None,
     overwrite: bool = False,
@@ -51,13 +56,18 @@ def export(
     sensor that failed, holds and fades in time, and keeps the limits. A refused model is left out; of an unproven one
     the correction stays zero.
 
+    klipper, heidenhain and fanuc hold less than a model: the best one of what they hold is fitted to recordings, judged
+    on unseen cycles beside the full one, and written with what is lost.
+
     Parameters
     ----------
     model : Path
         Model file from ``thermocomp fit``.
-    to : {'c99', 'st'}
-        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st is a function block
-        in structured text, IEC 61131-3.
+    recordings : list of Path
+        For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
+    to : {'c99', 'st', 'klipper', 'heidenhain', 'fanuc'}
+        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
+        structured text, IEC 61131-3; klipper its z_thermal_adjust; heidenhain a formula; fanuc a macro.
     output : Path
         Folder to write into.
     name : str
@@ -72,6 +82,10 @@ def export(
         Older readings are not used [s].
     compensator : CompensatorOptions
         Its limits.
+    reduction : ReductionOptions
+        How a model is reduced.
+    beginning : Beginning
+        How the recordings begin.
     accept_unproven : str
         Who takes an unproven model all the same, and why: "NAME, REASON".
     date : str
@@ -91,7 +105,10 @@ def export(
     models = [m.taken(accept_unproven) for m in modelfile.read(model)]
     refused = [m for m in models if m.honest_error is not None and m.honest_error.word == "refused"]
     left = [m for m in models if m not in refused]
-    texts: dict[str, bytes] = {}
+    reasons = {m.target: m.honest_error.reason for m in refused if m.honest_error is not None}
+    texts, elsewhere = dict[str, bytes](), dict[str, str]()
+    if recordings and to not in reducing.WRITERS:
+        raise InputError(f"{to} holds the whole model: it wants no recording, found {recordings[0]}")
     if left:
         limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
         facts = Facts(
@@ -100,8 +117,15 @@ def export(
             __version__,
             date or datetime.now(UTC).astimezone().date().isoformat(),
         )
-        made = Compensator.of(left, limits, watching=True)
-        texts = stpackage.write_package(made, name, facts, dialect) if dialect else WRITERS[to](made, name, facts)
+        if to in reducing.WRITERS:
+            texts, more, elsewhere = reducing.export_reduced(
+                to, left, recordings or [], reduction, beginning, limits, name, facts, accept_unproven, hidden=json
+            )
+            reasons |= more
+        else:
+            made = Compensator.of(left, limits, watching=True)
+            texts = stpackage.write_package(made, name, facts, dialect) if dialect else WRITERS[to](made, name, facts)
+    if texts:
         if output.exists() and not output.is_dir():
             raise InputError(f"{output}: is no folder")
         output.mkdir(parents=True, exist_ok=True)
@@ -109,14 +133,15 @@ def export(
             for file, text in texts.items():
                 written[output / file].write_bytes(text)
             written.publish()
-    reasons = {m.target: m.honest_error.reason for m in refused if m.honest_error is not None}
     if json:
-        print_json({"files": [str(output / file) for file in texts], "refused": reasons})
+        print_json({"files": [str(output / file) for file in texts], "refused": reasons | elsewhere})
     else:
         for target, why in reasons.items():
             console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
+        for target, why in elsewhere.items():
+            console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
         if texts:
             console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
             console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
             console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
-    return 1 if refused else 0
+    return 1 if reasons else 0

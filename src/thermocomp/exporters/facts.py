@@ -26,6 +26,13 @@ class Facts:
     version: str
     date: str
 
+    def origin(self) -> list[str]:
+        """Return where it comes from."""
+        return [
+            f"Model: {self.source}, SHA-256 {self.sha256}",
+            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export anew",
+        ]
+
     def lines(self, compensator: Compensator) -> list[str]:
         """Return what is to be known, the verdict in the first line.
 
@@ -39,8 +46,7 @@ class Facts:
         found += [f"unproven, taken by {who}" for who in sorted(taken)]
         return [
             *found,
-            f"Model: {self.source}, SHA-256 {self.sha256}",
-            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export anew",
+            *self.origin(),
             f"Limits: {limits.in_words()}; nothing older than {limits.reading_age:g} s is used; without a reading a "
             f"correction stays for {limits.hold:g} s and then goes to zero with a time constant of {limits.fade:g} s",
             "Sign: a correction [um] is what the controller adds to the commanded position: minus the deviation, which "
