@@ -8,20 +8,24 @@ from pathlib import Path
 from typing import Literal
 
 from thermocomp import __version__
+from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters import cpackage
+from thermocomp.exporters import cpackage, onnxpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99"]
+Target = Literal["c99", "onnx"]
 
 #: all files of an export by their names, the page how to use it the last
-WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {"c99": cpackage.write_package}
+WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
+    "c99": cpackage.write_package,
+    "onnx": onnxpackage.write_package,
+}
 
 
 def export(
@@ -43,15 +47,16 @@ def export(
     """Write the models of a file as code for another controller, with test vectors and how to use it.
 
     The code does what ``thermocomp serve`` does: it averages the zero, turns away what is not plausible, replaces a
-    sensor that failed, holds and fades in time, and keeps the limits. A refused model is left out; of an unproven one
-    the correction stays zero.
+    sensor that failed, holds and fades in time, and keeps the limits; as ONNX it takes the zero from its caller and
+    replaces no sensor. A refused model is left out; of an unproven one the correction stays zero.
 
     Parameters
     ----------
     model : Path
         Model file from ``thermocomp fit``.
-    to : {'c99'}
-        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer.
+    to : {'c99', 'onnx'}
+        What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; onnx is one step as a
+        graph, for a computer with a runtime of ONNX.
     output : Path
         Folder to write into.
     name : str
@@ -90,7 +95,8 @@ def export(
             __version__,
             date or datetime.now(UTC).astimezone().date().isoformat(),
         )
-        texts = WRITERS[to](Compensator.of(left, limits, watching=True), name, facts)
+        with needs("onnx"):  # one of them does
+            texts = WRITERS[to](Compensator.of(left, limits, watching=True), name, facts)
         if output.exists() and not output.is_dir():
             raise InputError(f"{output}: is no folder")
         output.mkdir(parents=True, exist_ok=True)

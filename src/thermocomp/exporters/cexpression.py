@@ -67,12 +67,7 @@ class Written:
                 gain = 1.0 / running - 1.0 / stopped
                 return self._lag(signal, f"dt * ({number(1.0 / stopped)} + {share} * {number(gain)})")
             case e.Recurrence(tick, interval):
-                clock = Clock(
-                    len(self.clocks),
-                    tick,
-                    interval,
-                    {n.of: None for n in walk(tick) if isinstance(n, e.Mean)} or {e.Constant(0.0): None},
-                )
+                clock = Clock.of(len(self.clocks), tick, interval)
                 self.clocks.append(clock)
                 now = ", ".join(map(self.value, clock.leaves))
                 self.lines.append(f"const tc_real now{clock.index}[{len(clock.leaves)}] = {{{now}}};")
@@ -120,6 +115,12 @@ class Clock:
                 self.past = max(self.past, node.ticks)
             if isinstance(node, e.Mean):
                 self.means = max(self.means, node.ticks)
+
+    @classmethod
+    def of(cls, index: int, tick: e.Node, interval: float) -> "Clock":
+        """Return the clock of a recurrence."""
+        leaves = {n.of: None for n in walk(tick) if isinstance(n, e.Mean)}
+        return cls(index, tick, interval, leaves or {e.Constant(0.0): None})
 
     def statements(self) -> list[str]:
         """Return the statements that work a tick out of ``mean``, ``s->mean`` and ``s->past``."""
