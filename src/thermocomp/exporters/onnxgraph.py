@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from thermocomp.core.bounds import GAP, READING
+from thermocomp.core.bounds import GAP, MEMORY, READING
 from thermocomp.exporters.block.steps import ACTIVE, FADING, HOLDING, SHADOW
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.onnxexpression import Memory, Walk
@@ -17,8 +17,6 @@ from thermocomp.exporters.onnxlimits import Drive
 from thermocomp.exporters.onnxnodes import Graph
 from thermocomp.exporters.onnxsupport import support
 
-#: numbers beyond are none of a state that this graph has made
-LARGEST = 1e300
 #: a state begins with: has it begun, its clock, were values used, and when were they
 CLOCKS = 4
 
@@ -103,11 +101,8 @@ def translate(tables: Tables) -> Block:
 def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:
     """Return the state that comes in; one with a number that this graph has not made counts as that of a start."""
     correction, slope = (g.part(state, a, b) for a, b in pairwise(places[1:]))
-    sound = g.put(
-        "And",
-        g.every(g.put("LessOrEqual", g.put("Abs", state), LARGEST)),
-        g.every(g.put("LessOrEqual", drive.largest(correction, slope), drive.magnitude * (1.0 + 1e-9))),
-    )
+    finite = g.every(g.put("LessOrEqual", g.put("Abs", state), MEMORY))
+    sound = g.put("And", finite, drive.holds(correction, slope))
     return g.choose(sound, state, 0.0)
 
 

@@ -18,7 +18,7 @@ class Drive:
 
     def __init__(self, graph: Graph, tables: Tables) -> None:
         t, self._graph = tables.values, graph
-        self.magnitude: float = t["magnitude"]
+        self._magnitude: float = t["magnitude"]
         self._rate, self._fade, self._hold = t["rate"], t["fade"], t["hold"]
         shadow, position = np.array(t["shadow"]), np.array(t["position"], dtype=np.float64)
         self._band = np.where(shadow, 0.0, t["dead_band"])
@@ -29,6 +29,13 @@ class Drive:
         mine = (line == np.arange(len(shadow))[:, None]) & ~shadow[:, None]
         self._to_offset = np.where(mine, t["to_offset"], 0.0)
         self._to_slope = np.where(mine, t["to_slope"], 0.0)
+
+    def holds(self, correction: str, slope: str) -> str:
+        """Return whether corrections are within their magnitude, and none has a slope that moves along nothing."""
+        g = self._graph
+        within = g.put("LessOrEqual", self._largest(correction, slope), self._magnitude * (1.0 + 1e-9))
+        flat = g.put("Or", g.put("Equal", slope, 0.0), self._travels)
+        return g.every(g.put("And", within, flat))
 
     def move(self, deviation: str, correction: str, slope: str, travel: str) -> tuple[str, str]:
         """Return corrections and slopes after a move towards where the models want them.
@@ -65,7 +72,7 @@ class Drive:
             How long nothing has driven them [s].
         travel : str
         """
-        g, largest = self._graph, self.largest(correction, slope)
+        g, largest = self._graph, self._largest(correction, slope)
         share = g.put("Exp", g.put("Div", g.put("Neg", travel), self._fade))
         reach = g.put("Mul", self._rate, travel)
         slow = g.put("Sub", 1.0, g.put("Div", reach, g.put("Max", largest, 1e-300)))
@@ -75,7 +82,7 @@ class Drive:
         share = g.choose(fades, share, 1.0)
         return g.put("Mul", share, correction), g.put("Mul", share, slope)
 
-    def largest(self, correction: str, slope: str) -> str:
+    def _largest(self, correction: str, slope: str) -> str:
         """Return the larger magnitude of corrections at the two ends of their travels."""
         g = self._graph
         return g.put("Max", *(g.put("Abs", self._at(correction, slope, p)) for p in self._ends))
@@ -90,7 +97,7 @@ class Drive:
 
     def _limit(self, wanted: str, current: str, travel: str) -> str:
         """Return corrections no further, no faster, and not moved for a trifle."""
-        g, most = self._graph, self.magnitude
+        g, most = self._graph, self._magnitude
         aim = g.between(wanted, -most, most)
         way, reach = g.put("Sub", aim, current), g.put("Mul", self._rate, travel)
         size = g.put("Abs", way)

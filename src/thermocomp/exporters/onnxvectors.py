@@ -76,10 +76,16 @@ def pick_zero(tables: Tables) -> FloatArray:
 
 def pick_readings(tables: Tables) -> Readings:
     """Return readings for test vectors; what is too old is missing, as the caller has to say."""
-    readings = make_readings(tables)
-    timely = (readings.age >= -CLOCK_SKEW) & (readings.age <= tables.values["reading_age"])
+    readings, age = make_readings(tables), tables.values["reading_age"]
+    timely = (readings.age >= -CLOCK_SKEW) & (readings.age <= age)
     values = np.where(timely[:, None], readings.values, np.nan)
-    return Readings(values, np.zeros(len(values)), readings.dt)
+    # a long silence before values that want much: the time that counts is no longer than an age
+    wide = np.array([[c.reference + c.low + share * (c.high - c.low) for c in tables.channels] for share in (0.9, 0.1)])
+    return Readings(
+        np.concatenate([values, wide, wide]),
+        np.zeros(len(values) + 4),
+        np.concatenate([readings.dt, [1.5 * age, 1.5 * age, 3600.0, 1.5 * age]]),
+    )
 
 
 def answer(compensator: Compensator, tables: Tables, readings: Readings, zero: FloatArray) -> Answers:
