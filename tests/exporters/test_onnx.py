@@ -123,6 +123,14 @@ def test_a_table_is_its_curve(curve: Curve, at: list[float]) -> None:
     check_graph(Compensator.of([model], FREE), rows, np.ones(len(rows)))
 
 
+def test_steps_are_taken_at_their_breaks() -> None:
+    curve = Curve((-1.0, 0.5, 2.0), (1.0, 2.0, 3.0, 4.0), "step")
+    model = accepted(Additive(**HEAD, variables=(SINGLES[1],), curves=(curve,)))
+    rows = np.array([[21.0, t, 0.0] for t in (18.5, 19.0, 20.0, 20.5, 21.0, 22.0, 23.0)])
+    said = check_graph(Compensator.of([model], FREE), rows, np.ones(7))
+    assert said.deviation.ravel().tolist() == [1.0, 2.0, 2.0, 3.0, 3.0, 4.0, 4.0]
+
+
 JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
 
 
@@ -141,12 +149,21 @@ def test_beyond_the_trained_range(
 def test_it_holds_and_fades_where_it_has_to() -> None:
     rises = np.array([[21.0], [31.0], [39.0], [41.0], [29.0]])  # trained to 18 degC, the margin included
     said = {}
-    for policy in ("hold", "fade"):
-        model = replace(growing("z_um", 1.0), support=Support(policy, margin=0.0))  # type: ignore[arg-type]
+    for support in (Support("hold", margin=0.0), Support("fade", margin=0.0)):
+        model = replace(growing("z_um", 1.0), support=support)
         model = replace(model, inputs=(replace(model.inputs[0], low=-3.0, high=15.0),))
-        said[policy] = check_graph(Compensator.of([model], FREE), rises, np.full(5, 10.0), ZERO[:1])
+        said[support.policy] = check_graph(Compensator.of([model], FREE), rises, np.full(5, 10.0), ZERO[:1])
     assert said["hold"].deviation.ravel().tolist() == [0.0, 10.0, 10.0, 10.0, 8.0]
     assert said["fade"].deviation.ravel() == pytest.approx([0.0, 10.0, 15.0 * (1 - 3 / 9), 15.0 * (1 - 5 / 9), 8.0])
+
+
+@pytest.mark.parametrize(("policy", "wanted"), [("hold", [0.0, 2.0, 2.0, 8.0]), ("fade", [0.0, 2.0, 5.52, 8.0])])
+def test_inputs_together(policy: Literal["hold", "fade"], wanted: list[float]) -> None:
+    model = Polynomial(**HEAD, variables=SINGLES, terms=((0,),), coefficients=(1.0,), support=Support(policy))
+    rows = np.array([[21.0, 20.0, 0.0], [23.0, 20.0, 0.0], [27.0, 22.0, 2760.0], [29.0, 22.0, 2740.0]])
+    model = accepted(model, joint=replace(JOINT, limit=3.0))
+    said = check_graph(Compensator.of([model], FREE), rows, np.full(4, 10.0))  # 2760 is 1.04 of what is allowed
+    assert said.deviation.ravel() == pytest.approx(wanted)
 
 
 def test_an_input_that_did_not_move_in_training_is_inside_where_it_was() -> None:
@@ -164,9 +181,16 @@ def test_an_input_that_did_not_move_in_training_is_inside_where_it_was() -> None
     assert said.deviation.ravel().tolist() == [3.0, 0.0]
 
 
-@pytest.mark.parametrize("model", [ticking(interval=15.0), net(interval=15.0), replace(ticking(), a=(0.6, 0.3999))])
+DEEP = replace(ticking(interval=15.0), a=(0.5, 0.2, -0.1), b=((1e-3, 2e-3, -5e-4, 7e-4),))
+
+
+@pytest.mark.parametrize(
+    "model", [DEEP, ticking(interval=15.0), net(interval=15.0), replace(ticking(), a=(0.6, 0.3999))]
+)
 def test_ticks_after_long_steps(model: ErrorModel) -> None:
-    steps = np.array([1.0, 15.0, 14.0, 0.001, 3600.0, 7.5, 7.5, 1e5, 1e-3, 44.999999, 45.0, 86400.0, 4.0])
+    steps = np.array(
+        [1.0, 14.99999, 15.00001, 15.0, 14.0, 0.001, 3600.0, 7.5, 7.5, 1e5, 1e-3, 44.999999, 45.0, 86400.0, 4.0]
+    )
     rows = np.resize([0.0, 3000.0, 1500.0, 6000.0], (len(steps), 1))
     check_graph(Compensator.of([accepted(model)], FREE), rows, steps, np.zeros(1))
 

@@ -56,7 +56,6 @@ class Drive:
         length = np.where(self._travels, self._high - self._low, 1.0)
         rise = g.put("Div", g.put("Sub", ends[1], ends[0]), length)
         level = g.put("And", g.put("Equal", tilt, 0.0), g.put("Equal", slope, 0.0))
-        level = g.put("Or", level, ~self._travels)
         return (
             g.choose(level, flat, g.put("Sub", ends[0], g.put("Mul", rise, self._low))),
             g.choose(level, slope, g.put("Mul", rise, 1000.0)),
