@@ -181,7 +181,7 @@ def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  
         case e.Clip(of, low, high):
             return g.between(value(of), float(low), float(high))
         case e.Sum(terms):
-            return g.add(*map(value, terms)) if terms else g.constant(0.0)
+            return _sum(g, terms, value)
         case e.Difference(of, minus):
             return g.put("Sub", value(of), value(minus))
         case e.Product(factors):
@@ -198,6 +198,21 @@ def arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str:  
         case e.Lookup(of, x, y, kind):
             return _look_up(g, value(of), np.array(x), np.array(y), steps=kind == "step")
     raise TypeError(f"{node}: no part of a formula")
+
+
+def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> str:
+    """Return a sum; what has a weight of its own is worked out at once."""
+    weights, weighted, others = list[float](), list[str](), list[str]()
+    for term in terms:
+        match term:
+            case e.Product((e.Constant(weight), part)) if len(terms) > 2:
+                weights.append(weight)
+                weighted.append(value(part))
+            case _:
+                others.append(value(term))
+    if weighted:
+        others.append(g.put("ReduceSum", g.put("Mul", np.array(weights), g.join(weighted)), keepdims=1))
+    return g.add(*others) if others else g.constant(0.0)
 
 
 def _look_up(g: Graph, at: str, x: np.ndarray, y: np.ndarray, *, steps: bool) -> str:
