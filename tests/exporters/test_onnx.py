@@ -22,7 +22,7 @@ from watchedmachine import watched_model
 from thermocomp.core.additive import Additive, Curve
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.inputs import Support
+from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
@@ -33,7 +33,7 @@ from thermocomp.exporters.onnxpackage import write_package
 from thermocomp.exporters.onnxvectors import answer, pick_readings, pick_zero
 from thermocomp.exporters.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.gate import explain_implausible
+from thermocomp.runtime.gate import explain_implausible, find_plausible_range
 
 FloatArray = NDArray[np.float64]
 FREE = Limits(magnitude=1e9, rate=1e9)
@@ -159,9 +159,9 @@ def test_it_holds_and_fades_where_it_has_to() -> None:
 
 @pytest.mark.parametrize(("policy", "wanted"), [("hold", [0.0, 2.0, 2.0, 8.0]), ("fade", [0.0, 2.0, 5.52, 8.0])])
 def test_inputs_together(policy: Literal["hold", "fade"], wanted: list[float]) -> None:
-    model = Polynomial(**HEAD, variables=SINGLES, terms=((0,),), coefficients=(1.0,), support=Support(policy))
+    line = Polynomial(**HEAD, variables=SINGLES, terms=((0,),), coefficients=(1.0,), support=Support(policy))
     rows = np.array([[21.0, 20.0, 0.0], [23.0, 20.0, 0.0], [27.0, 22.0, 2760.0], [29.0, 22.0, 2740.0]])
-    model = accepted(model, joint=replace(JOINT, limit=3.0))
+    model = accepted(line, joint=replace(JOINT, limit=3.0))
     said = check_graph(Compensator.of([model], FREE), rows, np.full(4, 10.0))  # 2760 is 1.04 of what is allowed
     assert said.deviation.ravel() == pytest.approx(wanted)
 
@@ -243,6 +243,21 @@ def test_the_zero_is_what_the_caller_says() -> None:
     said = block.run(Readings(rows, np.zeros(5), np.full(5, 10.0)), zero)
     assert said.correction.ravel().tolist() == [0.0, -8.0, -8.0, -8.0, -4.0]
     assert said.status.ravel().tolist() == [1, 1, 2, 2, 1]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit"),
+    [("temperature", "degC"), ("spindle_speed", "1/min"), ("displacement", "um")],
+)
+@pytest.mark.parametrize(("low", "high", "rezero"), [(-3.0, 15.0, True), (-3.1, 0.7, False), (-30.0, 120.0, True)])
+def test_what_is_plausible(quantity: str, unit: str, low: float, high: float, rezero: bool) -> None:
+    line = growing("x_um", 1.0)
+    channel = Input("t", quantity, unit, 20.0, rezero, low, high)
+    block, zero = GraphBlock(Compensator.of([replace(line, inputs=(channel,))], FREE)), np.array([20.3])
+    bounds = find_plausible_range(channel, 20.3 if rezero else 20.0)
+    values = [*bounds, np.nextafter(bounds[0], -np.inf), np.nextafter(bounds[1], np.inf)]
+    said = block.run(Readings(np.array(values)[:, None], np.zeros(4), np.full(4, 5.0)), zero)
+    assert said.status.ravel().tolist() == [1, 1, 2, 2]
 
 
 HOSTILE = st.one_of(

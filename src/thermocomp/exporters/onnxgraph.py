@@ -118,8 +118,8 @@ def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]
     begin = g.choose(g.put("And", rezero, known), begin, reference)
     bounded = applies > 0
     low, high, room = (np.array(t[name]) for name in ("low", "high", "room"))
-    least = g.put("Max", np.array(t["least"]), g.choose(bounded, g.add(begin, low - room), -np.inf))
-    most = g.put("Min", np.array(t["most"]), g.choose(bounded, g.add(begin, high + room), np.inf))
+    least = g.put("Max", np.array(t["least"]), g.choose(bounded, g.put("Sub", g.add(begin, low), room), -np.inf))
+    most = g.put("Min", np.array(t["most"]), g.choose(bounded, g.add(begin, high, room), np.inf))
     there = g.put("And", g.put("GreaterOrEqual", given, least), g.put("LessOrEqual", given, most))
     used = g.choose(there, given, begin)
     return g.put("Sub", used, begin), g.every(g.put("And", there, g.put("Or", known, ~rezero)))
