@@ -260,6 +260,14 @@ def test_what_is_plausible(quantity: str, unit: str, low: float, high: float, re
     assert said.status.ravel().tolist() == [1, 1, 2, 2]
 
 
+def test_a_time_that_is_none_moves_nothing() -> None:
+    steps = np.array([np.nan, 1.0, 1e10, np.nextafter(1e10, np.inf), -1e-9, 0.0, np.inf, 5.0])
+    rows = np.array([21.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0, 27.0])[:, None]
+    said = check_graph(Compensator.of([growing("x_um", 2.0)], FREE), rows, steps, ZERO[:1])
+    assert said.status.ravel().tolist() == [2, 1, 1, 2, 2, 2, 2, 1]
+    assert said.correction.ravel().tolist() == [0.0, 0.0, -2.0, -2.0, -2.0, -2.0, -2.0, -12.0]
+
+
 HOSTILE = st.one_of(
     st.floats(),
     st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0.0, 85.0, -127.0, 0.0, 65535.0]),
