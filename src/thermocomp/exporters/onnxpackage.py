@@ -81,8 +81,8 @@ no number or above 1e10 moves nothing, and so does one of 0. A state that is dam
 - No age of a reading: what is too old is yours to give as NaN.
 - Sensors are not watched: one that is not plausible stops the corrections, one that is wrong within the plausible range
   is believed, and nothing stands in for either. `thermocomp export --to c99` has all of this inside.
-- Nothing is learned from probings. Of a model that ticks at an interval, at most 100,000 ticks are made at once (17 days
-  at 15 s); what a longer gap would bring beyond is left out.
+- Nothing is learned from probings. Of a model that ticks at an interval, at most 100,000 ticks are made at once (17
+  days at 15 s); what a longer gap would bring beyond is left out.
 
 ## Switch it off
 
