@@ -52,7 +52,7 @@ $(VENV)/.study: pyproject.toml
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live]' --group dev
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live,onnx]' --group dev
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml

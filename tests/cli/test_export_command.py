@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,3 +126,52 @@ def test_models_that_average_their_zero_in_different_ways(tmp_path: Path, capsys
     model = written(tmp_path, judged("x_um", ACCEPTED), other)
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
     assert "export each file alone" in capsys.readouterr().err
+
+
+def prove_graph(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run as the page of the export says."""
+    line = re.search(r"^    python (\S+_test\.py)$", next(folder.glob("tc_*.md")).read_text(), re.M)
+    assert line is not None
+    return subprocess.run([sys.executable, line[1]], cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_a_graph_that_is_written_proves_itself(tmp_path: Path) -> None:
+    model = written(tmp_path, watched_model("z_um"), replace(watched_model("x_um"), honest_error=REFUSED))
+    line = ["export", str(model), "--to", "onnx", "--dead-band", "0.2", "--date", "2026-01-31", "-o"]
+    assert run([*line, str(tmp_path / "a"), "--name", "mill"]) == 1  # without x_um
+    done = prove_graph(tmp_path / "a")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert ", 0 wrong; largest difference " in done.stdout
+    assert run([*line, str(tmp_path / "b"), "--name", "mill"]) == 1
+    names = sorted(p.name for p in (tmp_path / "a").iterdir())
+    assert names == ["tc_mill.md", "tc_mill.onnx", "tc_mill_test.py", "tc_mill_vectors.json"]
+    assert all((tmp_path / "a" / n).read_bytes() == (tmp_path / "b" / n).read_bytes() for n in names)
+
+
+def test_a_graph_of_what_is_unproven_stays_zero(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = written(tmp_path, judged("x_um", ACCEPTED), judged("y_um", UNPROVEN))
+    assert run(["export", str(model), "--to", "onnx", "-o", str(tmp_path / "out")]) == 0
+    first = "x_um: accepted on unseen cycles; SHADOW ONLY, y_um: corrections stay zero"
+    assert capsys.readouterr().out.splitlines()[0] == first
+    assert (tmp_path / "out" / "tc_thermal.md").read_text().splitlines()[0].strip() == first
+    assert prove_graph(tmp_path / "out").returncode == 0
+    calls = json.loads((tmp_path / "out" / "tc_thermal_vectors.json").read_text())["calls"]
+    assert max(abs(c["correction"][0]) for c in calls) > 10.0
+    assert {c["correction"][1] for c in calls} == {0.0}
+
+
+def test_without_onnx_it_says_what_to_install(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = written(tmp_path, judged("x_um", ACCEPTED))
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    assert run(["export", str(model), "--to", "onnx", "-o", str(tmp_path / "out")]) == 2
+    assert "pip install 'thermocomp[onnx]'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 0
+
+
+def test_onnx_is_loaded_by_nothing_that_does_without() -> None:
+    code = "import sys, thermocomp.cli.export, thermocomp.exporters.onnxpackage; print('onnx' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

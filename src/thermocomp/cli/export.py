@@ -1,8 +1,9 @@
 """`thermocomp export`: a model file as code for another controller, with its proof."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Literal
@@ -10,23 +11,25 @@ from typing import Literal
 from thermocomp import __version__
 from thermocomp.cli import reducing
 from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters import cpackage, stpackage
+from thermocomp.exporters import cpackage, onnxpackage, stpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.ststatements import Dialect
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99", "st", "klipper", "heidenhain", "fanuc"]
+Target = Literal["c99", "st", "onnx", "klipper", "heidenhain", "fanuc"]
 
 #: all files of an export by their names, the page how to use it the last
 WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
     "c99": cpackage.write_package,
     "st": stpackage.write_package,
+    "onnx": onnxpackage.write_package,
 }
 
 
@@ -53,8 +56,8 @@ def export(
     """Write the models of a file as code for another controller, with test vectors and how to use it.
 
     The code does what ``thermocomp serve`` does: it averages the zero, turns away what is not plausible, replaces a
-    sensor that failed, holds and fades in time, and keeps the limits. A refused model is left out; of an unproven one
-    the correction stays zero.
+    sensor that failed, holds and fades in time, and keeps the limits; as ONNX it takes the zero from its caller and
+    replaces no sensor. A refused model is left out; of an unproven one the correction stays zero.
 
     klipper, heidenhain and fanuc hold less than a model: the best one of what they hold is fitted to recordings, judged
     on unseen cycles beside the full one, and written with what is lost.
@@ -65,9 +68,10 @@ def export(
         Model file from ``thermocomp fit``.
     recordings : list of Path
         For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
-    to : {'c99', 'st', 'klipper', 'heidenhain', 'fanuc'}
+    to : {'c99', 'st', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; klipper its z_thermal_adjust; heidenhain a formula; fanuc a macro.
+        structured text, IEC 61131-3; onnx one step as a graph, for a computer with a runtime of ONNX; klipper its
+        z_thermal_adjust; heidenhain a formula; fanuc a macro.
     output : Path
         Folder to write into.
     name : str
@@ -123,25 +127,30 @@ def export(
             )
             reasons |= more
         else:
-            made = Compensator.of(left, limits, watching=True)
-            texts = stpackage.write_package(made, name, facts, dialect) if dialect else WRITERS[to](made, name, facts)
+            writer = partial(stpackage.write_package, dialect=dialect) if dialect else WRITERS[to]
+            with needs("onnx"):  # one of them does
+                texts = writer(Compensator.of(left, limits, watching=True), name, facts)
     if texts:
-        if output.exists() and not output.is_dir():
-            raise InputError(f"{output}: is no folder")
-        output.mkdir(parents=True, exist_ok=True)
-        with drafts([output / file for file in texts], overwrite=overwrite) as written:
-            for file, text in texts.items():
-                written[output / file].write_bytes(text)
-            written.publish()
+        _write(output, texts, overwrite)
     if json:
         print_json({"files": [str(output / file) for file in texts], "refused": reasons | elsewhere})
-    else:
-        for target, why in reasons.items():
-            console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
-        for target, why in elsewhere.items():
-            console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
-        if texts:
-            console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
-            console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
-            console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
+        return 1 if reasons else 0
+    for target, why in reasons.items():
+        console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
+    for target, why in elsewhere.items():
+        console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
+    if texts:
+        console.print(words(texts[list(texts)[-1]].decode().split("  \n", 1)[0]), soft_wrap=True)
+        console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
+        console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
     return 1 if reasons else 0
+
+
+def _write(output: Path, texts: Mapping[str, bytes], overwrite: bool) -> None:
+    if output.exists() and not output.is_dir():
+        raise InputError(f"{output}: is no folder")
+    output.mkdir(parents=True, exist_ok=True)
+    with drafts([output / file for file in texts], overwrite=overwrite) as written:
+        for file, text in texts.items():
+            written[output / file].write_bytes(text)
+        written.publish()

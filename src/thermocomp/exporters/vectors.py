@@ -10,6 +10,7 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.reading import Reading
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +39,9 @@ class Answers(NamedTuple):
     passed: NDArray[np.bool_]  #: (n_calls,), the reading was used
 
 
-def replay(compensator: Compensator, tables: Tables, readings: Readings) -> Answers:
+def replay(
+    compensator: Compensator, tables: Tables, readings: Readings, start: CompensatorState | None = None
+) -> Answers:
     """Return what a compensator says of readings, from its start.
 
     Parameters
@@ -47,9 +50,11 @@ def replay(compensator: Compensator, tables: Tables, readings: Readings) -> Answ
     tables : Tables
         Of it.
     readings : Readings
+    start : CompensatorState, optional
+        Another one than that of `Compensator.start`.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
-    state, clock, begun, rows = compensator.start(), 0.0, False, []
+    state, clock, begun, rows = start or compensator.start(), 0.0, False, []
     for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good

@@ -1,13 +1,14 @@
 """Formulas of models as functions of a block: one variable per part, lags and clocks in what is kept."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.exporters.block.supporting import Supports
+from thermocomp.exporters.recurrences import Clock
 
 #: beyond every value that a table is asked for
 _BEYOND = 1e30
@@ -160,17 +161,11 @@ class Formulas:
         raise TypeError(f"{node}: no part of a formula")
 
 
-class _Clock:
-    """A value that is made anew at every tick of a clock of its own: see `thermocomp.core.expression.Recurrence`."""
+class _Clock(Clock):
+    """A value with a clock of its own, and where in the block's arrays it keeps what was."""
 
     def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
-        self.tick, self.interval = tick, interval
-        parts = list(_walk(tick))
-        means = [n for n in parts if isinstance(n, e.Mean)]
-        self.leaves = list(dict.fromkeys(n.of for n in means)) or [e.Constant(0.0)]
-        #: how many ticks back it looks at itself, and at the means
-        self.past = max([1, *(n.ticks for n in parts if isinstance(n, e.Past))])
-        self.means = max([1, *(n.ticks for n in means)])
+        super().__init__(tick, interval)
         self.past_begin = sum(c.past for c in before)
         self.leaf_begin = sum(len(c.leaves) for c in before)
         self.average_begin = sum(c.means * len(c.leaves) for c in before)
@@ -192,19 +187,3 @@ def number(value: float) -> str:
     if not math.isfinite(value):
         raise ValueError(f"{value}: is not finite")
     return repr(float(value))
-
-
-def _walk(node: e.Node) -> Iterator[e.Node]:
-    """Give a part and all that it is made of, what a `Mean` is of excepted."""
-    yield node
-    match node:
-        case e.Sum(parts) | e.Product(parts):
-            inner: tuple[e.Node, ...] = parts
-        case e.Sigmoid(of) | e.Named(_, of) | e.Clip(of) | e.Magnitude(of) | e.Power(of) | e.Lookup(of):
-            inner = (of,)
-        case e.Difference(of, minus):
-            inner = (of, minus)
-        case _:
-            inner = ()
-    for part in inner:
-        yield from _walk(part)

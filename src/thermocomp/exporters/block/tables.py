@@ -79,7 +79,7 @@ def gather(compensator: Compensator) -> Tables:
     formulas = Formulas(ranges, values["channel"])
     for name, waits in (("absolute", False), ("rezeroed", True)):
         mine = [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
-        formulas.add(name, [(k, m, _formula(m, ranges)) for k, m in mine])
+        formulas.add(name, [(k, m, formula(m, ranges)) for k, m in mine])
     own_sizes, own_values = formulas.finish()
     values |= own_values
     sizes = {
@@ -104,7 +104,7 @@ def gather(compensator: Compensator) -> Tables:
     return Tables(channels, ranges, sensors, tuple(lines), models, sizes, values, formulas.functions)
 
 
-def _formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
+def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
     """Return what a model computes, its inputs being numbered as the ranges are."""
     low, high, _ = model.bounds
     leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)

@@ -1,0 +1,44 @@
+"""What a value with a clock of its own looks back at: see `thermocomp.core.expression.Recurrence`."""
+
+from collections.abc import Iterator
+
+from thermocomp.core import expression as e
+
+
+class Clock:
+    """A value that is made anew at every tick.
+
+    Parameters
+    ----------
+    tick : Node
+        What it becomes.
+    interval : float
+        From tick to tick [s].
+    """
+
+    def __init__(self, tick: e.Node, interval: float) -> None:
+        self.tick, self.interval = tick, interval
+        parts = list(_walk(tick))
+        means = [n for n in parts if isinstance(n, e.Mean)]
+        #: what it takes means of
+        self.leaves: list[e.Node] = list(dict.fromkeys(n.of for n in means)) or [e.Constant(0.0)]
+        #: how many ticks back it looks at itself
+        self.past = max([1, *(n.ticks for n in parts if isinstance(n, e.Past))])
+        #: how many ticks back it looks at the means
+        self.means = max([1, *(n.ticks for n in means)])
+
+
+def _walk(node: e.Node) -> Iterator[e.Node]:
+    """Give a part and all that it is made of, what a `Mean` is of excepted."""
+    yield node
+    match node:
+        case e.Sum(parts) | e.Product(parts):
+            inner: tuple[e.Node, ...] = parts
+        case e.Sigmoid(of) | e.Named(_, of) | e.Clip(of) | e.Magnitude(of) | e.Power(of) | e.Lookup(of):
+            inner = (of,)
+        case e.Difference(of, minus):
+            inner = (of, minus)
+        case _:
+            inner = ()
+    for part in inner:
+        yield from _walk(part)
