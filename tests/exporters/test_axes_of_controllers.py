@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from compiledblock import check_block as check_c99
 from driftmodels import ACCEPTED, growing
-from stmachine import Machine
-from test_c99 import check_block as check_c99
-from test_structuredtext import FACTS, check_block
+from stmachine import Machine, check_block
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -21,10 +20,12 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.exporters import beckhoff, siemens
 from thermocomp.exporters.axes import find_drives, write_values
 from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.structuredtext import translate
 from thermocomp.exporters.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
 
+FACTS = Facts("model.json", "0" * 64, "0", "2026-01-31")
 FREE = Limits(magnitude=1e9, rate=1e9)
 
 
