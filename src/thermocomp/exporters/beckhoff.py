@@ -38,8 +38,8 @@ and offset of these parameters in your version (look them up in the documentatio
 the CNC adds the value to the command (1) or takes it off (-1). Try it, the spindle standing and an indicator on the
 axis: with P-AXIS-00273 at 200 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the CNC takes it off.
 
-At power-on the block begins with corrections of 0: write the parameters as 0 before the axes are homed, if the CNC keeps
-them.
+At power-on the block begins with corrections of 0: write the parameters as 0 before the axes are homed, if the CNC
+keeps them.
 
 The CNC spreads a change over a number of cycles of its own; here a correction changes by at most {rate:g} um/s.
 """

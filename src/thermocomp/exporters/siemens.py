@@ -39,8 +39,8 @@ as the vendor's worked example of a screw that grows has it) or adds it. Try it,
 on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis at 0.02 and all else at 0, the axis moves by 0.02 mm; by minus
 0.02 mm if the NC takes it off.
 
-At power-on the block begins with corrections of 0, and the setting data are still what was written last: write them as 0
-before the axes are referenced.
+At power-on the block begins with corrections of 0, and the setting data are still what was written last: write them
+as 0 before the axes are referenced.
 
 The NC moves an axis by a changed value at most with dv = MD32000 x MD32760, spread over cycles; tan beta is limited to
 MD32760. Here a correction changes by at most {rate:g} um/s = {speed:g} mm/min. With MD32760 = 0.01 (the 808D's
