@@ -12,9 +12,9 @@ from driftmodels import ACCEPTED
 from families import FAMILIES, READINGS
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from spoiling import models_of, spoiled
+from spoiling import FAILURES, models_of, spoiled
 from stmachine import Machine, check_block, check_same, parsed, run
-from watchedmachine import watched_model
+from watchedmachine import failing, watched_model
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Support
@@ -122,6 +122,14 @@ def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Unit]
         assert list(fresh.call(**again, restart=False).status) == list(machine.memory.status)
     assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
     assert moved[-1] == fresh.memory.correction[0]
+
+
+@pytest.mark.parametrize("failure", FAILURES)
+def test_every_failure_that_the_watch_knows(failure: str) -> None:
+    compensator, day = Compensator.of([watched_model("z_um")]), failing()
+    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64, copy=True)
+    FAILURES[failure](rows)
+    check_block(compensator, Readings(rows, np.zeros(len(rows)), np.diff(day.time, prepend=day.time[0])))
 
 
 @pytest.mark.long
