@@ -1,6 +1,7 @@
 """Test vectors: readings, faults among them, and what the compensator itself makes of each."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ from numpy.typing import NDArray
 from thermocomp.core.bounds import GAP
 from thermocomp.core.reading import Reading
 from thermocomp.exporters.block.tables import Tables
+from thermocomp.exporters.warming import Warming
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watch import RETURN, WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -81,56 +83,84 @@ def replay(
 def make_readings(tables: Tables) -> Readings:
     """Return readings that take a compensator through all that it does.
 
-    A start at rest, a warm-up at changing speeds, values beyond the trained range, each of them missing, wild or
-    impossible for a while, readings that are late, old or out of order, a source that falls silent until corrections
-    have gone to zero, and a return.
+    A start at rest and a warm-up at changing speeds; each value missing, wild or impossible for a while; readings that
+    are late, old or out of order; a source that falls silent until corrections have gone to zero, and a return; sensors
+    that stick, jump and drift one after the other; values beyond the trained range.
 
     Parameters
     ----------
     tables : Tables
     """
-    rest = np.array([i.reference + min(max(0.0, i.low), i.high) for i in tables.channels])
-    low = np.array([i.reference + i.low for i in tables.channels])
-    high = np.array([i.reference + i.high for i in tables.channels])
-    heat = np.array([i.quantity == "temperature" for i in tables.channels])
+    machine = Warming(tables)
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
     rows: list[tuple[FloatArray, float, float]] = []
 
     def add(values: FloatArray, dt: float, old: float = 0.0) -> None:
-        noise = np.where(heat, 0.002 * rng.standard_normal(len(rest)), 0.0)
+        noise = np.where(machine.heat, 0.002 * rng.standard_normal(len(values)), 0.0)
         rows.append((np.round(values + noise, 4), old, dt))
 
-    warm = rest
     for _ in range(45):
-        add(rest, 10.0, 0.5)
-    for k in range(120):  # heat follows what drives it
-        share = (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
-        warm = warm + np.where(heat, 0.06 * (rest + share * (high - rest) - warm), rest + share * (high - rest) - warm)
-        add(warm, 60.0 if k % 3 else 12.0, 0.25)
-    for k in range(24):
-        add(warm + 1.3 * (high - low) * math.sin(k / 4), 20.0)
-    for c in range(len(rest)):
+        add(machine.run(0.0, 10.0), 10.0, 0.5)
+    for k in range(120):
+        dt = 60.0 if k % 3 else 12.0
+        add(machine.run(_share(k), dt), dt, 0.25)
+    for c in range(len(machine.rest)):
         for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
-            hurt = warm.copy()
-            hurt[c] = wild
-            add(hurt, 15.0)
-        add(warm, 15.0)
+            values = machine.run(0.8, 15.0)
+            values[c] = wild
+            add(values, 15.0)
+        for _ in range(4):  # until it is believed again
+            add(machine.run(0.8, RETURN / 3), RETURN / 3)
+    _turn(machine, add, 30)
+    warm = machine.run(0.8, 10.0)
     for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
         add(warm, 10.0, old)
-    for dt in (math.nan, -1.0, 0.0, 1e6):
+    for dt in (math.nan, -1.0, 0.0):
         add(warm, dt)
     # silence: just before and just behind the end of the hold, then until all has faded
     held = min(math.ceil(hold / age), 200)
     waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * min(math.ceil(3 * fade / age), 200)
     for dt in waits:
         rows.append((rows[-1][0], rows[-1][1] + dt + age, dt))
-    for _ in range(8):  # there and back as fast as it may
-        add(warm, 7.0)
-    add(rest, 4 * 3600.0)
-    for _ in range(8):
-        add(rest, 7.0)
-    for k in range(40):
-        add(warm + (rest - warm) * min(k / 20, 1.0), 60.0)
+        machine.run(0.0, dt)
+    for share, dt in _THERE_AND_BACK:
+        add(machine.run(share, dt), dt)
+    _fail(tables, machine, add)
+    for k in range(24):
+        add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
+    add(machine.rest, 1e6)
+    _turn(machine, add, 20)
     values, ages, steps = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(3))
     return Readings(values, ages, steps)
+
+
+#: as fast as a correction may
+_THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + [(0.0, 7.0)] * 8
+
+
+def _share(k: int) -> float:
+    """Return the share of top speed in a step of a test."""
+    return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
+
+
+def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: int) -> None:
+    for k in range(minutes):
+        add(machine.run(_share(k), 60.0), 60.0)
+
+
+def _fail(tables: Tables, machine: Warming, add: Callable[[FloatArray, float], None]) -> None:
+    """Let sensors fail while the machine warms up: first one that may be lost, then others."""
+    sensors = np.array(tables.values["sensor_channel"] if tables.sensors else np.flatnonzero(machine.heat))
+    if not len(sensors):
+        return
+    may = np.all(tables.values["may_lose"], axis=0) if tables.sensors else np.zeros(len(sensors), np.bool_)
+    moves = (machine.high - machine.low)[sensors]
+    stuck, stepped, drifting = (int(sensors[k]) for k in np.resize(np.lexsort((-moves, ~may)), 3))
+    before = machine.run(0.0, 60.0)[stuck]
+    for k in range(60):
+        values = machine.run(_share(k + 10), 60.0)
+        values[stuck] = before
+        values[stepped] += 6.0 * (k >= 25)
+        values[drifting] += 0.3 * max(k - 40, 0)
+        add(values, 60.0)
