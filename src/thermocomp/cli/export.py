@@ -17,18 +17,19 @@ from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters import cpackage, onnxpackage, stpackage
+from thermocomp.exporters import cpackage, linuxcncpackage, onnxpackage, stpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.ststatements import Dialect
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99", "st", "onnx", "klipper", "heidenhain", "fanuc"]
+Target = Literal["c99", "st", "linuxcnc", "onnx", "klipper", "heidenhain", "fanuc"]
 
 #: all files of an export by their names, the page how to use it the last
 WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
     "c99": cpackage.write_package,
     "st": stpackage.write_package,
+    "linuxcnc": linuxcncpackage.write_package,
     "onnx": onnxpackage.write_package,
 }
 
@@ -68,9 +69,9 @@ def export(
         Model file from ``thermocomp fit``.
     recordings : list of Path
         For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
-    to : {'c99', 'st', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
+    to : {'c99', 'st', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; onnx one step as a graph, for a computer with a runtime of ONNX; klipper its
+        structured text, IEC 61131-3; linuxcnc that C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one step as a graph, for a computer with a runtime of ONNX; klipper its
         z_thermal_adjust; heidenhain a formula; fanuc a macro.
     output : Path
         Folder to write into.
@@ -128,6 +129,9 @@ def export(
             reasons |= more
         else:
             writer = partial(stpackage.write_package, dialect=dialect) if dialect else WRITERS[to]
+            if to == "linuxcnc":
+                left, axes, elsewhere = reducing.along_axes(left, reduction, to, "XYZ")
+                writer = partial(linuxcncpackage.write_package, axes=axes)
             with needs("onnx"):  # one of them does
                 texts = writer(Compensator.of(left, limits, watching=True), name, facts)
     if texts:

@@ -117,12 +117,8 @@ def export_reduced(
         None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
         no recording; or the correction would run into its limit.
     """
-    shape, axes = SHAPES[to], _find_axes(models, options)
-    elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to))}
-    wanted = [m for m in models if m.target not in elsewhere]
-    if not wanted:
-        raise InputError(f"nothing to write: {'; '.join(f'{t}: {why}' for t, why in elsewhere.items())}")
-    _refuse_twice([(m.target, axes[m.target]) for m in wanted])
+    shape = SHAPES[to]
+    wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
     more = [m for m in wanted if not fits(m, shape)]
     if more and not recordings:
         raise InputError(
@@ -148,12 +144,40 @@ def export_reduced(
     return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
 
 
-def _why_elsewhere(model: ErrorModel, axis: str, to: str) -> str:
+def along_axes(
+    models: Sequence[ErrorModel], options: ReductionOptions, to: str, corrected: str
+) -> tuple[list[ErrorModel], dict[str, str], dict[str, str]]:
+    """Return the models that a controller takes, the axes by target, and why others are left out.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+    options : ReductionOptions
+    to : str
+        The controller.
+    corrected : str
+        Letters of the axes that it corrects.
+
+    Raises
+    ------
+    InputError
+        None goes along one of these, or two along one.
+    """
+    axes = _find_axes(models, options)
+    elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to, corrected))}
+    wanted = [m for m in models if m.target not in elsewhere]
+    if not wanted:
+        raise InputError(f"nothing to write: {'; '.join(f'{t}: {why}' for t, why in elsewhere.items())}")
+    _refuse_twice([(m.target, axes[m.target]) for m in wanted])
+    return wanted, axes, elsewhere
+
+
+def _why_elsewhere(model: ErrorModel, axis: str, to: str, corrected: str) -> str:
     if model.unit != "um":
         return f"it predicts {model.unit}, and a correction is in um"
     if not axis:
         return f"its axis is not known: --axes {model.target}=Z would say that it is Z"
-    return "" if axis in SHAPES[to].axes else f"it is of {axis}, and {to} corrects {SHAPES[to].axes} alone"
+    return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
 
 
 def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
