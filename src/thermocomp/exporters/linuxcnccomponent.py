@@ -55,7 +55,7 @@ static hal_u32_t heard;
 static int fresh, could;
 
 /* Return the counts by which an external offset lacks what it shall be. */
-static hal_s32_t lacking(int k, double at, double request, int on, double seconds, double per_mm)
+static int lacking(int k, double at, double request, int on, double seconds, double per_mm)
 {{
     const double part = waited < SECOND ? (double)waited / SECOND : 1.0;
     double line, wanted, gap, error;
@@ -75,7 +75,7 @@ static hal_s32_t lacking(int k, double at, double request, int on, double second
     share[k] += 0.001 * per_mm * RATE * seconds / (gap > 1e-9 * per_mm ? gap : 1e-9 * per_mm);
     share[k] = share[k] < 1.0 ? share[k] : 1.0;
     error = (base[k] + share[k] * (wanted - base[k]) - request) / ({resolution!r} * per_mm);
-    return fabs(error) < 1e6 ? (hal_s32_t)lround(error) : 0;
+    return fabs(error) < 1e6 ? (int)lround(error) : 0;
 }}
 
 FUNCTION(_)
