@@ -44,12 +44,15 @@ include "{name}.c";
 #define SECOND 1000000000LL /* [ns] */
 #define MAGNITUDE {magnitude!r} /* um */
 #define RATE {rate!r} /* um/s */
+#define LARGEST 1e6 /* counts in a period */
 
 enum {{ INPUTS = {inputs}, TARGETS = {targets} }};
 
 static {name}_state state; /* all zero: begun */
 static double begin[TARGETS], begin_slope[TARGETS]; /* what the corrections were a second ago */
 static double base[TARGETS], share[TARGETS]; /* an offset that was found, and the way from there */
+static long sent[TARGETS]; /* counts since then */
+static int lost[TARGETS];
 static long long since, waited; /* the last reading, the last step [ns] */
 static hal_u32_t heard;
 static int fresh, could;
@@ -57,25 +60,31 @@ static int fresh, could;
 /* Return the counts by which an external offset lacks what it shall be. */
 static int lacking(int k, double at, double request, int on, double seconds, double per_mm)
 {{
-    const double part = waited < SECOND ? (double)waited / SECOND : 1.0;
-    double line, wanted, gap, error;
+    const double part = waited < SECOND ? (double)waited / SECOND : 1.0, count = {resolution!r} * per_mm;
+    double line, wanted, gap, order;
 
     line = begin[k] + part * ((double)state.correction[k] - begin[k]);
     line += 0.001 * at * (begin_slope[k] + part * ((double)state.slope[k] - begin_slope[k]));
-    if (!isfinite(line) || !isfinite(request)) {{
+    lost[k] = 0;
+    if (!on) {{ /* begin at what is in force */
+        base[k] = isfinite(request) ? request : 0.0;
+        share[k] = 0.0;
+        sent[k] = 0;
         return 0;
     }}
-    if (!on) {{ /* begin at what is in force */
-        base[k] = request;
-        share[k] = 0.0;
+    /* what was asked for has to be there: else another one moves it, or nobody listens */
+    lost[k] = !(fabs(request - (base[k] + (double)sent[k] * count)) < 0.5 * count);
+    if (lost[k] || !isfinite(line)) {{
         return 0;
     }}
     wanted = 0.001 * per_mm * (line > MAGNITUDE ? MAGNITUDE : line < -MAGNITUDE ? -MAGNITUDE : line);
     gap = fabs(wanted - base[k]);
     share[k] += 0.001 * per_mm * RATE * seconds / (gap > 1e-9 * per_mm ? gap : 1e-9 * per_mm);
     share[k] = share[k] < 1.0 ? share[k] : 1.0;
-    error = (base[k] + share[k] * (wanted - base[k]) - request) / ({resolution!r} * per_mm);
-    return fabs(error) < 1e6 ? (int)lround(error) : 0;
+    order = (base[k] + share[k] * (wanted - base[k]) - request) / count;
+    order = order > LARGEST ? LARGEST : order < -LARGEST ? -LARGEST : order;
+    sent[k] += lround(order);
+    return (int)lround(order);
 }}
 
 FUNCTION(_)
@@ -124,7 +133,9 @@ _TOLD = """        for (k = 0; k < {sensors}; k++) {{
             fault(k) = state.fault[k];
         }}
 """
-_MOVE = "    {a}_counts += lacking({k}, {at}, {a}_request, on, 1e-9 * (double)period, unit);\n"
+_MOVE = """    {a}_counts += lacking({k}, {at}, {a}_request, on, 1e-9 * (double)period, unit);
+    {a}_lost = lost[{k}];
+"""
 
 _HAL = """{facts}
 loadrt {component}
@@ -186,7 +197,7 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
     for k, target in enumerate(tables.targets):
         a, at = letters[target].lower(), "0.0"
         pins.append(f"\n/* {letters[target]}: {comment(target)} */")
-        pins += [f"pin in float {a}-request;", f"pin out s32 {a}-counts;"]
+        pins += [f"pin in float {a}-request;", f"pin out s32 {a}-counts;", f"pin out bit {a}-lost;"]
         if has_slopes(tables):
             pins.append(f"pin in float {a}-position;")
             at = f"{a}_position / unit - {tables.values['position'][k]!r}"
