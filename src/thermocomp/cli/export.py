@@ -71,8 +71,9 @@ def export(
         For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
     to : {'c99', 'st', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; linuxcnc that C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one step as a graph, for a computer with a runtime of ONNX; klipper its
-        z_thermal_adjust; heidenhain a formula; fanuc a macro.
+        structured text, IEC 61131-3; linuxcnc that C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one
+        step as a graph, for a computer with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula;
+        fanuc a macro.
     output : Path
         Folder to write into.
     name : str

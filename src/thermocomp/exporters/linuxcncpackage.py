@@ -1,4 +1,4 @@
-"""All files of an export to LinuxCNC: the C99, a component of HAL around it, HAL that moves axes, and how to use them."""
+"""All files of an export to LinuxCNC: the C99, a component of HAL around it, HAL that moves axes, and a page."""
 
 import re
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from thermocomp.exporters import cpackage
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.c99 import identifier
 from thermocomp.exporters.facts import Facts
-from thermocomp.exporters.linuxcnccomponent import has_slopes, name_component, write_component, write_hal
+from thermocomp.exporters.linuxcnccomponent import name_component, write_component, write_hal
 from thermocomp.exporters.pages import describe
 from thermocomp.exporters.reduced import find_axis
 from thermocomp.runtime.compensator import Compensator
@@ -17,9 +17,9 @@ _README = """{facts}
 
 # {name}: thermal compensation in LinuxCNC's HAL
 
-`{component}.comp` is a component for the servo thread. It runs `{name}.c` once a second, without Python and without
-allocation, and moves external offsets of {letters} in steps of 0.01 um. For LinuxCNC 2.9 in user space (Debian's, or
-with a kernel of PREEMPT_RT), not for RTAI.
+`{component}.comp` is a component for the servo thread. It runs `{name}.c` once a second, without Python and
+without allocation, and moves external offsets of {letters} in steps of 0.01 um. For LinuxCNC 2.9 in user space
+(Debian's, or with a kernel of PREEMPT_RT), not for RTAI.
 
 The other way is `thermocomp linuxcnc setup` with `thermocomp serve`: models, page, journal and probings are kept by a
 service there, and HAL keeps the correction alone. Use one of the two.
@@ -33,19 +33,23 @@ if all is well. Step 6 below proves the rest at the machine.
 
 ## Install it
 
-1. `sudo apt-get install linuxcnc-uspace-dev`, and in this folder: `sudo halcompile --install {component}.comp`. After an
-   update of LinuxCNC do it again.
-2. Copy `{name}.hal` beside the machine's INI, and add to its `[HAL]`, behind the other lines: `HALFILE = {name}.hal`.
-3. Add `OFFSET_AV_RATIO = 0.1` to {sections}: the share of speed and acceleration that an external offset may take.
-   Without it LinuxCNC takes offsets and does nothing. Nothing else may use an external offset of these axes.
-4. `{name}.hal` has places to **FILL IN**: where each value comes from. A value that comes from nowhere is missing.
+1. `sudo apt-get install linuxcnc-uspace-dev`, and in this folder: `sudo halcompile --install {component}.comp`.
+   After an update of LinuxCNC do it again. A warning that a frame is larger than 2560 bytes may be passed over: the
+   servo thread has a stack of 1 MB.
+2. Copy `{name}.hal` beside the machine's INI, and add to its `[HAL]`, behind the other lines:
+   `HALFILE = {name}.hal`.
+3. Add `OFFSET_AV_RATIO = 0.1` to {sections}: the share of speed and
+   acceleration that an external offset may take. Without it LinuxCNC takes offsets and does nothing. Nothing else may
+   use an external offset of these axes.
+4. `{name}.hal` has places to **FILL IN**: where each value comes from. A value that comes from nowhere is missing, and
+   without a count of `reading` nothing ever moves.
 5. Have whoever reads the sensors write all values, and then count `reading` up (any change will do), every second or
-   ten. If that stands still, the values are old. Where values come from inputs that the servo thread reads itself, let a
-   `charge_pump` through `conv_bit_u32` count, and give the watchdog of the card, inverted, to `good-K`.
+   ten. If that stands still, the values are old. Where values come from inputs that the servo thread reads itself, let
+   a `charge_pump` count through `conv_bit_u32`, and give the watchdog of the card, inverted, to `good-K`.
 6. Start LinuxCNC, home, and look: `halcmd show pin {hal}`. `rejected` has to be 0 within the second of a reading, and
    `engaged` TRUE when the machine is on, homed, and in MDI, AUTO or jogging axes. Once a correction is not zero,
    {offsets} must be as large, in machine units. **Try the sign**: with a dial gauge on the axis, the tool has to move
-   by the correction, in plus direction if it is positive. `motion.eoffset-limited` is TRUE when a soft limit cuts it.
+   by the correction, in plus direction if it is positive. `motion.eoffset-limited` is TRUE while a soft limit cuts it.
 
 | value | what it is | unit |
 |---|---|---|
@@ -55,13 +59,17 @@ if all is well. Step 6 below proves the rest at the machine.
 |---|---|---|
 {corrections}
 
-As pins the corrections are in mm. {zero} {status}{sensors}
+{zero} {status}{sensors}
 
-A reading counts once: between readings `rejected` is 1 and `status-K` 2, and nothing moves. When the machine is
-switched on again, LinuxCNC has set its offsets to zero; they come back no faster than the rate.
+A reading counts once: between readings `rejected` is 1 and `status-K` 2, and nothing moves.
 
 A value that is NaN or not plausible, `good-K` FALSE, and a `reading` that stands still move no axis: the correction
-stays for {hold:g} s and then goes to zero. `#5063` of a probing has the external offset in it.
+stays for {hold:g} s and then goes to zero. Where an offset is not what was asked for, because something else clears or
+moves it, {losts} TRUE and nothing is sent until the machine was off and on.
+
+When the machine is switched on again, LinuxCNC has set its offsets to zero; they come back no faster than the rate. It
+takes the place where the axis stands for the commanded one then, until the next absolute move. `#5063` of a probing has
+the external offset in it.
 
 ## Switch it off
 
@@ -97,6 +105,7 @@ def write_package(
         raise InputError(f"want an axis of its own for each target, found {letters}")
     component = name_component(name)
     about = describe(compensator, tables)
+    about["corrections"] = str(about["corrections"]).replace("[um]", "[mm]")  # as pins
     sections = [f"`[AXIS_{a}]`" for a in letters.values()]
     page = _README.format(
         facts="  \n".join(said),
@@ -106,6 +115,7 @@ def write_package(
         letters=_joined(list(letters.values())),
         sections=_joined(sections),
         offsets=_joined([f"`axis.{a.lower()}.eoffset`" for a in letters.values()]),
+        losts=_joined([f"`{a.lower()}-lost`" for a in letters.values()]) + (" are" if len(letters) > 1 else " is"),
         **{k: re.sub(r"`(\w+)\[(\w+)\]`", r"`\1-\2`", v) if isinstance(v, str) else v for k, v in about.items()},
     )
     texts = {
