@@ -14,13 +14,65 @@ from watchedmachine import watched_model
 
 from thermocomp.cli.app import run
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
 from thermocomp.core.provenance import HonestError
-from thermocomp.files import modelfile
+from thermocomp.files import modelfile, positionfile
 
 UNPROVEN = replace(ACCEPTED, verdict="unproven", reason="one cycle is not enough")
 REFUSED = replace(ACCEPTED, verdict="refused", reason="worse than nothing")
 CC = shutil.which("gcc") or shutil.which("cc")
 needs_compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+
+
+def along_x() -> PositionModel:
+    slope = replace(growing("EXX", 12.0, "um/m"), honest_error=ACCEPTED)
+    return PositionModel(target="EXX", unit="um", axis="X", travel=(-200.0, 600.0), slopes=(slope,))
+
+
+def test_of_an_error_along_an_axis(tmp_path: Path) -> None:
+    positionfile.write([along_x()], tmp_path / "x.json")
+    for target in ("c99", "st", "siemens", "beckhoff"):
+        assert run(["export", str(tmp_path / "x.json"), "--to", target, "-o", str(tmp_path / target)]) == 0
+    page = (tmp_path / "siemens" / "tc_thermal.md").read_text()
+    assert "| 0 | X | EXX | 3 (bits 0, 1) |" in page
+    assert "its profile stays a table" in page
+    if CC:
+        assert prove(tmp_path / "c99").returncode == 0
+
+
+def test_a_refused_slope_is_left_out(tmp_path: Path) -> None:
+    bad = replace(along_x(), slopes=(replace(along_x().slopes[0], honest_error=REFUSED),))
+    positionfile.write([bad], tmp_path / "x.json")
+    assert run(["export", str(tmp_path / "x.json"), "--to", "st", "-o", str(tmp_path / "out")]) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_error_along_an_axis_is_not_reduced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    positionfile.write([along_x()], tmp_path / "x.json")
+    assert run(["export", str(tmp_path / "x.json"), "--to", "fanuc", "-o", str(tmp_path)]) == 2
+    assert "fanuc holds nothing that changes along an axis, as EXX does" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize("dialect", ["codesys", "twincat", "scl"])
+def test_structured_text_in_every_dialect(tmp_path: Path, dialect: str) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    command = ["export", str(model), "--to", "st", "--dialect", dialect, "--date", "2026-01-31", "-o"]
+    for folder in ("one", "two"):
+        assert run([*command, str(tmp_path / folder)]) == 0
+    files = sorted(f.name for f in (tmp_path / "one").iterdir())
+    assert {Path(f).suffix for f in files} == {
+        "codesys": {".st", ".md"},
+        "twincat": {".TcPOU", ".TcDUT", ".md"},
+        "scl": {".scl", ".md"},
+    }[dialect]
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+
+
+def test_a_dialect_is_of_structured_text_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    assert run(["export", str(model), "--to", "c99", "--dialect", "scl", "-o", str(tmp_path)]) == 2
+    assert "--dialect scl: is of --to st alone" in capsys.readouterr().err
 
 
 def written(folder: Path, *models: ErrorModel) -> Path:

@@ -9,7 +9,8 @@ from test_export_command import needs_compiler, prove
 
 from thermocomp.cli.app import run
 from thermocomp.core.model import ErrorModel
-from thermocomp.files import modelfile
+from thermocomp.core.position import PositionModel
+from thermocomp.files import modelfile, positionfile
 
 FILES = ["tc_thermal.c", "tc_thermal.h", "tc_thermal.hal", "tc_thermal.md", "tc_thermal_hal.comp", "tc_thermal_test.c"]
 
@@ -61,3 +62,13 @@ def test_the_same_model_gives_the_same_bytes_and_a_refused_one_none(tmp_path: Pa
         text = (tmp_path / "a" / "out" / file).read_bytes()
         assert text == (tmp_path / "b" / "out" / file).read_bytes()
         assert b"x_um" not in text
+
+
+def test_a_model_along_an_axis_knows_where_that_is(tmp_path: Path) -> None:
+    slope = replace(growing("EXX_1", 40.0), unit="um/m")
+    model = PositionModel(target="EXX", unit="um", axis="X", travel=(-200.0, 600.0), slopes=(slope,))
+    positionfile.write([model], tmp_path / "x.json")
+    line = ["export", str(tmp_path / "x.json"), "--to", "linuxcnc", "-o", str(tmp_path / "out"), "--json"]
+    assert run(line) == 0
+    assert "axis.x.pos-cmd => tc-thermal-hal.x-position" in (tmp_path / "out" / "tc_thermal.hal").read_text()
+    assert run([*line, "--overwrite", "--axes", "EXX=Y"]) == 2  # it is of X

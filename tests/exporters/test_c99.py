@@ -1,14 +1,12 @@
 """The C code of a compensator does what the compensator does: compiled by a real compiler, for every family."""
 
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, SANITIZED, CompiledBlock
+from compiledblock import COMPILERS, SANITIZED, CompiledBlock, check_block, check_same
 from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
@@ -26,7 +24,7 @@ from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.c99 import translate
-from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
+from thermocomp.exporters.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
 FloatArray = NDArray[np.float64]
@@ -38,36 +36,6 @@ pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
 def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
     return replace(model, honest_error=ACCEPTED, **changes)
-
-
-def check_same(one: Answers, other: Answers, within: float = 1e-12) -> None:
-    """Compare what two said: decisions exactly, numbers to a share of their size."""
-    assert (one.passed == other.passed).all()
-    assert (one.status == other.status).all()
-    assert (one.fault == other.fault).all()
-    for a, b in ((one.correction, other.correction), (one.slope, other.slope), (one.deviation, other.deviation)):
-        assert np.isfinite(b).all()
-        assert (np.abs(a - b) <= within * np.maximum(1.0, np.abs(a))).all()
-
-
-def check_block(
-    compensator: Compensator,
-    rows: FloatArray,
-    dt: FloatArray,
-    *,
-    age: FloatArray | None = None,
-    flags: tuple[str, ...] = SANITIZED,
-    within: float = 1e-12,
-    compiler: str = "",
-) -> Answers:
-    """Run a compensator and its C code over the same rows; return what they said."""
-    age = np.zeros(len(rows)) if age is None else age
-    with tempfile.TemporaryDirectory() as folder:
-        block = CompiledBlock(compensator, Path(folder), compiler or COMPILERS[0], flags)
-        readings = Readings(rows, age, dt)
-        expected = replay(compensator, block.tables, readings)
-        check_same(expected, block.run(readings), within)
-    return expected
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)

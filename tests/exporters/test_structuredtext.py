@@ -12,7 +12,8 @@ from driftmodels import ACCEPTED
 from families import FAMILIES, READINGS
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from stmachine import Machine, parsed
+from spoiling import models_of, spoiled
+from stmachine import Machine, check_block, check_same, parsed, run
 from watchedmachine import watched_model
 
 from thermocomp.core.correction import Limits
@@ -23,10 +24,11 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.stpackage import write_package
-from thermocomp.exporters.structuredtext import NOTHING, Unit, translate
+from thermocomp.exporters.structuredtext import Unit, translate
 from thermocomp.exporters.ststatements import RESERVED
 from thermocomp.exporters.sttest import write_test
-from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
+from thermocomp.exporters.vectors import Readings, make_readings, replay
+from thermocomp.files.recordings import read
 from thermocomp.runtime.compensator import Compensator
 
 FREE = Limits(magnitude=1e9, rate=1e9)
@@ -36,54 +38,6 @@ SLOW: dict[str, Any] = {
     "phases": [Phase.explicit, Phase.reuse, Phase.generate],
 }
 FACTS = Facts("model.json", "0" * 64, "0", "2026-01-31")
-
-
-def finite(value: float) -> float:
-    return float(value) if np.isfinite(value) else NOTHING
-
-
-def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
-    """Call a block with readings; what is no number is not good."""
-    said, told, found, passed = [], [], [], []
-    for values, age, dt in zip(*readings, strict=True):
-        good = [bool(np.isfinite(v)) for v in values]
-        seen = machine.call(
-            value=[float(v) if g else 0.0 for v, g in zip(values, good, strict=True)],
-            good=good,
-            age=finite(age),
-            elapsed=finite(dt),
-            restart=False,
-        )
-        said.append([*seen.correction, *seen.slope])
-        told.append(list(seen.status))
-        found.append(list(seen.fault) if sensors else [])
-        passed.append(seen.rejected == 0)
-    table = np.array(said)
-    return Answers(
-        table[:, :targets],
-        table[:, targets:],
-        np.array(told),
-        np.empty((len(told), 0)),
-        np.array(found, dtype=int).reshape(len(found), -1),
-        np.array(passed),
-    )
-
-
-def check_same(expected: Answers, said: Answers) -> None:
-    """Compare decisions exactly, numbers to 1e-9 of their size."""
-    assert (expected.passed == said.passed).all()
-    assert (expected.status == said.status).all()
-    assert (expected.fault == said.fault).all()
-    for a, b in ((expected.correction, said.correction), (expected.slope, said.slope)):
-        assert (np.abs(a - b) <= 1e-9 * np.maximum(1.0, np.abs(a))).all()
-
-
-def check_block(compensator: Compensator, readings: Readings) -> Answers:
-    tables = gather(compensator)
-    machine = Machine(translate(tables, "tc_x", "codesys"))
-    expected = replay(compensator, tables, readings)
-    check_same(expected, run(machine, readings, len(tables.targets), len(tables.sensors)))
-    return expected
 
 
 def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
@@ -168,6 +122,19 @@ def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Unit]
         assert list(fresh.call(**again, restart=False).status) == list(machine.memory.status)
     assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
     assert moved[-1] == fresh.memory.correction[0]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["averaged", "mra"])
+def test_a_whole_recording_with_sensors_that_fail(shared_data: Path, method: str) -> None:
+    recording = read(shared_data / "fl_thermal" / "recording.csv")
+    targets = [c.name for c in recording.channels if c.quantity == "displacement"][:1]
+    compensator = Compensator.of(models_of(recording, targets, method), Limits(rate=0.5))
+    tables = gather(compensator)
+    rows = recording.table[[c.name for c in tables.channels]].to_numpy(dtype=np.float64)
+    for seed in range(3):
+        dt = np.diff(recording.time, prepend=recording.time[0])
+        check_block(compensator, Readings(spoiled(rows, seed) if seed else rows, np.zeros(len(rows)), dt))
 
 
 @pytest.mark.parametrize("family", FAMILIES)

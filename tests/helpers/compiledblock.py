@@ -3,15 +3,19 @@
 import ctypes
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.exporters.block.tables import gather
 from thermocomp.exporters.c99 import translate
-from thermocomp.exporters.vectors import Answers, Readings
+from thermocomp.exporters.vectors import Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
+
+FloatArray = NDArray[np.float64]
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2")
 SANITIZED = ("-fsanitize=undefined", "-fno-sanitize-recover")
@@ -108,3 +112,33 @@ class CompiledBlock:
             told[:, targets : targets + sensors].astype(int),
             told[:, -2] == 0,
         )
+
+
+def check_same(one: Answers, other: Answers, within: float = 1e-12) -> None:
+    """Compare what two said: decisions exactly, numbers to a share of their size."""
+    assert (one.passed == other.passed).all()
+    assert (one.status == other.status).all()
+    assert (one.fault == other.fault).all()
+    for a, b in ((one.correction, other.correction), (one.slope, other.slope), (one.deviation, other.deviation)):
+        assert np.isfinite(b).all()
+        assert (np.abs(a - b) <= within * np.maximum(1.0, np.abs(a))).all()
+
+
+def check_block(
+    compensator: Compensator,
+    rows: FloatArray,
+    dt: FloatArray,
+    *,
+    age: FloatArray | None = None,
+    flags: tuple[str, ...] = SANITIZED,
+    within: float = 1e-12,
+    compiler: str = "",
+) -> Answers:
+    """Run a compensator and its C code over the same rows; return what they said."""
+    age = np.zeros(len(rows)) if age is None else age
+    with tempfile.TemporaryDirectory() as folder:
+        block = CompiledBlock(compensator, Path(folder), compiler or COMPILERS[0], flags)
+        readings = Readings(rows, age, dt)
+        expected = replay(compensator, block.tables, readings)
+        check_same(expected, block.run(readings), within)
+    return expected

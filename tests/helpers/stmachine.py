@@ -11,10 +11,14 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 from blark import transform as b
 from blark.parse import parse_source_code
 
-from thermocomp.exporters.structuredtext import Unit
+from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.structuredtext import NOTHING, Unit, translate
+from thermocomp.exporters.vectors import Answers, Readings, replay
+from thermocomp.runtime.compensator import Compensator
 
 _PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}
 _COMPARE = {"=": "==", "<>": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">="}
@@ -305,3 +309,52 @@ class _Function:
         assert [str(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
         texts = [self._as(v, kind) for v, kind in zip(values, wanted.values(), strict=True)]
         return f"{name}({', '.join(texts)})", head["gives"]
+
+
+def finite(value: float) -> float:
+    return float(value) if np.isfinite(value) else NOTHING
+
+
+def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
+    """Call a block with readings; what is no number is not good."""
+    said, told, found, passed = [], [], [], []
+    for values, age, dt in zip(*readings, strict=True):
+        good = [bool(np.isfinite(v)) for v in values]
+        seen = machine.call(
+            value=[float(v) if g else 0.0 for v, g in zip(values, good, strict=True)],
+            good=good,
+            age=finite(age),
+            elapsed=finite(dt),
+            restart=False,
+        )
+        said.append([*seen.correction, *seen.slope])
+        told.append(list(seen.status))
+        found.append(list(seen.fault) if sensors else [])
+        passed.append(seen.rejected == 0)
+    table = np.array(said)
+    return Answers(
+        table[:, :targets],
+        table[:, targets:],
+        np.array(told),
+        np.empty((len(told), 0)),
+        np.array(found, dtype=int).reshape(len(found), -1),
+        np.array(passed),
+    )
+
+
+def check_same(expected: Answers, said: Answers) -> None:
+    """Compare decisions exactly, numbers to 1e-9 of their size."""
+    assert (expected.passed == said.passed).all()
+    assert (expected.status == said.status).all()
+    assert (expected.fault == said.fault).all()
+    for one, other in ((expected.correction, said.correction), (expected.slope, said.slope)):
+        assert (np.abs(one - other) <= 1e-9 * np.maximum(1.0, np.abs(one))).all()
+
+
+def check_block(compensator: Compensator, readings: Readings) -> Answers:
+    """Run a compensator and its structured text over the same readings; return what they said."""
+    tables = gather(compensator)
+    machine = Machine(translate(tables, "tc_x", "codesys"))
+    expected = replay(compensator, tables, readings)
+    check_same(expected, run(machine, readings, len(tables.targets), len(tables.sensors)))
+    return expected

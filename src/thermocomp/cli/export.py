@@ -1,6 +1,6 @@
 """`thermocomp export`: a model file as code for another controller, with its proof."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -17,18 +17,22 @@ from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
-from thermocomp.exporters import cpackage, linuxcncpackage, onnxpackage, stpackage
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
+from thermocomp.exporters import beckhoff, cpackage, linuxcncpackage, onnxpackage, siemens, stpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.ststatements import Dialect
-from thermocomp.files import modelfile
+from thermocomp.files.machines import read_models
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99", "st", "linuxcnc", "onnx", "klipper", "heidenhain", "fanuc"]
+Target = Literal["c99", "st", "siemens", "beckhoff", "linuxcnc", "onnx", "klipper", "heidenhain", "fanuc"]
 
 #: all files of an export by their names, the page how to use it the last
-WRITERS: dict[Target, Callable[[Compensator, str, Facts], dict[str, bytes]]] = {
+WRITERS: dict[Target, Callable[..., dict[str, bytes]]] = {
     "c99": cpackage.write_package,
     "st": stpackage.write_package,
+    "siemens": siemens.write_package,
+    "beckhoff": beckhoff.write_package,
     "linuxcnc": linuxcncpackage.write_package,
     "onnx": onnxpackage.write_package,
 }
@@ -66,14 +70,14 @@ def export(
     Parameters
     ----------
     model : Path
-        Model file from ``thermocomp fit``.
+        Model file from ``thermocomp fit``, or of ``thermocomp position``.
     recordings : list of Path
         For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
-    to : {'c99', 'st', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
+    to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; linuxcnc that C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one
-        step as a graph, for a computer with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula;
-        fanuc a macro.
+        structured text, IEC 61131-3; siemens and beckhoff the same and what their temperature compensation takes;
+        linuxcnc the C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one step as a graph, for a computer
+        with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula; fanuc a macro.
     output : Path
         Folder to write into.
     name : str
@@ -108,10 +112,9 @@ def export(
     """
     if dialect is not None and to != "st":
         raise InputError(f"--dialect {dialect}: is of --to st alone")
-    models = [m.taken(accept_unproven) for m in modelfile.read(model)]
-    refused = [m for m in models if m.honest_error is not None and m.honest_error.word == "refused"]
-    left = [m for m in models if m not in refused]
-    reasons = {m.target: m.honest_error.reason for m in refused if m.honest_error is not None}
+    models = [m.taken(accept_unproven) for m in read_models(model)]
+    reasons = {m.target: why for m in models if (why := _refusal(m))}
+    left = [m for m in models if m.target not in reasons]
     texts, elsewhere = dict[str, bytes](), dict[str, str]()
     if recordings and to not in reducing.WRITERS:
         raise InputError(f"{to} holds the whole model: it wants no recording, found {recordings[0]}")
@@ -125,11 +128,20 @@ def export(
         )
         if to in reducing.WRITERS:
             texts, more, elsewhere = reducing.export_reduced(
-                to, left, recordings or [], reduction, beginning, limits, name, facts, accept_unproven, hidden=json
+                to,
+                _constant(left, to),
+                recordings or [],
+                reduction,
+                beginning,
+                limits,
+                name,
+                facts,
+                accept_unproven,
+                hidden=json,
             )
             reasons |= more
         else:
-            writer = partial(stpackage.write_package, dialect=dialect) if dialect else WRITERS[to]
+            writer = _writer(to, left, dialect, reduction.named())
             if to == "linuxcnc":
                 left, axes, elsewhere = reducing.along_axes(left, reduction, to, "XYZ")
                 writer = partial(linuxcncpackage.write_package, axes=axes)
@@ -149,6 +161,30 @@ def export(
         console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
         console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
     return 1 if reasons else 0
+
+
+def _writer(
+    to: Target, models: Sequence[ErrorModel | PositionModel], dialect: Dialect | None, named: Mapping[str, str]
+) -> Callable[..., dict[str, bytes]]:
+    """Return the writer of a target, with what it wants to know beside the compensator."""
+    if to in ("siemens", "beckhoff"):
+        along = {m.target: m.axis for m in models if isinstance(m, PositionModel)}
+        return partial(WRITERS[to], axes={**along, **named})
+    return partial(WRITERS[to], dialect=dialect) if dialect else WRITERS[to]
+
+
+def _constant(models: Sequence[ErrorModel | PositionModel], to: str) -> list[ErrorModel]:
+    """Return models that say the same at every position."""
+    if along := [m.target for m in models if isinstance(m, PositionModel)]:
+        raise InputError(f"{to} holds nothing that changes along an axis, as {along[0]} does")
+    return [m for m in models if isinstance(m, ErrorModel)]
+
+
+def _refusal(model: ErrorModel | PositionModel) -> str:
+    """Return why a model must not run at all; nothing if it may, or may once it is taken."""
+    parts = model.models if isinstance(model, PositionModel) else (model,)
+    verdicts = [m.honest_error for m in parts if m.honest_error is not None]
+    return next((v.reason for v in verdicts if v.word == "refused"), "")
 
 
 def _write(output: Path, texts: Mapping[str, bytes], overwrite: bool) -> None:

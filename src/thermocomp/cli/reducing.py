@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from cyclopts import Parameter
 
@@ -13,6 +13,7 @@ from thermocomp.cli.progress import show_steps
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.fanuc import write_fanuc
 from thermocomp.exporters.heidenhain import write_heidenhain
@@ -21,6 +22,8 @@ from thermocomp.exporters.reduced import SHAPES, Reduced, as_it_is, find_axis, f
 
 if TYPE_CHECKING:
     from thermocomp.assessment.reduction import Reduction
+
+_Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 WRITERS: dict[str, Callable[..., dict[str, bytes]]] = {
     "klipper": write_klipper,
@@ -145,13 +148,13 @@ def export_reduced(
 
 
 def along_axes(
-    models: Sequence[ErrorModel], options: ReductionOptions, to: str, corrected: str
-) -> tuple[list[ErrorModel], dict[str, str], dict[str, str]]:
+    models: Sequence[_Model], options: ReductionOptions, to: str, corrected: str
+) -> tuple[list[_Model], dict[str, str], dict[str, str]]:
     """Return the models that a controller takes, the axes by target, and why others are left out.
 
     Parameters
     ----------
-    models : sequence of ErrorModel
+    models : sequence of ErrorModel or PositionModel
     options : ReductionOptions
     to : str
         The controller.
@@ -172,11 +175,13 @@ def along_axes(
     return wanted, axes, elsewhere
 
 
-def _why_elsewhere(model: ErrorModel, axis: str, to: str, corrected: str) -> str:
+def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, corrected: str) -> str:
     if model.unit != "um":
         return f"it predicts {model.unit}, and a correction is in um"
     if not axis:
         return f"its axis is not known: --axes {model.target}=Z would say that it is Z"
+    if isinstance(model, PositionModel) and axis != model.axis:
+        return f"it runs along {model.axis}, and --axes says {axis}"
     return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
 
 
@@ -195,12 +200,13 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
         )
 
 
-def _find_axes(models: Sequence[ErrorModel], options: ReductionOptions) -> dict[str, str]:
+def _find_axes(models: Sequence[ErrorModel | PositionModel], options: ReductionOptions) -> dict[str, str]:
     """Return the axis of each target; empty where none is known, or others are named."""
     named, targets = options.named(), [m.target for m in models]
     if unknown := [t for t in named if t not in targets]:
         raise InputError(f"--axes {', '.join(unknown)}: no such target; there are {', '.join(targets)}")
-    return {t: find_axis(t, named) if not named or t in named else "" for t in targets}
+    known = named or {m.target: m.axis for m in models if isinstance(m, PositionModel)}
+    return {t: find_axis(t, known) if not named or t in named else "" for t in targets}
 
 
 def _reduce(

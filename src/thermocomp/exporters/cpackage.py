@@ -49,7 +49,7 @@ Call it in a cycle, every second or ten, with the time since the call before, me
 |---|---|---|
 {corrections}
 
-{zero} {status}{sensors}
+{geometry}{zero} {status}{sensors}
 
 ## Switch it off
 

@@ -36,6 +36,10 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         f"{zeroing.at_rest:g} s while the spindle stands; until then the correction stays where it is."
         if tables.sizes["has_zero"]
         else "Nothing counts from the start.",
+        "geometry": "Only what temperature changes along an axis is corrected: its profile stays a table of the "
+        "controller.\n\n"
+        if slopes
+        else "",
         "status": f"`{of}status[k]` says how a correction is: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow; "
         f"`{of}rejected`\nwhy a reading was not used: 0 it was, 1 its time, 2 a value missing or not plausible, 3 no "
         f"start of a machine;\n`{of}outside` how many inputs are beyond the trained range.",

@@ -57,9 +57,9 @@ Call one instance of `{name}` in a cyclic task of a second or ten seconds:
 |---|---|---|
 {corrections}
 
-{zero} {status}{sensors}
+{geometry}{zero} {status}{sensors}
 
-## Switch it off
+{about}## Switch it off
 
 Do not set the correction to zero at once: the axis would jump. Call the block with an age of 1.0E+9: the correction
 stays where it is for {hold:g} s and then goes to zero, slowly. The controller must not compensate for temperature
@@ -92,10 +92,40 @@ def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Di
     InputError
         A model has no formula, or the models do not go together.
     """
+    return write_blocks(compensator, name, facts, dialect)
+
+
+def write_blocks(
+    compensator: Compensator,
+    name: str,
+    facts: Facts,
+    dialect: Dialect,
+    more: Sequence[Unit] = (),
+    about: str = "",
+) -> dict[str, bytes]:
+    """Return all files of a compensator, and of more blocks for a controller.
+
+    Parameters
+    ----------
+    compensator : Compensator
+        Made by `Compensator.of`.
+    name : str
+    facts : Facts
+    dialect : {'codesys', 'twincat', 'scl'}
+    more : sequence of Unit
+        Beside the compensator.
+    about : str
+        What the page says of them.
+
+    Raises
+    ------
+    InputError
+        A model has no formula, or the models do not go together.
+    """
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
-    units = translate(tables, name, dialect)
+    units = [*translate(tables, name, dialect), *more]
     tests = write_test(tables, name, dialect, readings, answers)
     head = "".join(f"(* {comment(line)} *)\n" for line in said)
     page = _README.format(
@@ -103,6 +133,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Di
         name=name,
         dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL"}[dialect],
         install=_INSTALL[dialect].format(name=name),
+        about=f"{about.lstrip()}\n" if about else "",
         calls=len(readings.age),
         tolerance=TOLERANCE,
         **describe(compensator, tables),
