@@ -44,7 +44,7 @@ class Plant:
 
     def __init__(self, stand: HalStand, axis: str = "z") -> None:
         self.stand, self.axis, self.request, self.counts = stand, axis, 0.0, 0
-        self.largest = 0.0  # move in a period [mm]
+        self.moves: list[float] = []  # in each period [mm]
         self.switch(True)
 
     def switch(self, on: bool) -> None:
@@ -53,13 +53,18 @@ class Plant:
         if not on:
             self.request = 0.0
 
+    def check_rate(self, rate: float) -> None:
+        """See that no tenth of a second has more than the rate [um/s] and a count in it."""
+        there = np.cumsum([0.0, *self.moves])
+        assert np.abs(there[100:] - there[:-100]).max() <= 1e-4 * rate + 1.001e-5
+
     def run(self, periods: int) -> None:
         for _ in range(periods):
             self.stand.run(1)
             counts = self.stand[f"{self.axis}-counts"]
             if self.stand["motion-enabled"]:
                 self.request += (counts - self.counts) * self.stand["scale"]
-                self.largest = max(self.largest, abs(counts - self.counts) * self.stand["scale"])
+            self.moves.append((counts - self.counts) * self.stand["scale"])
             self.counts = counts
             self.stand[f"{self.axis}-request"] = self.request
 
@@ -129,7 +134,6 @@ def test_an_axis_follows_no_faster_than_it_may_and_comes_back_after_off_and_on(m
         stand["reading"] = 2 + k
         plant.run(1000)
     assert plant.request == pytest.approx(-0.008, abs=FINE)
-    assert plant.largest <= 2e-6 + 1e-5  # and a count
     assert stand["engaged"]
     plant.switch(False)
     plant.run(3000)
@@ -139,12 +143,15 @@ def test_an_axis_follows_no_faster_than_it_may_and_comes_back_after_off_and_on(m
     assert plant.request == pytest.approx(-0.002, abs=2e-5)
     plant.run(4000)
     assert plant.request == pytest.approx(-0.008, abs=FINE)
-    assert plant.largest <= 2e-6 + 1e-5
-    stand["value-0"] = 60.0  # beyond the magnitude
+    plant.switch(False)
+    plant.run(10)
+    plant.switch(True)
+    stand["value-0"] = 60.0  # beyond the magnitude, while it comes back
     for k in range(10):
         stand["reading"] = 20 + k
         plant.run(1000)
     assert plant.request == pytest.approx(-0.015, abs=FINE)
+    plant.check_rate(2.0)
 
 
 @needs_halcompile
@@ -236,6 +243,40 @@ def test_in_inches_and_along_the_travel(make: Make) -> None:
     stand["z-position"] = 0.0
     plant.run(1)
     assert 25.4 * plant.request == pytest.approx(-0.002 + 0.040 * 0.1, abs=FINE)
+    stand["z-position"] = 5000.0  # beyond the travel the end holds
+    plant.run(1)
+    assert 25.4 * plant.request == pytest.approx(-0.002 - 0.040 * 0.4, abs=FINE)
+    before = stand["z-counts"]
+    stand["z-position"] = math.nan
+    plant.run(100)
+    assert stand["z-counts"] == before
+
+
+@needs_halcompile
+def test_a_line_comes_back_no_faster_than_it_may_at_either_end(make: Make) -> None:
+    slope = growing("z_um", 40.0, "um/m")
+    model = PositionModel(target="z_um", unit="um", axis="Z", travel=(0.0, 500.0), slopes=(slope,))
+    stand = make(model, limits=Limits(rate=2.0))
+    plant = Plant(stand)
+    stand["z-position"] = 500.0
+    stand["value-0"], stand["reading"] = 20.0, 1
+    plant.run(1000)
+    for k in range(12):
+        stand["value-0"], stand["reading"] = 21.0, 2 + k
+        plant.run(1000)
+    assert plant.request == pytest.approx(-0.020, abs=FINE)
+    plant.switch(False)
+    plant.run(10)
+    plant.switch(True)
+    stand["z-position"] = 250.0
+    plant.run(2500)
+    assert plant.request == pytest.approx(-0.0025, abs=2 * FINE)  # half of what the end may
+    stand["z-position"] = 0.0
+    plant.run(1)
+    assert plant.request == pytest.approx(0.0, abs=FINE)
+    stand["z-position"] = 500.0
+    plant.run(9000)
+    assert plant.request == pytest.approx(-0.020, abs=FINE)
 
 
 @needs_halcompile

@@ -48,41 +48,51 @@ include "{name}.c";
 
 enum {{ INPUTS = {inputs}, TARGETS = {targets} }};
 
+/* ends of the travel, from the reference position [mm]; none: the same at every position */
+static const double travel[TARGETS][2] = {{{travel}}};
+
 static {name}_state state; /* all zero: begun */
-static double begin[TARGETS], begin_slope[TARGETS]; /* what the corrections were a second ago */
-static double base[TARGETS], share[TARGETS]; /* an offset that was found, and the way from there */
+static double now[TARGETS][2]; /* the lines in force, at both ends of the travel [um] */
+static double base[TARGETS]; /* an offset that was found [machine units] */
 static long sent[TARGETS]; /* counts since then */
 static int lost[TARGETS];
 static long long since, waited; /* the last reading, the last step [ns] */
 static hal_u32_t heard;
 static int fresh, could;
 
-/* Return the counts by which an external offset lacks what it shall be. */
-static int lacking(int k, double at, double request, int on, double seconds, double per_mm)
+static double within(double value, double low, double high)
 {{
-    const double part = waited < SECOND ? (double)waited / SECOND : 1.0, count = {resolution!r} * per_mm;
-    double line, wanted, gap, order;
+    return value < low ? low : value > high ? high : value;
+}}
 
-    line = begin[k] + part * ((double)state.correction[k] - begin[k]);
-    line += 0.001 * at * (begin_slope[k] + part * ((double)state.slope[k] - begin_slope[k]));
+/* Return the counts by which an external offset lacks what it shall be; ends of the travel from the reference [mm]. */
+static int lacking(int k, const double ends[2], double at, double request, int on, double seconds, double per_mm)
+{{
+    const double count = {resolution!r} * per_mm, most = RATE * seconds;
+    double wanted, order;
+    int j;
+
     lost[k] = 0;
     if (!on) {{ /* begin at what is in force */
         base[k] = isfinite(request) ? request : 0.0;
-        share[k] = 0.0;
+        now[k][0] = now[k][1] = 1000.0 * base[k] / per_mm;
         sent[k] = 0;
         return 0;
     }}
     /* what was asked for has to be there: else another one moves it, or nobody listens */
     lost[k] = !(fabs(request - (base[k] + (double)sent[k] * count)) < 0.5 * count);
-    if (lost[k] || !isfinite(line)) {{
+    if (lost[k]) {{
         return 0;
     }}
-    wanted = 0.001 * per_mm * (line > MAGNITUDE ? MAGNITUDE : line < -MAGNITUDE ? -MAGNITUDE : line);
-    gap = fabs(wanted - base[k]);
-    share[k] += 0.001 * per_mm * RATE * seconds / (gap > 1e-9 * per_mm ? gap : 1e-9 * per_mm);
-    share[k] = share[k] < 1.0 ? share[k] : 1.0;
-    order = (base[k] + share[k] * (wanted - base[k]) - request) / count;
-    order = order > LARGEST ? LARGEST : order < -LARGEST ? -LARGEST : order;
+    for (j = 0; j < 2; j++) {{
+        wanted = within((double)state.correction[k] + 0.001 * (double)state.slope[k] * ends[j], -MAGNITUDE, MAGNITUDE);
+        now[k][j] += within(wanted - now[k][j], -most, most);
+    }}
+    at = ends[1] > ends[0] ? within((at - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0) : 0.0;
+    order = (0.001 * per_mm * (now[k][0] + at * (now[k][1] - now[k][0])) - request) / count;
+    if (!(fabs(order) < LARGEST)) {{
+        return 0;
+    }}
     sent[k] += lround(order);
     return (int)lround(order);
 }}
@@ -90,7 +100,7 @@ static int lacking(int k, double at, double request, int on, double seconds, dou
 FUNCTION(_)
 {{
     const hal_u32_t count = reading;
-    const int can = motion_enabled && all_homed && (coord_mode || teleop_mode) && unit > 0.0;
+    const int can = motion_enabled && all_homed && (coord_mode || teleop_mode) && unit > 0.001 && unit < 1000.0;
     const int on = can && could; /* in the first period LinuxCNC sets an offset that it has kept to zero */
     int k;
 
@@ -106,10 +116,6 @@ FUNCTION(_)
 
         for (k = 0; k < INPUTS; k++) {{
             given[k] = good(k) ? (tc_real)value(k) : (tc_real)NAN;
-        }}
-        for (k = 0; k < TARGETS; k++) {{
-            begin[k] = (double)state.correction[k];
-            begin_slope[k] = (double)state.slope[k];
         }}
         {name}_step(&state, given, fresh && enable ? 1e-9 * (double)since : 1e9, 1e-9 * (double)waited);
         fresh = 0;
@@ -133,7 +139,7 @@ _TOLD = """        for (k = 0; k < {sensors}; k++) {{
             fault(k) = state.fault[k];
         }}
 """
-_MOVE = """    {a}_counts += lacking({k}, {at}, {a}_request, on, 1e-9 * (double)period, unit);
+_MOVE = """    {a}_counts += lacking({k}, travel[{k}], {at}, {a}_request, on, 1e-9 * (double)period, unit);
     {a}_lost = lost[{k}];
 """
 
@@ -202,7 +208,9 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
             pins.append(f"pin in float {a}-position;")
             at = f"{a}_position / unit - {tables.values['position'][k]!r}"
         moves.append(_MOVE.format(a=a, k=k, at=at))
-    sensors = len(tables.sensors)
+    sensors, known = len(tables.sensors), tables.values
+    ends = zip(known["travel_low"], known["travel_high"], known["position"], strict=True)
+    travel = ", ".join(f"{{{low - at!r}, {high - at!r}}}" if low < high else "{0.0, 0.0}" for low, high, at in ends)
     return _COMPONENT.format(
         facts="".join(f"/* {comment(line)} */\n" for line in facts),
         component=name_component(name),
@@ -213,6 +221,7 @@ def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Ma
         faults=_FAULTS.format(sensors=sensors) if sensors else "",
         told=_TOLD.format(sensors=sensors) if sensors else "",
         moves="".join(moves),
+        travel=travel,
         resolution=RESOLUTION,
         magnitude=float(tables.values["magnitude"]),
         rate=float(tables.values["rate"]),
