@@ -1,5 +1,6 @@
 """The component of an export to LinuxCNC: it does what the compensator does, and moves no axis that it may not."""
 
+import itertools
 import math
 import subprocess
 from collections.abc import Callable
@@ -152,6 +153,31 @@ def test_an_axis_follows_no_faster_than_it_may_and_comes_back_after_off_and_on(m
         plant.run(1000)
     assert plant.request == pytest.approx(-0.015, abs=FINE)
     plant.check_rate(2.0)
+
+
+@needs_halcompile
+def test_it_moves_only_while_an_external_offset_can_and_not_in_its_first_period(make: Make) -> None:
+    stand = make(growing("z_um", 2.0), limits=Limits(rate=1e4))
+    stand["value-0"], stand["reading"] = 20.0, 1
+    stand.run(1000)
+    stand["value-0"], stand["reading"] = 25.0, 2
+    stand.run(1000)
+    assert stand["correction-0"] == pytest.approx(-0.010)
+    names = ("motion-enabled", "all-homed", "coord-mode", "teleop-mode")
+    for pins in itertools.product((False, True), repeat=4):
+        for name in names:
+            stand[name] = False
+        stand["z-request"] = 0.003  # found there
+        stand.run(1)
+        before = stand["z-counts"]
+        for name, value in zip(names, pins, strict=True):
+            stand[name] = value
+        stand["z-request"] = 0.0  # LinuxCNC does that in this period when it is switched on
+        stand.run(1)
+        assert (stand["engaged"], stand["z-counts"], stand["z-lost"]) == (False, before, False)
+        stand.run(1)
+        can = pins[0] and pins[1] and (pins[2] or pins[3])
+        assert (stand["engaged"], stand["z-counts"] - before, stand["z-lost"]) == (can, -1000 if can else 0, False)
 
 
 @needs_halcompile
