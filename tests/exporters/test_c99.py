@@ -1,6 +1,5 @@
 """The C code of a compensator does what the compensator does: compiled by a real compiler, for every family."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from spoiling import FAILURES
 from watchedmachine import failing, watched_model
 
 from thermocomp.core.additive import Additive, Curve
@@ -182,45 +182,13 @@ def test_sensors_that_fail(cuts: dict[str, Any], found: list[int], flags: tuple[
     assert (said.status[-1] > 1).all() == (found[2] > 0)  # without t3_C it does harm: held, then faded
 
 
-def _stuck(rows: FloatArray) -> None:
-    rows[200:, 0] = rows[200, 0]
-
-
-def _swapped(rows: FloatArray) -> None:
-    rows[:, [0, 1]] = rows[0, [0, 1]] + (rows - rows[0])[:, [1, 0]]
-
-
-def _drifting(rows: FloatArray) -> None:
-    rows[200:, 1] += np.linspace(0.0, 8.0, len(rows) - 200)
-
-
-def _spikes(rows: FloatArray) -> None:
-    rows[100::37, 0] += 7.0
-
-
-def _back(rows: FloatArray) -> None:
-    rows[150:260, 1] = np.nan
-
-
-def _dead_at_the_start(rows: FloatArray) -> None:
-    rows[:, 0] = 0.0
-
-
-def _no_speed(rows: FloatArray) -> None:
-    rows[40:90, 3] = np.nan
-
-
-def _fast(rows: FloatArray) -> None:
-    rows[300:302, 3] = 65535.0
-
-
-@pytest.mark.parametrize("damage", [_stuck, _swapped, _drifting, _spikes, _back, _dead_at_the_start, _no_speed, _fast])
-def test_every_failure_that_the_watch_knows(damage: Callable[[FloatArray], None]) -> None:
+@pytest.mark.parametrize("failure", FAILURES)
+def test_every_failure_that_the_watch_knows(failure: str) -> None:
     compensator = Compensator.of([watched_model("z_um")])
     day = failing()
     rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64, copy=True)
     assert [c.name for c in gather(compensator).channels][3] == "spindle_rpm"
-    damage(rows)
+    FAILURES[failure](rows)
     check_block(compensator, rows, np.diff(day.time, prepend=day.time[0]))
 
 

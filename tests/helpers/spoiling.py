@@ -71,3 +71,48 @@ def _wild(rows: FloatArray, rng: np.random.Generator) -> None:
 
 
 DAMAGES: list[Damage] = [_missing, _stuck, _stepped, _drifting, _swapped, _wild]
+
+
+def _stuck_late(rows: FloatArray) -> None:
+    rows[200:, 0] = rows[200, 0]
+
+
+def _first_two_swapped(rows: FloatArray) -> None:
+    rows[:, [0, 1]] = rows[0, [0, 1]] + (rows - rows[0])[:, [1, 0]]
+
+
+def _drifts_slowly(rows: FloatArray) -> None:
+    rows[200:, 1] += np.linspace(0.0, 8.0, len(rows) - 200)
+
+
+def _spikes(rows: FloatArray) -> None:
+    rows[100::37, 0] += 7.0
+
+
+def _back(rows: FloatArray) -> None:
+    rows[150:260, 1] = np.nan
+
+
+def _dead_at_the_start(rows: FloatArray) -> None:
+    rows[:, 0] = 0.0
+
+
+def _no_speed(rows: FloatArray) -> None:
+    rows[40:90, 3] = np.nan
+
+
+def _fast(rows: FloatArray) -> None:
+    rows[300:302, 3] = 65535.0
+
+
+#: of the day of `watchedmachine.failing`: three temperatures and the speed
+FAILURES: dict[str, Callable[[FloatArray], None]] = {
+    "stuck": _stuck_late,
+    "swapped": _first_two_swapped,
+    "drifting": _drifts_slowly,
+    "spikes": _spikes,
+    "back": _back,
+    "dead_at_the_start": _dead_at_the_start,
+    "no_speed": _no_speed,
+    "fast": _fast,
+}

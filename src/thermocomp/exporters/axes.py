@@ -7,7 +7,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.reduced import find_axis
 from thermocomp.exporters.structuredtext import Unit
-from thermocomp.exporters.ststatements import Dialect, array, number, quoted, section
+from thermocomp.exporters.ststatements import SCL, Dialect, array, number, quoted, section
 
 
 class Drive(NamedTuple):
@@ -86,7 +86,7 @@ def write_values(
     outputs = {v.name: array("int" if v.whole else "real", n) for v in taken.values()}
     parts = [
         f"FUNCTION_BLOCK {quoted(name, scl)}",
-        *(["VERSION : 0.1"] if scl else []),
+        *(SCL if scl else []),
         f"(* What the controller takes, by axis: {', '.join(f'{k}: {d.letter}' for k, d in enumerate(drives))} *)",
         *(f"(* {v.name}: {v.about} *)" for v in taken.values()),
         "(* direction: 1.0 if the controller adds it to the command, -1.0 if it takes it off. UNCONFIRMED: try it *)",

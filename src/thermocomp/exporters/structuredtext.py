@@ -7,6 +7,7 @@ from thermocomp.exporters.block.layout import Kind
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.ststatements import (
     BAGS,
+    SCL,
     TYPES,
     Dialect,
     array,
@@ -119,7 +120,7 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> Unit:
         else:
             lines.append(f"{mark}s.{safe(n)} := {zero};")
     own = quoted(f"{name}_start", scl)
-    parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(["VERSION : 0.1"] if scl else [])]
+    parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(SCL if scl else [])]
     parts += ["(* Begin anew: temperatures count from now on; corrections stay, and move from where they are. *)"]
     parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
     parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
@@ -132,7 +133,7 @@ def _block(tables: Tables, name: str, scl: bool) -> Unit:
     outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
     kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
     numbered = [f"{k}: {c.name} [{c.unit}]" for k, c in enumerate(tables.channels)]
-    parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(["VERSION : 0.1"] if scl else [])]
+    parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(SCL if scl else [])]
     parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
     parts += [wrapped(f"(* correction [um], by number: {comment(_listed(tables.targets))} *)")]
     parts += [

@@ -17,139 +17,19 @@ TYPES: dict[Kind, str] = {"real": "LREAL", "time": "LREAL", "int": "DINT", "bool
 
 #: what is a word of the language, or of its library, in one of the dialects
 RESERVED = frozenset(
-    (
-        "abs",
-        "acos",
-        "action",
-        "add",
-        "and",
-        "any",
-        "array",
-        "asin",
-        "at",
-        "atan",
-        "begin",
-        "bool",
-        "by",
-        "byte",
-        "case",
-        "concat",
-        "configuration",
-        "const",
-        "constant",
-        "continue",
-        "date",
-        "delete",
-        "dint",
-        "div",
-        "do",
-        "dt",
-        "dword",
-        "else",
-        "elsif",
-        "end",
-        "eq",
-        "exit",
-        "exp",
-        "expt",
-        "false",
-        "find",
-        "floor",
-        "for",
-        "from",
-        "function",
-        "ge",
-        "get",
-        "goto",
-        "gt",
-        "if",
-        "in",
-        "insert",
-        "int",
-        "interval",
-        "le",
-        "left",
-        "len",
-        "lint",
-        "limit",
-        "ln",
-        "log",
-        "lreal",
-        "lt",
-        "lword",
-        "max",
-        "method",
-        "mid",
-        "min",
-        "mod",
-        "mul",
-        "mux",
-        "ne",
-        "next",
-        "not",
-        "of",
-        "on",
-        "or",
-        "override",
-        "pointer",
-        "private",
-        "program",
-        "public",
-        "put",
-        "read",
-        "real",
-        "ref",
-        "reference",
-        "region",
-        "repeat",
-        "replace",
-        "resource",
-        "result",
-        "retain",
-        "return",
-        "right",
-        "rol",
-        "ror",
-        "round",
-        "sel",
-        "shl",
-        "shr",
-        "sin",
-        "single",
-        "sint",
-        "sqrt",
-        "step",
-        "stop",
-        "string",
-        "struct",
-        "sub",
-        "super",
-        "swap",
-        "tan",
-        "task",
-        "then",
-        "this",
-        "time",
-        "to",
-        "tod",
-        "transition",
-        "true",
-        "trunc",
-        "type",
-        "udint",
-        "uint",
-        "ulint",
-        "until",
-        "usint",
-        "var",
-        "void",
-        "while",
-        "with",
-        "word",
-        "write",
-        "xor",
-    )
+    """
+    abs acos action add and any array asin at atan begin bool by byte case concat configuration const constant
+    continue date delete dint div do dt dword else elsif end eq exit exp expt false find floor for from function ge
+    get goto gt if in insert int interval le left len lint limit ln log lreal lt lword max method mid min mod mul
+    mux ne next not of on or override pointer private program public put read real ref reference region repeat
+    replace resource result retain return right rol ror round sel shl shr sin single sint sqrt step stop string
+    struct sub super swap tan task then this time to tod transition true trunc type udint uint ulint until usint var
+    void while with word write xor
+    """.split()  # noqa: SIM905 - a list of a line per word is long
 )
+
+#: below the name of a block: data that are not optimized end at 64 kB
+SCL = ["{ S7_Optimized_Access := 'TRUE' }", "VERSION : 0.1"]
 
 #: functions of the library that every dialect has
 _LIBRARY = {"abs": "ABS", "exp": "EXP", "log": "LN", "sqrt": "SQRT"}
@@ -224,7 +104,7 @@ class _Writer(Printer):
         own = {n: TYPES[kind] for n, kind in self.own.items()}
         gives = "LREAL" if f.is_of_numbers else "Void" if self._scl else "BOOL"
         head = f"FUNCTION {quoted(f'{self._name}_{f.name}', self._scl)} : {gives}"
-        parts = [head, *(["VERSION : 0.1"] if self._scl else []), f"(* {f.about.splitlines()[0]} *)"]
+        parts = [head, *(SCL if self._scl else []), f"(* {f.about.splitlines()[0]} *)"]
         parts += [section("VAR_IN_OUT", bags), section("VAR_INPUT", given)]
         parts += [section("VAR_TEMP" if self._scl else "VAR", own)]
         return "\n".join(filter(None, parts)), "\n".join(wrapped(x) for x in self.block(self.statements, 0))
@@ -354,7 +234,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     """
     scl = dialect == "scl"
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
-    lines += ["VERSION : 0.1"] if scl else []
+    lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
     for n, var in used_in(bag, used).items():
         size = _size(var, tables.sizes)

@@ -8,7 +8,7 @@ import numpy as np
 from thermocomp.exporters.block.layout import Kind
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.structuredtext import NOTHING, Unit
-from thermocomp.exporters.ststatements import Dialect, array, number, quoted, section, values, wrapped
+from thermocomp.exporters.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
 from thermocomp.exporters.vectors import Answers, Readings
 
 #: difference that is allowed, as a share of a correction, or in um of one below 1 um
@@ -78,14 +78,14 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         held["found"] = ("int", answers.fault.ravel().tolist())
     lines = [
         f"TYPE {quoted(f'{name}_vectors', scl)}{'' if scl else ' :'}",
-        *(["VERSION : 0.1"] if scl else []),
+        *(SCL if scl else []),
         "STRUCT",
     ]
     lines += [wrapped(f"    {n} : {array(k, len(v))} := {values(v, k)};") for n, (k, v) in held.items()]
     vectors = Unit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
     parts = [
         f"FUNCTION_BLOCK {quoted(f'{name}_test', scl)}",
-        *(["VERSION : 0.1"] if scl else []),
+        *(SCL if scl else []),
         f"(* Runs {name} over its test vectors, one in each cycle: done after {calls}; wrong has to be 0 then. *)",
         section("VAR_OUTPUT", {"row": "DINT", "wrong": "DINT", "largest": "LREAL", "done": "BOOL"}),
         section(
