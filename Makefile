@@ -21,7 +21,7 @@ demo: $(VENV)/.study
 
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium clang gcc gcc-arm-none-eabi libc6-dev libclang-rt-dev libnewlib-arm-none-eabi linuxcnc-uspace \
-		mosquitto qemu-system-arm
+		linuxcnc-uspace-dev mosquitto qemu-system-arm
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev

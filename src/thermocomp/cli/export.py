@@ -19,13 +19,13 @@ from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
-from thermocomp.exporters import beckhoff, cpackage, onnxpackage, siemens, stpackage
+from thermocomp.exporters import beckhoff, cpackage, linuxcncpackage, onnxpackage, siemens, stpackage
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.ststatements import Dialect
 from thermocomp.files.machines import read_models
 from thermocomp.runtime.compensator import Compensator
 
-Target = Literal["c99", "st", "siemens", "beckhoff", "onnx", "klipper", "heidenhain", "fanuc"]
+Target = Literal["c99", "st", "siemens", "beckhoff", "linuxcnc", "onnx", "klipper", "heidenhain", "fanuc"]
 
 #: all files of an export by their names, the page how to use it the last
 WRITERS: dict[Target, Callable[..., dict[str, bytes]]] = {
@@ -33,6 +33,7 @@ WRITERS: dict[Target, Callable[..., dict[str, bytes]]] = {
     "st": stpackage.write_package,
     "siemens": siemens.write_package,
     "beckhoff": beckhoff.write_package,
+    "linuxcnc": linuxcncpackage.write_package,
     "onnx": onnxpackage.write_package,
 }
 
@@ -72,11 +73,11 @@ def export(
         Model file from ``thermocomp fit``, or of ``thermocomp position``.
     recordings : list of Path
         For klipper, heidenhain and fanuc: CSV, XLSX or Parquet files to reduce the model on; each is one test.
-    to : {'c99', 'st', 'siemens', 'beckhoff', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
+    to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         What to write: c99 is one header and one source of C99, for a DSP, a PLC or a computer; st a function block in
-        structured text, IEC 61131-3; siemens and beckhoff the same and what their temperature compensation takes; onnx
-        one step as a graph, for a computer with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula;
-        fanuc a macro.
+        structured text, IEC 61131-3; siemens and beckhoff the same and what their temperature compensation takes;
+        linuxcnc the C99 as a component of HAL, and HAL that moves X, Y and Z; onnx one step as a graph, for a computer
+        with a runtime of ONNX; klipper its z_thermal_adjust; heidenhain a formula; fanuc a macro.
     output : Path
         Folder to write into.
     name : str
@@ -141,6 +142,9 @@ def export(
             reasons |= more
         else:
             writer = _writer(to, left, dialect, reduction.named())
+            if to == "linuxcnc":
+                left, axes, elsewhere = reducing.along_axes(left, reduction, to, "XYZ")
+                writer = partial(linuxcncpackage.write_package, axes=axes)
             with needs("onnx"):  # one of them does
                 texts = writer(Compensator.of(left, limits, watching=True), name, facts)
     if texts:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from cyclopts import Parameter
 
@@ -13,6 +13,7 @@ from thermocomp.cli.progress import show_steps
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.position import PositionModel
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.fanuc import write_fanuc
 from thermocomp.exporters.heidenhain import write_heidenhain
@@ -21,6 +22,8 @@ from thermocomp.exporters.reduced import SHAPES, Reduced, as_it_is, find_axis, f
 
 if TYPE_CHECKING:
     from thermocomp.assessment.reduction import Reduction
+
+_Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 WRITERS: dict[str, Callable[..., dict[str, bytes]]] = {
     "klipper": write_klipper,
@@ -117,12 +120,8 @@ def export_reduced(
         None goes along an axis that the controller corrects, or two along one; a model has to be reduced, and there is
         no recording; or the correction would run into its limit.
     """
-    shape, axes = SHAPES[to], _find_axes(models, options)
-    elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to))}
-    wanted = [m for m in models if m.target not in elsewhere]
-    if not wanted:
-        raise InputError(f"nothing to write: {'; '.join(f'{t}: {why}' for t, why in elsewhere.items())}")
-    _refuse_twice([(m.target, axes[m.target]) for m in wanted])
+    shape = SHAPES[to]
+    wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
     more = [m for m in wanted if not fits(m, shape)]
     if more and not recordings:
         raise InputError(
@@ -148,12 +147,42 @@ def export_reduced(
     return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
 
 
-def _why_elsewhere(model: ErrorModel, axis: str, to: str) -> str:
+def along_axes(
+    models: Sequence[_Model], options: ReductionOptions, to: str, corrected: str
+) -> tuple[list[_Model], dict[str, str], dict[str, str]]:
+    """Return the models that a controller takes, the axes by target, and why others are left out.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel or PositionModel
+    options : ReductionOptions
+    to : str
+        The controller.
+    corrected : str
+        Letters of the axes that it corrects.
+
+    Raises
+    ------
+    InputError
+        None goes along one of these, or two along one.
+    """
+    axes = _find_axes(models, options)
+    elsewhere = {m.target: why for m in models if (why := _why_elsewhere(m, axes[m.target], to, corrected))}
+    wanted = [m for m in models if m.target not in elsewhere]
+    if not wanted:
+        raise InputError(f"nothing to write: {'; '.join(f'{t}: {why}' for t, why in elsewhere.items())}")
+    _refuse_twice([(m.target, axes[m.target]) for m in wanted])
+    return wanted, axes, elsewhere
+
+
+def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, corrected: str) -> str:
     if model.unit != "um":
         return f"it predicts {model.unit}, and a correction is in um"
     if not axis:
         return f"its axis is not known: --axes {model.target}=Z would say that it is Z"
-    return "" if axis in SHAPES[to].axes else f"it is of {axis}, and {to} corrects {SHAPES[to].axes} alone"
+    if isinstance(model, PositionModel) and axis != model.axis:
+        return f"it runs along {model.axis}, and --axes says {axis}"
+    return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
 
 
 def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
@@ -171,12 +200,13 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
         )
 
 
-def _find_axes(models: Sequence[ErrorModel], options: ReductionOptions) -> dict[str, str]:
+def _find_axes(models: Sequence[ErrorModel | PositionModel], options: ReductionOptions) -> dict[str, str]:
     """Return the axis of each target; empty where none is known, or others are named."""
     named, targets = options.named(), [m.target for m in models]
     if unknown := [t for t in named if t not in targets]:
         raise InputError(f"--axes {', '.join(unknown)}: no such target; there are {', '.join(targets)}")
-    return {t: find_axis(t, named) if not named or t in named else "" for t in targets}
+    known = named or {m.target: m.axis for m in models if isinstance(m, PositionModel)}
+    return {t: find_axis(t, known) if not named or t in named else "" for t in targets}
 
 
 def _reduce(

@@ -132,7 +132,7 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
     """
     name, n, sizes = identifier(name), len(tables.channels), tables.sizes
     functions = write_functions(tables, name)
-    above = "".join(f"/* {_comment(line)} */\n" for line in facts)
+    above = "".join(f"/* {comment(line)} */\n" for line in facts)
     source = _SOURCE.format(
         facts=above,
         name=name,
@@ -166,7 +166,7 @@ def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
     for k, text in enumerate(texts):
         word = re.sub(r"[^A-Za-z0-9]+", "_", text.split(" [")[0]).strip("_").upper() or "X"
         lines.append(
-            f"    {name.upper()}_{kind}_{k}_{word} = {k}{',' if k < len(texts) - 1 else ''} /* {_comment(text)} */"
+            f"    {name.upper()}_{kind}_{k}_{word} = {k}{',' if k < len(texts) - 1 else ''} /* {comment(text)} */"
         )
     return "\n".join(lines)
 
@@ -177,7 +177,8 @@ def identifier(name: str) -> str:
     return f"tc_{text}"
 
 
-def _comment(text: str) -> str:
+def comment(text: str) -> str:
+    """Return a text that ends no comment."""
     for sign in ("*/", "/*", "??"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.encode("ascii", "backslashreplace").decode().split())
