@@ -72,7 +72,59 @@ def test_structured_text_in_every_dialect(tmp_path: Path, dialect: str) -> None:
 def test_a_dialect_is_of_structured_text_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = written(tmp_path, watched_model("z_um"))
     assert run(["export", str(model), "--to", "c99", "--dialect", "scl", "-o", str(tmp_path)]) == 2
-    assert "--dialect scl: is of --to st alone" in capsys.readouterr().err
+    assert "--dialect scl: only --to st takes it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--magnitude", "inf"], "--magnitude inf: c99 wants a finite number"),
+        (["--hold", "inf"], "--hold inf: c99 wants a finite number"),
+        (["--reading-age", "inf"], "--reading-age inf: c99 wants a finite number"),
+        (["--name", "../x"], "--name '../x': want letters, digits and _"),
+        (["--name", ""], "--name '': want letters"),
+        (["--date", "2026-13-45"], "--date 2026-13-45: want a date such as 2026-01-31"),
+        (["--most-loss", "3"], "--most-loss: c99 has no use for it"),
+        (["--axes", "z_um=Z"], "--axes: c99 has no use for it"),
+    ],
+)
+def test_an_option_that_would_make_a_useless_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out"), *options]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_each_target_has_its_own_verdict_and_what_is_left_out_is_said_in_the_files(tmp_path: Path) -> None:
+    tilt = replace(growing("B0C", 2.0, "urad"), honest_error=ACCEPTED)
+    model = written(tmp_path, judged("z_um", ACCEPTED), judged("y_um", UNPROVEN), judged("x_um", REFUSED), tilt)
+    taken = ["--accept-unproven", "M. Weber, trial"]
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out"), *taken]) == 1
+    for name in ("tc_thermal.h", "tc_thermal.md"):
+        text = (tmp_path / "out" / name).read_text()
+        assert text.split("\n")[0].strip("/* ") == (
+            "z_um: accepted on unseen cycles; y_um: UNPROVEN, taken all the same"
+        )
+        assert "Left out: x_um: worse than nothing" in text
+        assert "Left out: B0C: it predicts urad, and a correction is in um" in text
+
+
+@needs_compiler
+def test_files_compiled_with_other_switches_do_not_link(tmp_path: Path) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path)]) == 0
+    assert CC is not None
+    for switch in ("-DTC_FLOAT", "-DTC_ZERO_READINGS=60"):
+        subprocess.run([CC, "-c", switch, "tc_thermal.c"], cwd=tmp_path, check=True)
+        link = [CC, "tc_thermal.o", "tc_thermal_test.c", "-lm", "-o", "t"]
+        done = subprocess.run(link, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert "undefined reference" in done.stderr
+    few = subprocess.run(
+        [CC, "-c", "-DTC_ZERO_READINGS=1", "tc_thermal.c"], cwd=tmp_path, capture_output=True, check=False
+    )
+    assert b"at least 2" in few.stderr
 
 
 def written(folder: Path, *models: ErrorModel) -> Path:

@@ -61,7 +61,7 @@ def test_the_same_model_gives_the_same_bytes_and_a_refused_one_none(tmp_path: Pa
     for file in FILES:
         text = (tmp_path / "a" / "out" / file).read_bytes()
         assert text == (tmp_path / "b" / "out" / file).read_bytes()
-        assert b"x_um" not in text
+        assert text.replace(b"Left out: x_um: worse", b"").count(b"x_um") == 0
 
 
 def test_a_model_along_an_axis_knows_where_that_is(tmp_path: Path) -> None:

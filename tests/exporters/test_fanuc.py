@@ -161,7 +161,7 @@ def test_the_vectors_hold_and_find_a_mistake(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(content)
     line = [sys.executable, str(tmp_path / "tc_check.py")]
     assert ", 0 wrong" in subprocess.run(line, check=True, capture_output=True, text=True).stdout
-    for was, becomes in (("-0.012*", "0.012*"), ("GT150.0]GOTO", "GT950.0]GOTO"), ("THEN#1=0.5", "THEN#1=0.6")):
+    for was, becomes in (("-12.0*", "12.0*"), ("GT150.0]GOTO", "GT950.0]GOTO"), ("THEN#1=0.5", "THEN#1=0.6")):
         text = texts["tc.nc"].decode()
         assert was in text
         (tmp_path / "other.nc").write_text(text.replace(was, becomes))

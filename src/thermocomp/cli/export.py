@@ -1,7 +1,9 @@
 """`thermocomp export`: a model file as code for another controller, with its proof."""
 
+import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from functools import partial
 from hashlib import sha256
@@ -15,6 +17,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
+from thermocomp.core.correction import Limits
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
@@ -110,24 +113,30 @@ def export(
     int
         0 done, 1 a model was refused and left out, 2 unusable input.
     """
+    limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
+    _check(to, name, date, limits)
     if dialect is not None and to != "st":
-        raise InputError(f"--dialect {dialect}: is of --to st alone")
-    models = [m.taken(accept_unproven) for m in read_models(model)]
-    reasons = {m.target: why for m in models if (why := _refusal(m))}
-    left = [m for m in models if m.target not in reasons]
-    texts, elsewhere = dict[str, bytes](), dict[str, str]()
+        raise InputError(f"--dialect {dialect}: only --to st takes it")
     if recordings and to not in reducing.WRITERS:
         raise InputError(f"{to} holds the whole model: it wants no recording, found {recordings[0]}")
+    _check_reduction(to, reduction)
+    models = [m.taken(accept_unproven) for m in read_models(model)]
+    reasons = {m.target: why for m in models if (why := _refusal(m))}
+    texts = dict[str, bytes]()
+    elsewhere = {}
+    if to not in reducing.WRITERS:
+        elsewhere = {m.target: f"it predicts {m.unit}, and a correction is in um" for m in models if m.unit != "um"}
+    left = [m for m in models if m.target not in reasons and m.target not in elsewhere]
     if left:
-        limits = replace(compensator.limits(), hold=hold, fade=fade, reading_age=reading_age)
         facts = Facts(
             model.name,
             sha256(model.read_bytes()).hexdigest(),
             __version__,
             date or datetime.now(UTC).astimezone().date().isoformat(),
+            reasons | elsewhere,
         )
         if to in reducing.WRITERS:
-            texts, more, elsewhere = reducing.export_reduced(
+            texts, more, others = reducing.export_reduced(
                 to,
                 _constant(left, to),
                 recordings or [],
@@ -140,10 +149,12 @@ def export(
                 hidden=json,
             )
             reasons |= more
+            elsewhere |= others
         else:
             writer = _writer(to, left, dialect, reduction.named())
             if to == "linuxcnc":
-                left, axes, elsewhere = reducing.along_axes(left, reduction, to, "XYZ")
+                left, axes, others = reducing.along_axes(left, reduction, to, "XYZ")
+                elsewhere |= others
                 writer = partial(linuxcncpackage.write_package, axes=axes)
             with needs("onnx"):  # one of them does
                 texts = writer(Compensator.of(left, limits, watching=True), name, facts)
@@ -161,6 +172,30 @@ def export(
         console.print(words(f"Written: {', '.join(str(output / file) for file in texts)}"), soft_wrap=True)
         console.print(words(f"Prove it as {output / list(texts)[-1]} says."), soft_wrap=True)
     return 1 if reasons else 0
+
+
+def _check(to: str, name: str, date: str | None, limits: Limits) -> None:
+    """Refuse what would make no file, or one that no controller takes."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        raise InputError(f"--name {name!r}: want letters, digits and _, a letter first, such as mill_3")
+    for option in ("magnitude", "rate", "hold", "fade", "reading_age"):
+        if not math.isfinite(getattr(limits, option)):
+            raise InputError(f"--{option.replace('_', '-')} {getattr(limits, option)}: {to} wants a finite number")
+    if date is not None:
+        try:
+            datetime.strptime(date, "%Y-%m-%d").astimezone()
+        except ValueError as e:
+            raise InputError(f"--date {date}: want a date such as 2026-01-31") from e
+
+
+def _check_reduction(to: str, found: reducing.ReductionOptions) -> None:
+    """Refuse options that a target would pass over."""
+    if to in reducing.WRITERS:
+        return
+    plain = reducing.ReductionOptions(axes=found.axes if to in ("siemens", "beckhoff", "linuxcnc") else None)
+    for option in fields(plain):
+        if getattr(found, option.name) != getattr(plain, option.name):
+            raise InputError(f"--{option.name.replace('_', '-')}: {to} has no use for it")
 
 
 def _writer(

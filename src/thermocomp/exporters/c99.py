@@ -20,9 +20,28 @@ typedef double tc_real;
 #endif
 #endif
 
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
 /* readings that the zero is averaged of, at most; fewer take less memory, and then it is known earlier */
 #ifndef TC_ZERO_READINGS
 #define TC_ZERO_READINGS {most}
+#endif
+
+#if TC_ZERO_READINGS < 2
+#error "TC_ZERO_READINGS: at least 2"
+#endif
+
+/* what is compiled with other switches does not link */
+#define TC_PASTE(name, readings) name##readings
+#define TC_NAMED(name, readings) TC_PASTE(name, readings)
+#ifdef TC_FLOAT
+#define {name}_start TC_NAMED({name}_start_float_, TC_ZERO_READINGS)
+#define {name}_step TC_NAMED({name}_step_float_, TC_ZERO_READINGS)
+#else
+#define {name}_start TC_NAMED({name}_start_double_, TC_ZERO_READINGS)
+#define {name}_step TC_NAMED({name}_step_double_, TC_ZERO_READINGS)
 #endif
 
 /* what it takes, in this order */
@@ -48,6 +67,10 @@ void {name}_start({name}_state *s);
  * at last lets the corrections go to zero.
  */
 void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt);
+
+#ifdef __cplusplus
+}}
+#endif
 
 #endif
 """

@@ -23,13 +23,16 @@ calls, faults among them, and compares with what thermocomp says.
 
 It prints how many calls are wrong (none), the largest difference, and how many bytes the state takes; its exit code is
 0 if all is well. For single precision add `-DTC_FLOAT`; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
-may be known earlier then, and the test does not fit). Never compile with `-ffast-math`.
+may be known earlier then, and the test does not fit). Compile all files of your program with the same of these:
+otherwise it does not link. Never compile with `-ffast-math`.
 
 ## Run it
 
-Call it in a cycle, every second or ten, with the time since the call before, measured or fixed:
+Call it in a cycle, every ten seconds, with the time since the call before, measured or fixed. (At a shorter cycle the
+one call in which the zero becomes known has more to sort: 300 s / cycle readings of each input.)
 
     #include "{name}.h"
+    #include <math.h>                          /* NAN */
 
     static {name}_state state;                 /* zero at power-on */
     static tc_real value[{inputs}];
@@ -50,6 +53,10 @@ Call it in a cycle, every second or ten, with the time since the call before, me
 {corrections}
 
 {geometry}{zero} {status}{sensors}
+
+## Try the sign
+
+{sign}
 
 ## Switch it off
 
@@ -91,8 +98,8 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return how far single precision may be off: a model whose terms cancel makes much of a rounded temperature."""
+    """Return how far single precision may be off: models whose terms cancel or that recur make much of it."""
     with np.errstate(over="ignore"):  # what is that large is no reading
         rounded = readings._replace(values=readings.values.astype(np.float32).astype(np.float64))
-    moved = np.abs(replay(compensator, tables, rounded).correction - answers.correction)
+    moved = np.abs(replay(compensator, tables, rounded, single=True).correction - answers.correction)
     return max(1e-5, 10.0 * float((moved / np.maximum(1.0, np.abs(answers.correction))).max(initial=0.0)))

@@ -1,6 +1,7 @@
 """What is said of an exported compensator before anything else: may it run, what it is, where it comes from."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from thermocomp.runtime.compensator import Compensator
 
@@ -19,18 +20,22 @@ class Facts:
         thermocomp version that exports.
     date : str
         Of the export.
+    left_out : mapping of str to str
+        Targets of the model file that are not in the export, and why.
     """
 
     source: str
     sha256: str
     version: str
     date: str
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def origin(self) -> list[str]:
         """Return where it comes from."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
             f"Written by thermocomp {self.version} on {self.date}; change nothing here, export anew",
+            *(f"Left out: {target}: {why}" for target, why in self.left_out.items()),
         ]
 
     def lines(self, compensator: Compensator) -> list[str]:
@@ -59,7 +64,10 @@ def _verdict(compensator: Compensator) -> str:
     shadow, lines = compensator.shadow, compensator.lines
     if len(shadow) == len(lines):
         return f"SHADOW ONLY, {', '.join(lines)}: not proven on unseen cycles; all corrections stay zero"
-    running = ", ".join(t for t in lines if t not in shadow)
-    taken = [m for m in compensator.models if m.honest_error and m.honest_error.taken]
-    word = f"{running}: UNPROVEN, taken all the same" if taken else f"{running}: accepted on unseen cycles"
-    return f"{word}; SHADOW ONLY, {', '.join(shadow)}: corrections stay zero" if shadow else word
+    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, taken all the same": list[str]()}
+    for target, line in lines.items():
+        if target not in shadow:
+            taken = any(m.honest_error and m.honest_error.taken for m in compensator.models[line.models])
+            said["UNPROVEN, taken all the same" if taken else "accepted on unseen cycles"].append(target)
+    words = [f"{', '.join(targets)}: {word}" for word, targets in said.items() if targets]
+    return "; ".join([*words, *([f"SHADOW ONLY, {', '.join(shadow)}: corrections stay zero"] if shadow else [])])

@@ -145,9 +145,10 @@ def _axis(r: Reduced, place: dict[str, int], most: float, step: float) -> Iterat
         yield f"IF[#{place[i.name]}EQ#0]GOTO{label + 3} ({_comment(i.name)}: VACANT. NOTHING CHANGES)"
         yield f"IF[#{place[i.name]}LT{_real(low)}]GOTO{label + 3} (NOT PLAUSIBLE)"
         yield f"IF[#{place[i.name]}GT{_real(high)}]GOTO{label + 3}"
-    yield f"#1={_real(in_mm(0.0 - r.model.intercept))} (WANTED IN MM)"
+    yield f"#1={_real(in_um(0.0 - r.model.intercept))} (WANTED IN UM: A CONTROL TAKES EIGHT DIGITS)"
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
-        yield f"#1=#1-[{_real(in_mm(factor))}*[#{place[i.name]}-[{_real(zero)}]]]"
+        yield f"#1=#1-[{_real(in_um(factor))}*[#{place[i.name]}-[{_real(zero)}]]]"
+    yield "#1=#1/1000.0 (IN MM)"
     yield from _within("#1", most)
     yield f"N{label + 2}#2=#1-#{force}"
     yield from _within("#2", step)

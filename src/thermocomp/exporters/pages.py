@@ -30,7 +30,8 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         "values": "\n".join(f"| `value[{k}]` | {c.name} | {c.unit} |" for k, c in enumerate(tables.channels)),
         "line": "add `slope[k]` [um/m] by the distance from" if slopes else "the same at every position",
         "corrections": "\n".join(
-            f"| `correction[{k}]` [um] | {t} | {f'{p:g} mm' if slopes else ''} |" for k, (t, p) in enumerate(positions)
+            f"| `correction[{k}]` [um] | {t} | {f'{p:g} mm' if slopes else 'yes'} |"
+            for k, (t, p) in enumerate(positions)
         ),
         "zero": f"Temperatures count from the mean over the first {zeroing.otherwise:g} s, or over "
         f"{zeroing.at_rest:g} s while the spindle stands; until then the correction stays where it is."
@@ -40,6 +41,10 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         "controller.\n\n"
         if slopes
         else "",
+        "sign": "Give the controller +20 um by hand in place of a correction, the spindle standing and an indicator on "
+        "the\naxis: it has to move by 0.02 mm in its positive direction, and back with 0. If it goes the other way, "
+        "turn the sign\nround where you hand the correction over, nowhere else. Temperatures that are made up are no "
+        "trial: the watch does not\nbelieve them.",
         "status": f"`{of}status[k]` says how a correction is: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow; "
         f"`{of}rejected`\nwhy a reading was not used: 0 it was, 1 its time, 2 a value missing or not plausible, 3 no "
         f"start of a machine;\n`{of}outside` how many inputs are beyond the trained range.",

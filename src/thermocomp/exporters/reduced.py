@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import NamedTuple
 
@@ -172,12 +172,24 @@ def fits(model: ErrorModel, shape: Shape) -> bool:
 
 
 def as_it_is(model: ErrorModel, axis: str) -> Reduced:
-    """Return a model of that shape as reduced, without a loss."""
+    """Return a model of that shape in the digits that are printed, without a loss."""
     found = model.honest_error
+    assert isinstance(model, Polynomial)
+    model = replace(
+        model,
+        inputs=tuple(replace(i, reference=round(i.reference, 4)) for i in model.inputs),
+        coefficients=tuple(float(f"{c:.5g}") for c in model.coefficients),
+        intercept=float(f"{model.intercept:.5g}"),
+    )
     none = Left(math.nan if found is None else found.none_rms, math.nan)
     own = Left(*((math.nan, math.nan) if found is None else (found.rms, found.max_abs)))
     return Reduced(
-        model, axis, "the model is of that shape already; its error is that in the model file", none, own, own
+        model,
+        axis,
+        "the model is of that shape already, here with five digits; its error is that in the file",
+        none,
+        own,
+        own,
     )
 
 

@@ -19,6 +19,9 @@ TAKEN = {
 _PAGE = """
 ## Into the NC
 
+For a SINUMERIK ONE, whose PLC is an S7-1500. The PLC of an 840D sl (S7-300) knows no LReal, that of an 828D or
+808D no SCL: there another computer has to run the compensator (C99, ONNX or `thermocomp serve`).
+
 dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` makes these of `correction` and `slope` of `{name}`:
 
 | output | setting data | unit |
@@ -35,9 +38,9 @@ k, the axis, what it takes, and its machine data:
 
 The PLC writes the setting data, in a cycle of seconds to minutes. **UNCONFIRMED**: with which block of your PLC it
 writes NC variables (the builder's manual says so), and `direction`, whether the NC takes the value off the command (-1,
-as the vendor's worked example of a screw that grows has it) or adds it. Try it, the spindle standing and an indicator
-on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis at 0.02 and all else at 0, the axis moves by 0.02 mm; by minus
-0.02 mm if the NC takes it off.
+as the vendor's worked example of a screw that grows has it) or adds it. Try it, MD32750 being
+set, the axis referenced, the spindle standing and an indicator on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis
+at 0.02 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the NC takes it off.
 
 At power-on the block begins with corrections of 0, and the setting data are still what was written last: write them
 as 0 before the axes are referenced.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from uuid import NAMESPACE_URL, uuid5
 
-from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.block.tables import Tables, gather
 from thermocomp.exporters.c99 import identifier
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.pages import describe
@@ -16,11 +16,12 @@ from thermocomp.runtime.compensator import Compensator
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
 Make an object of each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration above,
-statements below), and the same with `{name}_test.st`.""",
+statements below, without the `END_...` of a POU), and the same with `{name}_test.st`.""",
     "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project: Add > Existing item, all of
 them.""",
     "scl": """`{name}.scl` is an external source. TIA Portal: External source files > Add new external file, then
-Generate blocks from source; the same with `{name}_test.scl`. For S7-1500 (LReal, and data blocks of this size).""",
+Generate blocks from source; the same with `{name}_test.scl`. For S7-1500 (LReal, and optimized data: {kilobytes} kB
+for an instance).""",
 }
 
 _README = """{facts}
@@ -39,7 +40,8 @@ to be 0 then, and `largest`, the largest difference to thermocomp as a share of 
 
 ## Run it
 
-Call one instance of `{name}` in a cyclic task of a second or ten seconds:
+Call one instance of `{name}` in a cyclic task of ten seconds. At a shorter cycle the one call in which the zero becomes
+known has more to sort (300 s / cycle readings of each input): mind the watchdog. It needs LREAL.
 
 | input | what it is |
 |---|---|
@@ -47,7 +49,7 @@ Call one instance of `{name}` in a cyclic task of a second or ten seconds:
 | `good[k]` | FALSE for a sensor that says nothing or reports a failure |
 | `age` | seconds since the values were measured |
 | `elapsed` | seconds since the call before, measured or the cycle time of the task |
-| `restart` | TRUE for one call: temperatures count from now on; corrections stay and move from where they are |
+| `restart` | when it becomes TRUE: temperatures count from now on; corrections stay and move from where they are |
 
 | value | what it is | unit |
 |---|---|---|
@@ -59,7 +61,11 @@ Call one instance of `{name}` in a cyclic task of a second or ten seconds:
 
 {geometry}{zero} {status}{sensors}
 
-{about}## Switch it off
+{about}## Try the sign
+
+{sign}
+
+## Switch it off
 
 Do not set the correction to zero at once: the axis would jump. Call the block with an age of 1.0E+9: the correction
 stays where it is for {hold:g} s and then goes to zero, slowly. The controller must not compensate for temperature
@@ -132,7 +138,7 @@ def write_blocks(
         facts="  \n".join(said),
         name=name,
         dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL"}[dialect],
-        install=_INSTALL[dialect].format(name=name),
+        install=_INSTALL[dialect].format(name=name, kilobytes=_kilobytes(tables)),
         about=f"{about.lstrip()}\n" if about else "",
         calls=len(readings.age),
         tolerance=TOLERANCE,
@@ -147,6 +153,13 @@ def write_blocks(
             f"{name}_test.{suffix}": _joined(tests, head, dialect),
         }
     return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
+
+
+def _kilobytes(tables: Tables) -> int:
+    """Return about how much an instance takes, readings of the zero above all."""
+    sizes = tables.sizes
+    readings = sizes["MOST"] * (sizes["CHANNELS"] + sizes.get("WATCHED", 0) + 2)
+    return 10 + (8 * (readings + sizes.get("MEMORY", 0) * (sizes["SENSORS"] + 1) + sizes["POINTS"])) // 1000
 
 
 def _joined(units: Sequence[Unit], head: str, dialect: Dialect) -> str:

@@ -34,9 +34,10 @@ OUTPUTS: dict[str, str] = {
     "outside": "",
 }
 
-_BODY = """IF {restart} THEN
+_BODY = """IF {restart} AND NOT {restarted} THEN
     {name}_start({s});
 END_IF;
+{restarted} := {restart};
 FOR {k} := 0 TO {last} DO
     {w}.value[{k}] := {value}[{k}];
     IF NOT {good}[{k}] THEN
@@ -151,10 +152,10 @@ def _block(tables: Tables, name: str, scl: bool) -> Unit:
             "VAR_OUTPUT",
             {o: array(kinds.get(o, "int"), size) if size else TYPES["int"] for o, size in outputs.items()},
         ),
-        section("VAR", {bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}),
+        section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, "restarted": "BOOL"}),
         section("VAR_TEMP" if scl else "VAR", {"k": "DINT"}),
     ]
-    names = ("s", "w", "k", "value", "good", "age", "elapsed", "restart")
+    names = ("s", "w", "k", "value", "good", "age", "elapsed", "restart", "restarted")
     body = _BODY.format(
         **{v: f"{mark}{v}" for v in names if v != "s"},
         s=f"s := {mark}s",
@@ -181,6 +182,6 @@ def _listed(names: Sequence[str]) -> str:
 
 def comment(text: str) -> str:
     """Return a text that ends no comment."""
-    for sign in ("*)", "(*"):
+    for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.encode("ascii", "backslashreplace").decode().split())

@@ -120,8 +120,7 @@ class _Writer(Printer):
             case ast.Return(ast.IfExp(test, body, orelse)):
                 return self.statement(ast.If(test, [ast.Return(body)], [ast.Return(orelse)]), depth)
             case ast.Return(value) if value is not None:
-                own = quoted(f"{self._name}_{self.function.name}", self._scl)
-                return [f"{pad}{'#' if self._scl else ''}{own} := {self.bare(value, 'real')};"]
+                return [f"{pad}{self._local(f'{self._name}_{self.function.name}')} := {self.bare(value, 'real')};"]
             case ast.Expr(ast.Call() as call):
                 return [f"{pad}{self._call(called(call), call.args[3:], list(BAGS))};"]
             case ast.If(test, body, orelse):

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,12 @@ class Answers(NamedTuple):
 
 
 def replay(
-    compensator: Compensator, tables: Tables, readings: Readings, start: CompensatorState | None = None
+    compensator: Compensator,
+    tables: Tables,
+    readings: Readings,
+    start: CompensatorState | None = None,
+    *,
+    single: bool = False,
 ) -> Answers:
     """Return what a compensator says of readings, from its start.
 
@@ -54,6 +60,8 @@ def replay(
     readings : Readings
     start : CompensatorState, optional
         Another one than that of `Compensator.start`.
+    single : bool
+        Let models remember in single precision.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
@@ -62,6 +70,8 @@ def replay(
         clock, begun = clock + dt if good and begun else clock, begun or good
         tick = clock if good else math.nan  # a clock that says nothing moves nothing
         state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
+        if single:
+            state = state._replace(models=_single(state.models))
         rows.append(
             (
                 [said.corrections[t].offset for t in targets],
@@ -78,6 +88,18 @@ def replay(
 
     passed = np.array([r[5] for r in rows], dtype=np.bool_)
     return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
+
+
+def _single(value: Any) -> Any:
+    """Return what a model remembers, rounded to single precision."""
+    if isinstance(value, float | np.ndarray):
+        return np.asarray(value).astype(np.float32).astype(np.float64)[()]
+    if isinstance(value, tuple):
+        parts = [_single(v) for v in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{f.name: _single(getattr(value, f.name)) for f in fields(value)})
+    return value
 
 
 def make_readings(tables: Tables) -> Readings:

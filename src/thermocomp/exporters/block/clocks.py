@@ -4,6 +4,9 @@ import math
 
 from thermocomp.exporters.block.formulas import tick
 from thermocomp.exporters.block.names import Names
+from thermocomp.exporters.block.numbers import smaller
+
+MOST_TICKS = 2e9
 
 
 def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
@@ -25,8 +28,10 @@ def run_clock(s: Names, w: Names, t: Names, c: int, begun: bool) -> None:
         dt = 0.0
         for i in range(leaves):
             s.averages[t.average_begin[c] + i] = w.leaf[first + i]
-    ticks = math.floor((s.phase[c] + dt) / t.interval[c] + 0.000001)
+    ticks = 0.0 + math.floor(smaller((s.phase[c] + dt) / t.interval[c] + 0.000001, MOST_TICKS))
     phase = s.phase[c] + dt - ticks * t.interval[c]
+    if ticks >= MOST_TICKS:  # a whole number of 32 bits ends there; it has settled
+        phase = 0.0
     if ticks > 0.0:
         dt = phase
     moves = True
