@@ -1,5 +1,7 @@
 """All files of an export to C99: the code, its test, and how to use it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from thermocomp.exporters.block.tables import Tables, gather
@@ -7,7 +9,7 @@ from thermocomp.exporters.c99 import translate
 from thermocomp.exporters.ctest import write_test
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.pages import describe
-from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
+from thermocomp.exporters.vectors import Answers, FloatArray, Readings, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 
 _README = """{facts}
@@ -89,7 +91,9 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(name, tables, readings, answers, _single(compensator, tables, readings, answers)),
+        f"{name}_test.c": write_test(
+            name, tables, readings, answers, _double(tables), _single(compensator, tables, readings, answers)
+        ),
         f"{name}.md": _README.format(
             facts="  \n".join(said), name=name, calls=len(readings.age), **describe(compensator, tables, "state.")
         ),
@@ -97,9 +101,23 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     return {file: text.encode() for file, text in texts.items()}
 
 
+def _double(tables: Tables) -> float:
+    """Return how far double precision may be off: what feeds itself makes more of rounding."""
+    return 1e-11 if tables.sizes["CLOCKS"] else 1e-12
+
+
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return how far single precision may be off: models whose terms cancel or that recur make much of it."""
+    """Return how far single precision may be off: ten times what rounding of all numbers changes."""
+    rows = readings._replace(values=_rounded(readings.values))
+    coarse = replace(compensator, models=round_all(compensator.models, _rounded))
+    said = replay(coarse, tables, rows, rounded=_rounded)
+    moved = [
+        float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0))
+        for a, b in ((answers.correction, said.correction), (answers.slope, said.slope))
+    ]
+    return max(1e-5, 10.0 * max(moved))
+
+
+def _rounded(numbers: FloatArray) -> FloatArray:
     with np.errstate(over="ignore"):  # what is that large is no reading
-        rounded = readings._replace(values=readings.values.astype(np.float32).astype(np.float64))
-    moved = np.abs(replay(compensator, tables, rounded, single=True).correction - answers.correction)
-    return max(1e-5, 10.0 * float((moved / np.maximum(1.0, np.abs(answers.correction))).max(initial=0.0)))
+        return numbers.astype(np.float32).astype(np.float64)

@@ -13,9 +13,9 @@ _PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
 #include <stdio.h>
 
 #ifdef TC_FLOAT
-#define TOLERANCE {single:.0e} /* what rounding of the values alone changes, ten times, or 1e-5 */
+#define TOLERANCE {single:.0e} /* what rounding of numbers changes, ten times, or 1e-5 */
 #else
-#define TOLERANCE 1e-12
+#define TOLERANCE {double:.0e} /* 1e-11 with a model that feeds itself */
 #endif
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
@@ -82,7 +82,7 @@ _FAULTS = """        for (j = 0; j < SENSORS; j++) {
 """
 
 
-def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, single: float) -> str:
+def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
     """Return a program that says whether the code does what the compensator did.
 
     Parameters
@@ -93,12 +93,14 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
     readings : Readings
     answers : Answers
         Of the compensator.
-    single : float
-        Difference that is allowed in single precision, as a share of a correction, or in um of one below 1 um.
+    double, single : float
+        Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
+        1 um.
     """
     calls = range(len(readings.age))
     return _PROGRAM.format(
         name=name,
+        double=double,
         single=single,
         calls=len(calls),
         inputs=len(tables.channels),

@@ -48,7 +48,7 @@ def replay(
     readings: Readings,
     start: CompensatorState | None = None,
     *,
-    single: bool = False,
+    rounded: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Answers:
     """Return what a compensator says of readings, from its start.
 
@@ -60,8 +60,8 @@ def replay(
     readings : Readings
     start : CompensatorState, optional
         Another one than that of `Compensator.start`.
-    single : bool
-        Let models remember in single precision.
+    rounded : callable, optional
+        What becomes of all numbers that are kept between two calls.
     """
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = start or compensator.start(), 0.0, False, []
@@ -70,8 +70,9 @@ def replay(
         clock, begun = clock + dt if good and begun else clock, begun or good
         tick = clock if good else math.nan  # a clock that says nothing moves nothing
         state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
-        if single:
-            state = state._replace(models=_single(state.models))
+        if rounded is not None:
+            corrections = {t: round_all(c, rounded) for t, c in state.corrections.items()}
+            state = state._replace(models=round_all(state.models, rounded), corrections=corrections)
         rows.append(
             (
                 [said.corrections[t].offset for t in targets],
@@ -90,15 +91,17 @@ def replay(
     return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
 
 
-def _single(value: Any) -> Any:
-    """Return what a model remembers, rounded to single precision."""
-    if isinstance(value, float | np.ndarray):
-        return np.asarray(value).astype(np.float32).astype(np.float64)[()]
+def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
+    """Return a value in which all numbers that are not whole are rounded."""
+    if isinstance(value, float):
+        return float(rounded(np.array(value)))
+    if isinstance(value, np.ndarray) and value.dtype == np.float64:
+        return rounded(value)
     if isinstance(value, tuple):
-        parts = [_single(v) for v in value]
+        parts = [round_all(v, rounded) for v in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{f.name: _single(getattr(value, f.name)) for f in fields(value)})
+        return replace(value, **{f.name: round_all(getattr(value, f.name), rounded) for f in fields(value)})
     return value
 
 
