@@ -60,9 +60,9 @@ class SpeedState:
 class PacedDynamic(ErrorModel):
     """Deviation = intercept + sum of temperatures, their first-order lags and speed states, each by its read-out.
 
-    A lag of a temperature T follows tau dx/dt = T - x. A state of the speed n follows dx/dt = k (nu^p - x), nu = |n| /
-    n_top, with k = 1/tau_stopped + nu (1/tau_running - 1/tau_stopped): a turning spindle stirs the air that cools it.
-    All rest in the first reading.
+    A lag of a temperature T follows tau dx/dt = T - x. A state of the speed n follows dx/dt = k (nu^p - x), nu =
+    abs(n) / n_top, with k = 1/tau_stopped + nu (1/tau_running - 1/tau_stopped): a turning spindle stirs the air that
+    cools it. All rest in the first reading.
 
     Parameters
     ----------

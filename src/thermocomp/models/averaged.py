@@ -80,7 +80,7 @@ class AveragedDynamic(TimedRegressor):
     left_out_ : ndarray of shape (n_rows, 2)
         Of each row that was learned from: prediction by structures that were fitted without its cycle, and their spread
         [unit of y]; nan elsewhere.
-    gain_ : ndarray of shape (n_features_in_,)
+    gain_ : ndarray of shape (n_inputs,)
         How much y follows each temperature within one step between rows, in absolute value [unit of y per degC]; 0 for
         a speed.
 
