@@ -1,7 +1,7 @@
 """The compensator's way of a reading as scalars and loops: what is written for a controller, in any language.
 
 The same as `thermocomp.runtime.compensator` does, of models whose zero is the start, without probings and orders. The
-functions run in Python, and are printed as they stand (`thermocomp.exporters.printing`): assignments, ``if``, ``for``
+functions run in Python, and are printed as they stand (`thermocomp.exporters.printer`): assignments, ``if``, ``for``
 and ``while`` over variables of three kinds, ``s`` that is kept, ``w`` that is not, ``t`` that is known. A procedure
 leaves its result in a variable; a function is of numbers alone.
 """
