@@ -15,6 +15,7 @@ from thermocomp.exporters.ststatements import (
     quoted,
     safe,
     section,
+    size_of,
     used_in,
     wrapped,
     write_functions,
@@ -35,7 +36,7 @@ OUTPUTS: dict[str, str] = {
 }
 
 _BODY = """IF {restart} AND NOT {restarted} THEN
-    {name}_start({s});
+    {start}({s});
 END_IF;
 {restarted} := {restart};
 FOR {k} := 0 TO {last} DO
@@ -46,7 +47,7 @@ FOR {k} := 0 TO {last} DO
 END_FOR;
 {w}.age := {age};
 {w}.{w_dt} := {elapsed};
-{name}_step({bags});
+{step}({bags});
 """
 
 
@@ -108,16 +109,14 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[Unit]:
 def _start(tables: Tables, name: str, used: str, scl: bool) -> Unit:
     """Return the function that begins anew; the corrections in force stay, and move from there."""
     mark = "#" if scl else ""
-    lines, longest = [], 0
+    lines = []
     for n, var in used_in("s", used).items():
         if n in ("correction", "slope"):
             continue
-        size, zero = 1, number(0, var.kind)
-        for dim in var.dims:
-            size *= max(tables.sizes[dim], 1)
+        zero = number(0, var.kind)
         if var.dims:
-            longest = max(longest, size)
-            lines += [f"FOR {mark}k := 0 TO {size - 1} DO", f"    {mark}s.{safe(n)}[{mark}k] := {zero};", "END_FOR;"]
+            last = size_of(var, tables.sizes) - 1
+            lines += [f"FOR {mark}k := 0 TO {last} DO", f"    {mark}s.{safe(n)}[{mark}k] := {zero};", "END_FOR;"]
         else:
             lines.append(f"{mark}s.{safe(n)} := {zero};")
     own = quoted(f"{name}_start", scl)
@@ -159,14 +158,13 @@ def _block(tables: Tables, name: str, scl: bool) -> Unit:
     body = _BODY.format(
         **{v: f"{mark}{v}" for v in names if v != "s"},
         s=f"s := {mark}s",
-        name=f'"{name}' if scl else name,
+        start=quoted(f"{name}_start", scl),
+        step=quoted(f"{name}_step", scl),
         w_dt=safe("dt"),
         last=n - 1,
         nothing=number(NOTHING),
         bags=", ".join(f"{b} := {mark}{b}" for b in BAGS),
     )
-    if scl:
-        body = body.replace(f'"{name}_start', f'"{name}_start"').replace(f'"{name}_step', f'"{name}_step"')
     for o, size in outputs.items():
         if size:
             body += f"FOR {mark}k := 0 TO {size - 1} DO\n    {mark}{o}[{mark}k] := {mark}s.{safe(o)}[{mark}k];\n"

@@ -236,7 +236,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
     for n, var in used_in(bag, used).items():
-        size = _size(var, tables.sizes)
+        size = size_of(var, tables.sizes)
         what = array(var.kind, size) if var.dims else TYPES[var.kind]
         start = f" := {values(tables.values[n], var.kind)}" if bag == "t" else ""
         lines += [wrapped(f"    {safe(n)} : {what}{start};"), f"    (* {var.about} *)"]
@@ -248,7 +248,8 @@ def used_in(bag: str, used: str) -> dict[str, Var]:
     return {n: v for n, v in VARIABLES[bag].items() if re.search(rf"\b{bag}\.{safe(n)}\b", used)}
 
 
-def _size(var: Var, sizes: Mapping[str, int]) -> int:
+def size_of(var: Var, sizes: Mapping[str, int]) -> int:
+    """Return how many numbers a variable holds."""
     size = 1
     for dim in var.dims:
         size *= max(sizes[dim], 1)
