@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, RecordingError, UnitError
@@ -280,6 +280,7 @@ def test_text_in_a_parquet_column_is_told_with_its_row(tmp_path: Path) -> None:
         st.text(alphabet='01.,;"#\n\r-eTZ:+ ', max_size=60).map(lambda t: f"time;t1_C\n{t}".encode()),
     )
 )
+@example(content=b'"\t\x01\r\x01\t0')
 def test_whatever_stands_in_a_file_it_is_read_or_refused(content: bytes) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "any.csv"

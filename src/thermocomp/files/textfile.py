@@ -122,6 +122,8 @@ class CsvTable:
                 BytesIO(self.data) if self.data else self.path, **self._options(types), **more, **_EXACT
             ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
+        except IndexError as e:  # pandas meets an end of the file within a cell
+            raise ValueError("no row is found in it") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
                 f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
