@@ -40,6 +40,12 @@ def test_of_an_error_along_an_axis(tmp_path: Path) -> None:
         assert prove(tmp_path / "c99").returncode == 0
 
 
+def test_an_axis_that_it_was_not_measured_along(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    positionfile.write([along_x()], tmp_path / "x.json")
+    assert run(["export", str(tmp_path / "x.json"), "--to", "siemens", "--axes", "EXX=Y", "-o", str(tmp_path)]) == 2
+    assert "--axes EXX=Y: EXX was measured along X" in " ".join(capsys.readouterr().err.split())
+
+
 def test_a_refused_slope_is_left_out(tmp_path: Path) -> None:
     bad = replace(along_x(), slopes=(replace(along_x().slopes[0], honest_error=REFUSED),))
     positionfile.write([bad], tmp_path / "x.json")

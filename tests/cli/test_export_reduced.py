@@ -89,6 +89,7 @@ def test_what_has_the_shape_already_wants_no_recording(to: str, tmp_path: Path) 
     model = written(tmp_path, growing("z_um", 3.0))
     assert run(["export", model, "--to", to, "-o", str(tmp_path / "out"), *DATE]) == 0
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted({*NAMES, MAIN[to]} - {NAMES[2]})
+    assert run(["export", model, "--to", to, "-o", str(tmp_path / "other"), "--sensors", "t9_C"]) == 2
     assert "1.00 times" in (tmp_path / "out" / "tc_thermal.md").read_text()
     unproven = replace(growing("z_um", 3.0), honest_error=replace(ACCEPTED, verdict="unproven"))
     assert run(["export", written(tmp_path, unproven), "--to", to, "-o", str(tmp_path / "no"), *DATE]) == 1

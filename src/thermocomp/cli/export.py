@@ -204,6 +204,9 @@ def _writer(
     """Return the writer of a target, with what it wants to know beside the compensator."""
     if to in ("siemens", "beckhoff"):
         along = {m.target: m.axis for m in models if isinstance(m, PositionModel)}
+        for target, axis in named.items():
+            if along.get(target, axis) != axis:
+                raise InputError(f"--axes {target}={axis}: {target} was measured along {along[target]}")
         return partial(WRITERS[to], axes={**along, **named})
     return partial(WRITERS[to], dialect=dialect) if dialect else WRITERS[to]
 

@@ -122,11 +122,12 @@ def export_reduced(
     """
     shape = SHAPES[to]
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)
-    more = [m for m in wanted if not fits(m, shape)]
+    more = [m for m in wanted if not fits(m, shape) or not _has(options, m)]
     if more and not recordings:
+        held = f"{to} holds {_told(shape.sensors)}{', of --sensors' if options.sensors else ''}"
         raise InputError(
-            f"{to} holds {_told(shape.sensors)}, and the model of {', '.join(m.target for m in more)} is more than that"
-            f": name recordings to reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
+            f"{held}, and the model of {', '.join(m.target for m in more)} is more than that: name recordings to "
+            f"reduce it on, such as: thermocomp export {facts.source} drift.csv --to {to}"
         )
     reductions = _reduce(more, axes, recordings, options, beginning, to, hidden=hidden) if more else {}
     refused, found = dict[str, str](), list[Reduced]()
@@ -183,6 +184,11 @@ def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, correc
     if isinstance(model, PositionModel) and axis != model.axis:
         return f"it runs along {model.axis}, and --axes says {axis}"
     return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
+
+
+def _has(options: ReductionOptions, model: ErrorModel) -> bool:
+    """Return whether the controller has the temperatures of a model."""
+    return options.sensors is None or {i.name for i in model.inputs} <= set(options.sensors)
 
 
 def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
