@@ -27,7 +27,7 @@ def test_targets_go_along_axes_and_others_are_left_out(tmp_path: Path, capsys: p
     models = (growing("z_um", 2.0), growing("bed_um", 3.0), replace(growing("x_um", 1.0), honest_error=None))
     assert exported(tmp_path, models=models) == 0
     said = capsys.readouterr().out
-    assert "bed_um is left out: its axis is not known: --axes bed_um=Z would say that it is Z" in said
+    assert "bed_um is left out: its axis is not known: --axes bed_um=X, =Y or =Z names it" in said
     first = "z_um: accepted on unseen cycles; SHADOW ONLY, x_um: corrections stay zero"
     assert first in said
     out = tmp_path / "out"

@@ -183,6 +183,19 @@ def test_sensors_that_fail(cuts: dict[str, Any], found: list[int], flags: tuple[
     assert (said.status[-1] > 1).all() == (found[2] > 0)  # without t3_C it does harm: held, then faded
 
 
+@pytest.mark.parametrize("rpm", [0.0, 1500.0])
+@pytest.mark.parametrize("dt", [0.3, 1.0])
+def test_the_zero_of_many_readings(dt: float, rpm: float) -> None:
+    compensator, rng, n = Compensator.of([watched_model("z_um")]), np.random.default_rng(3), 1500
+    rows = np.column_stack([20.0 + np.cumsum(rng.normal(0.0, 0.004, (n, 3)), axis=0), np.full(n, rpm)])
+    rows[n // 2 :, 3] = 2500.0
+    rows[rng.random(rows.shape) < 0.003] = np.nan
+    said = check_block(compensator, np.round(rows, 3), dt * rng.choice([1.0, 1.5], n), age=rng.uniform(0.0, 0.2, n))
+    if rpm == 0.0 and dt < 0.5:  # no more fit in
+        assert (said.status[:, 0] == 0).sum() == 599
+    assert np.abs(said.correction).max() > 1.0
+
+
 @pytest.mark.parametrize("failure", FAILURES)
 def test_every_failure_that_the_watch_knows(failure: str) -> None:
     compensator = Compensator.of([watched_model("z_um")])

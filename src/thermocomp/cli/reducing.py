@@ -180,7 +180,7 @@ def _why_elsewhere(model: ErrorModel | PositionModel, axis: str, to: str, correc
     if model.unit != "um":
         return f"it predicts {model.unit}, and a correction is in um"
     if not axis:
-        return f"its axis is not known: --axes {model.target}=Z would say that it is Z"
+        return f"its axis is not known: --axes {model.target}=X, =Y or =Z names it"
     if isinstance(model, PositionModel) and axis != model.axis:
         return f"it runs along {model.axis}, and --axes says {axis}"
     return "" if axis in corrected else f"it is of {axis}, and {to} corrects {corrected} alone"
