@@ -10,9 +10,12 @@ from thermocomp.assessment.probing import Probed, Probings
 from thermocomp.assessment.replay import replay_compensated
 from thermocomp.assessment.study import assess
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.reading import Reading
 from thermocomp.recording.recording import Recording
 from thermocomp.recording.stacking import stack
 from thermocomp.report.probings import describe_probings
+from thermocomp.runtime.adaptation import Probing
+from thermocomp.runtime.compensator import Compensator
 
 FEW = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "spindle_rpm")
 
@@ -116,3 +119,37 @@ def test_what_is_no_plan_of_probings_is_refused(odd: object) -> None:
         Probings.of(odd)
     assert Probings.of(None) is None
     assert Probings.of("every 2 h") == Probings.of(Probings(7200.0))
+
+
+@pytest.mark.parametrize("sound", [False, True])
+@pytest.mark.parametrize("error", [10.0, -10.0, 60.0, -400.0, 15_000.0])
+def test_a_wrong_one_does_little_harm_however_often_it_comes(
+    error: float, sound: bool, day: Recording, fitted: tc.ErrorModel
+) -> None:
+    """A chip on the sphere, the wrong tool, a unit; beside sound probings every 2 h, and alone."""
+    samples = stack([day], ["z_um"], [i.name for i in fitted.inputs])
+    samples = samples.take(np.arange(len(samples)) % 6 == 0)
+    time, true = samples.time, samples.deviations[:, 0]
+    names, running = [i.name for i in fitted.inputs], Compensator.of([fitted])
+    every = Probings(7200.0).find_rows(time, np.isfinite(true))
+
+    def replay(wrong: dict[int, Probing]) -> np.ndarray:
+        state, left = running.start(), np.zeros(len(time))
+        for k, values in enumerate(samples.values.tolist()):
+            reading = Reading(float(time[k]), dict(zip(names, values, strict=True)))
+            made = Probing(float(true[k]), keys=(f"time {time[k]}",)) if sound and k in every else None
+            one = wrong.get(k, made)
+            state, said = running.step(state, reading, reading.time, {} if one is None else {"z_um": one})
+            left[k] = true[k] + said.corrections["z_um"].offset
+        return left
+
+    without = replay({})
+    for row in (every[2] + 30, every[6] + 50):
+        sent, after = (
+            Probing(float(true[row]) + error),
+            slice(row + 1, int(np.searchsorted(time, time[row] + 4 * 3600))),
+        )
+        once, often = replay({row: sent}), replay({row + 2 * k: sent for k in range(10)})
+        assert (once == often).all()
+        rms = [float(np.sqrt(np.mean(left[after] ** 2))) for left in (once, without)]
+        assert rms[0] <= 1.5 * rms[1]

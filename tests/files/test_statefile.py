@@ -96,6 +96,20 @@ def test_other_families_too(tmp_path: Path) -> None:
         assert same(statefile.read(tmp_path / "state.json", machine).state, state)
 
 
+def test_a_file_of_before_probings_were_told_apart(machine: Compensator, samples: Samples) -> None:
+    state = run(machine, samples, 110)
+    assert set(state.probed) == {"z_um"}
+    assert state.learned["z_um"].most < math.inf
+    entry = {"written": NOW.isoformat(), "models": statefile.fingerprint(machine), "state": encode(state)}
+    del entry["state"]["probed"]  # type: ignore[attr-defined]
+    for name in ("refused_since", "most", "usual"):
+        del entry["state"]["learned"]["z_um"][name]  # type: ignore[index]
+    found = statefile.loads(jsonfile.pack(statefile.KIND, [entry]), machine).state
+    assert found.probed == {}
+    assert same(found._replace(probed=state.probed, learned=state.learned), state)
+    assert found.learned["z_um"].mean == pytest.approx(state.learned["z_um"].mean)
+
+
 def test_the_state_of_other_models_is_refused(machine: Compensator, samples: Samples) -> None:
     text = statefile.dumps(run(machine, samples, 5), machine, NOW)
     other = Compensator.of([replace(m, intercept=1e-9) for m in machine.models])

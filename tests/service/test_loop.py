@@ -15,6 +15,7 @@ from driftmodels import ACCEPTED, growing
 
 from thermocomp.adapters.mqtt import MqttSink, MqttSource
 from thermocomp.adapters.plain import FileSink
+from thermocomp.adapters.probes import MqttProbe
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status as LinkStatus
@@ -415,6 +416,70 @@ def test_a_measurement_under_a_correction_that_nobody_knows_is_refused(monkeypat
         assert service.probings["z_um"].deviation == 2.0
 
     asyncio.run(running(service, work))
+
+
+@pytest.mark.parametrize("more", [{}, {"id": "chip 1"}, {"time": 0.0}])
+@pytest.mark.parametrize("measured", [10.0, 60.0, -15_000.0])
+def test_a_real_broker_that_repeats_a_probing(
+    broker: Mosquitto, more: dict[str, object], measured: float, tmp_path: Path
+) -> None:
+    """The same bytes twice between two readings, after the next, and after a restart."""
+    source, probe = Given(), MqttProbe(topic="m/7/probe", port=broker.port)
+    service = Service(machine(), [source], [], state_path=tmp_path / "state.json", probes=[probe])
+    message = {"target": "z_um", "measured_um": measured, "under_correction": True, **more}
+    if "time" in more:
+        message["time"] = time.time()
+
+    async def send(times: int) -> None:
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            for _ in range(times):
+                await client.publish("m/7/probe", json.dumps(message), qos=1)
+
+    async def events(own: Service, count: int) -> None:
+        await until(lambda: len([e for e in own.events if e.kind == "probing"]) >= count)
+
+    async def work() -> None:
+        await until(lambda: probe.status().state == "connected")
+        await asyncio.sleep(0.3)
+        say(source, 20.0)
+        await until(lambda: service.counts["readings"] == 1)
+        await send(2)
+        await events(service, 1)
+        say(source, 20.0)
+        await until(lambda: service.counts["readings"] == 2)
+        await send(3)
+        await events(service, 5)
+
+    asyncio.run(running(service, work))
+    after = MqttProbe(topic="m/7/probe", port=broker.port)
+    later = Service(machine(), [source], [], state_path=tmp_path / "state.json", probes=[after])
+
+    async def again() -> None:
+        await until(lambda: after.status().state == "connected")
+        await asyncio.sleep(0.3)
+        say(source, 20.0)
+        await send(1)
+        await events(later, 1)
+        say(source, 20.0)
+        await until(lambda: later.counts["readings"] == 2)
+
+    asyncio.run(running(later, again))
+    for own in (service, later):
+        assert own.state.corrections["z_um"].offset == 0.0
+        assert sum("delivered before" in e.text for e in own.events) >= (4 if own is service else 1)
+
+
+def test_two_probings_before_a_reading_and_one_of_tomorrow() -> None:
+    service = Service(machine(), [Given()], [])
+    for _ in range(2):
+        service.take(Reading(time.time(), {"t": 20.0}))
+    for measured, ahead in ((1.0, 0.0), (1.1, 0.0), (1.2, 3600.0)):
+        at = time.time() + ahead
+        service.measure(Measurement(at, "z_um", measured, left=False, keys=(f"time {at}",)))
+    assert [e.text for e in service.events if e.kind == "probing"] == [
+        "z_um refused: another one waits for the next reading",
+        "z_um refused: its time is 3600 s ahead of the clock",
+    ]
 
 
 def test_an_alarm_is_told_and_suspends_nothing() -> None:

@@ -79,4 +79,17 @@ def test_a_measurement_that_is_none(payload: str) -> None:
 
 def test_a_measurement() -> None:
     told = '{"target": "z_um", "measured_um": 3, "under_correction": false, "position_mm": 10.5, "time": 7}'
-    assert read_measurement(told, 5.0) == Measurement(7.0, "z_um", 3.0, False, 0.5, 10.5)
+    assert read_measurement(told, 5.0) == Measurement(7.0, "z_um", 3.0, False, 0.5, 10.5, ("time 7.0",))
+
+
+def test_what_tells_a_measurement_from_others() -> None:
+    def keys(more: str, measured: float = 3.0, arrived: float = 5.0) -> tuple[str, ...]:
+        told = f'{{"target": "z_um", "measured_um": {measured}, "under_correction": false{more}}}'
+        return read_measurement(told, arrived).keys
+
+    assert keys(', "id": "p 17", "time": 7') == ("id p 17", "time 7.0")
+    assert keys(', "id": 17') == keys(', "id": "17"', 4.0, 9.0) == ("id 17",)
+    assert keys("", arrived=5.0) == keys("", arrived=6.0) != keys("", 3.1)  # its content
+    for wrong in ('""', "null", "1.5", "true", "[1]", f'"{"x" * 300}"'):
+        with pytest.raises(ReadingError, match="whose id cannot be used"):
+            keys(f', "id": {wrong}')

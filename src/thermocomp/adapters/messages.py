@@ -15,7 +15,9 @@ MOST_BYTES, MOST_VALUES = 65_536, 1_000
 _NUMBERS = {"measured_um": None, "repeatability_um": 0.5, "position_mm": 0.0}
 #: no tool point is further off [um]
 _FAR = 1e5
-_KNOWN = {"time", "target", "under_correction", *_NUMBERS}
+_KNOWN = {"time", "id", "target", "under_correction", *_NUMBERS}
+#: characters of an id
+_LONG = 200
 
 
 def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str]) -> Reading:
@@ -53,7 +55,8 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     ----------
     payload : bytes or str
         JSON: ``{"target": "z_um", "measured_um": 3.2, "under_correction": true}``; with ``repeatability_um``,
-        ``position_mm`` and ``time`` (s since 1970) if they are known.
+        ``position_mm``, ``time`` (s since 1970) and ``id`` (text or a whole number) if they are known. The id or the
+        time tells it from others, without them its content.
     arrived : float
         The clock, now [s]: its time if it does not say.
 
@@ -62,19 +65,22 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     ReadingError
         It is too large, no JSON, or not such a table: whether it was measured under the correction has to be in it.
     """
-    example = '{"target": "z_um", "measured_um": 3.2, "under_correction": true}'
+    example = '{"id": "17", "target": "z_um", "measured_um": 3.2, "under_correction": true}'
     content = _table(payload, example)
     found = {k: _number(content.get(k, default)) for k, default in _NUMBERS.items()}
     found["time"] = _number(content.get("time", arrived))
-    target, left = content.get("target"), content.get("under_correction")
+    target, left, own = content.get("target"), content.get("under_correction"), content.get("id", "")
     wrong = [k for k, v in found.items() if v is None] + ["target"] * (not isinstance(target, str))
+    wrong += ["id"] * (type(own) not in (str, int) or len(str(own)) > _LONG or ("id" in content and own == ""))
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
         raise ReadingError(f"a measurement whose {', '.join(wrong)[:80]} cannot be used; want {example}")
     if abs(found["measured_um"] or 0.0) > _FAR or not 0.0 <= (found["repeatability_um"] or 0.0) <= _FAR:
         raise ReadingError(f"a measurement beyond {_FAR:g} um, or a repeatability below 0: nothing a probe can say")
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
-    return Measurement(at, str(target)[:200], measured, bool(left), spread, position)
+    keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
+    keys = keys or [f"content {json.dumps(content, sort_keys=True)}"]
+    return Measurement(at, str(target)[:200], measured, bool(left), spread, position, tuple(keys))
 
 
 def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:

@@ -72,9 +72,8 @@ class SimulatedProbe:
             await asyncio.sleep(self.every / self.machine.speed)
             for target in self.targets:
                 if (true := self.machine.truth.get(target)) is not None:
-                    yield Measurement(
-                        time.time(), target, true + noise.gauss(0.0, self.repeatability), False, self.repeatability
-                    )
+                    now, found = time.time(), true + noise.gauss(0.0, self.repeatability)
+                    yield Measurement(now, target, found, False, self.repeatability, keys=(f"time {now!r}",))
 
     def status(self) -> Status:
         """Return how it is, at once."""

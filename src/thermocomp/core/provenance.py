@@ -1,6 +1,7 @@
 """What stands beside the numbers of a model: where it comes from, and how it was judged."""
 
 from dataclasses import dataclass, field
+from statistics import median
 from typing import Literal
 
 from thermocomp.core.bounds import COEFFICIENT, check_between
@@ -126,6 +127,11 @@ class HonestError:
             harm_margin=self.harm_margin or 0.0,
             lost=list(self.lost.values()),
         )
+
+    @property
+    def typical(self) -> float:
+        """RMS of the residual in most unseen cycles: the median over them."""
+        return median(self.cycles.values()) if self.cycles else self.rms
 
     @property
     def current(self) -> bool:

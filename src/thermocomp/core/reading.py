@@ -40,3 +40,4 @@ class Measurement(NamedTuple):
     left: bool  #: it is what the correction in force left; otherwise the correction is not in it
     repeatability: float = 0.5  #: standard deviation [um]
     position: float = 0.0  #: on the axis [mm]
+    keys: tuple[str, ...] = ()  #: its id, its time, its content: a measurement with one of them again is the same

@@ -178,7 +178,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
     """Raise `ValueError` unless it is a state of this compensator."""
     cold, lines = compensator.start(), compensator.lines
     want(list(state.corrections) == list(lines), list(state.corrections), "corrections", f"those of {', '.join(lines)}")
-    for name in ("idle", "learned", "references", "raw", "orders"):
+    for name in ("idle", "learned", "references", "raw", "orders", "probed"):
         want(set(getattr(state, name)) <= set(lines), None, name, f"none but {', '.join(lines)}")
     most = compensator.limits.magnitude * (1 + 1e-9)
     for target, correction in state.corrections.items():
@@ -187,6 +187,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
     for name, number in (("time", state.time), ("clock", state.clock), ("taken", state.taken), ("away", state.away)):
         want(number is None or math.isfinite(number) or name == "away", number, name, "a finite number")
     want(all(0.0 <= v < math.inf for v in state.idle.values()), None, "idle", "times")
+    want(all(-math.inf < t < math.inf for k in state.probed.values() for t in k.values()), None, "probed", "times")
     for name in ("models", "gathered", "watches"):
         found, expected = len(getattr(state, name)), len(getattr(cold, name))
         want(found == expected, found, name, f"{expected} of them")
@@ -223,6 +224,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         )
         sizes = 0.0 < learned.size <= learned.spread <= _LARGEST
         want(bool(sound) and sizes, None, place, "a mean with its covariance")
+        want(learned.most > 0.0 and 0.0 < learned.usual <= 100.0, None, place, "what a probing may move")
         models = compensator.models[lines[target].models]
         known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
         want(n in known, n, f"{place}.mean", f"{max(known)} numbers")

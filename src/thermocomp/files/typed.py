@@ -1,6 +1,7 @@
 """Named tuples and dataclasses with arrays as JSON, and back by their types: nothing is guessed at."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -22,7 +23,7 @@ def encode(value: Any) -> Any:
         value = value._asdict()
     elif is_dataclass(value):
         value = {f.name: getattr(value, f.name) for f in fields(value)}
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {k: encode(v) for k, v in value.items()}
     return [encode(v) for v in value] if isinstance(value, tuple) else value
 
@@ -53,6 +54,9 @@ def decode(kind: Any, value: Any, place: str) -> Any:
         return _plain(kind, value, place)
     hints = get_type_hints(kind)
     names = list(getattr(kind, "_fields", None) or [f.name for f in fields(kind)])
+    if isinstance(value, dict):  # a file of before these fields were there
+        defaults = getattr(kind, "_field_defaults", {})
+        names = [n for n in names if n in value or n not in defaults]
     want(isinstance(value, dict) and list(value) == names, value, place, f"a table of {', '.join(names)}")
     return kind(**{name: decode(hints[name], value[name], f"{place}.{name}") for name in names})
 

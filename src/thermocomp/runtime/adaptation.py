@@ -4,6 +4,10 @@ A Kalman filter over what may be wrong with a model: an offset of the size of it
 and, in a model that is the average of many structures, how much of each main direction of their differences is true. A
 probing says their sum. The offset is forgotten with a time constant of hours: it stands for what the machine does now;
 the rest is what the training left open, and is known for days. Without a probing the model says what it said.
+
+A probing can be wrong: a chip on the sphere, the wrong tool, another unit. One probing alone moves a model by no more
+than `SUSPECT` standard deviations of what is expected; two that were made apart from each other and agree count in
+full; and none, however often it is repeated, moves it beyond what the model can be wrong by (`find_most`).
 """
 
 from typing import NamedTuple
@@ -17,11 +21,23 @@ FloatArray = NDArray[np.float64]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
 #: what no offset and no structure explains, as a share of the error on cycles that were left out
 UNEXPLAINED = 0.2
-#: a probing further from what is expected than so many standard deviations is refused
-IMPLAUSIBLE = 5.0
-#: two that agree on more show that the machine is unlike what the model was judged on: from then on errors of this
-#: many standard deviations are what it was seen to be wrong by
-AGREED = 3.0
+#: a probing this many standard deviations from what is expected counts less, the further it is from it
+SUSPECT = 2.5
+#: a probing further than this many standard deviations from what is expected is refused
+IMPLAUSIBLE = 4.0
+#: errors of most cycles and days are smaller than their root mean square over all: down to this share of it
+LEAST_USUAL = 0.5
+#: probings over which it is learned how large the errors of this day are
+MEMORY = 5.0
+#: two probings confirm each other if they agree within this many standard deviations, and this much time lies between
+#: them [s]
+AGREED, APART = 5.0, 600.0
+#: two that confirm each other show that the machine is unlike what the model was judged on: from then on errors of
+#: this many standard deviations are what it was seen to be wrong by
+UNLIKE = 3.0
+#: a model is wrong by at most this many times its error on cycles that were left out, and this many times the drift
+#: without compensation (both root mean squares)
+MOST, MOST_OF_DRIFT = 10.0, 3.0
 #: no error is counted on to be smaller [um]
 LEAST = 1e-3
 
@@ -35,6 +51,14 @@ class Probing(NamedTuple):
     deviation: float  #: [um]
     repeatability: float = 0.5  #: of the probe, standard deviation [um]
     position: float = 0.0  #: where on the axis [mm]
+    keys: tuple[
+        str, ...
+    ] = ()  #: what tells it from others: an id, its time; a probing with one of them again is the same
+
+    @property
+    def identity(self) -> tuple[str, ...]:
+        """Its keys; its numbers if it has none."""
+        return self.keys or (f"{self.deviation} um at {self.position} mm, give or take {self.repeatability} um",)
 
 
 class Adaptation(NamedTuple):
@@ -45,9 +69,10 @@ class Adaptation(NamedTuple):
     size: float  #: of the error without probings, root mean square [um]
     spread: float  #: standard deviation of the offset without probings: the size, or more once it was seen [um]
     time: float  #: of the last probing that was taken [s]
-    refused: float = (
-        np.nan
-    )  #: the error by the last probing, if that was refused: what a second one says, too, is taken
+    refused: float = np.nan  #: the error by the last probing, if that was not taken in full [um]
+    refused_since: float = -np.inf  #: when a probing said so first [s]
+    most: float = np.inf  #: no probing moves the model further [um]
+    usual: float = 1.0  #: variance of the errors of this day, as a share of that of the size
 
     def at(self, time: FloatArray | float) -> tuple[FloatArray, FloatArray]:
         """Return mean, (..., n), and covariance, (..., n, n), at later times [s]: on their way back to no probing."""
@@ -72,7 +97,8 @@ class Adaptation(NamedTuple):
         ndarray of shape (...,)
             [um]
         """
-        return np.asarray((self._kept(time) * self.mean * _beside(directions, 1.0)).sum(axis=-1))
+        found = (self._kept(time) * self.mean * _beside(directions, 1.0)).sum(axis=-1)
+        return np.asarray(np.clip(found, -self.most, self.most))
 
     def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
         """Return what is left of the half-width of a band, as a share of it; `floor` is that of the band [um].
@@ -91,7 +117,26 @@ class Adaptation(NamedTuple):
         return np.asarray(np.exp(-gone / constants))
 
 
-def begin(size: float, n_directions: int) -> Adaptation:
+def find_most(size: float, drift: float, magnitude: float) -> float:
+    """Return what a model can be wrong by at most [um].
+
+    Parameters
+    ----------
+    size : float
+        Root mean square error on cycles that the model had not seen [um].
+    drift : float
+        The same without compensation: an error of a thermal model is no larger than what heat does to the machine [um].
+    magnitude : float
+        What a correction may be at most [um].
+
+    Returns
+    -------
+    float
+    """
+    return min(MOST * max(size, LEAST), MOST_OF_DRIFT * max(drift, LEAST), magnitude)
+
+
+def begin(size: float, n_directions: int, typical: float = np.inf, most: float = np.inf) -> Adaptation:
     """Return what is known without a probing.
 
     Parameters
@@ -100,13 +145,19 @@ def begin(size: float, n_directions: int) -> Adaptation:
         Root mean square error on cycles that the model had not seen [um].
     n_directions : int
         0 to learn an offset alone.
+    typical : float
+        Root mean square error on most of these cycles; the size if that is less [um].
+    most : float
+        See `find_most` [um].
 
     Returns
     -------
     Adaptation
     """
     size = max(size, LEAST)
-    return Adaptation(np.zeros(n_directions + 1), np.diag([*[1.0] * n_directions, size**2]), size, size, -np.inf)
+    prior = np.diag([*[1.0] * n_directions, size**2])
+    usual = min(max(typical / size, LEAST_USUAL), 1.0) ** 2
+    return Adaptation(np.zeros(n_directions + 1), prior, size, size, -np.inf, most=most, usual=usual)
 
 
 def take(
@@ -134,20 +185,36 @@ def take(
     """
     if not (np.isfinite(error) and 0.0 <= repeatability < np.inf):
         return before, f"{error} um with a repeatability of {repeatability} um: want finite numbers"
+    if abs(error) > before.most + IMPLAUSIBLE * repeatability:
+        return before, (
+            f"{error:+.1f} um from the model, which can be wrong by {before.most:.1f} um at most: check the probe, the "
+            "tool and the unit; if the tool point did move so far, set the zero anew"
+        )
     (mean, covariance), spread = before.at(time), before.spread
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
-    surprise = error - float(weights @ mean)
-    plausible = IMPLAUSIBLE * float(weights @ covariance @ weights + own) ** 0.5
-    if abs(surprise) > plausible:
-        if not abs(error - before.refused) <= IMPLAUSIBLE * (2 * own) ** 0.5:
-            why = f"{surprise:+.1f} um from what is expected, where {plausible:.1f} um are plausible: measure again"
-            return before._replace(refused=error), why
-        covariance[-1, -1] += surprise**2
-        spread = max(spread, abs(surprise) / AGREED)
+    surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
+    typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
+    if abs(surprise) > SUSPECT * typical:
+        plausible = abs(surprise) <= IMPLAUSIBLE * typical
+        alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
+        since = before.refused_since if alike else time
+        if alike and time - since >= APART:
+            if not plausible:
+                covariance[-1, -1] += surprise**2
+                spread = max(spread, abs(surprise) / UNLIKE)
+        elif plausible:  # as of a probe so bad that it is within what is expected
+            noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
+        else:
+            limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
+            why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
+            return before._replace(refused=error, refused_since=since), why
+    usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
+    usual = max(usual, LEAST_USUAL**2)
     gain = covariance @ weights
-    variance = float(weights @ gain) + own
+    variance = float(weights @ gain) + noise
     after = covariance - np.outer(gain, gain) / variance
-    return Adaptation(mean + gain * (surprise / variance), (after + after.T) / 2, before.size, spread, time), ""
+    mean = mean + gain * (surprise / variance)
+    return Adaptation(mean, (after + after.T) / 2, before.size, spread, time, *doubt, before.most, usual), ""
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:

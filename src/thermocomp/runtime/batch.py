@@ -100,8 +100,10 @@ def run(
     shift, refused = np.zeros(len(time)), tuple[str, ...]()
     if probed is not None:
         later = np.arange(len(time)) >= known
-        alone, _, _ = _adapted(model, alone, time, np.where(complete & later, probed, np.nan), repeatability)
-        gated, shift, refused = _adapted(model, gated, time, np.where(drives & later, probed, np.nan), repeatability)
+        alone, _, _ = _adapted(model, alone, time, np.where(complete & later, probed, np.nan), repeatability, limits)
+        gated, shift, refused = _adapted(
+            model, gated, time, np.where(drives & later, probed, np.nan), repeatability, limits
+        )
         moved = _moved(gated.deviation, drives, time, limits, known)
     return ModelRun(alone.deviation, moved, alone.outside, turned, gate.why, alone.half_width, shift, without, refused)
 
@@ -241,11 +243,18 @@ def _said(
 
 
 def _adapted(
-    model: ErrorModel, answers: _Answers, time: FloatArray, probed: FloatArray, repeatability: float
+    model: ErrorModel,
+    answers: _Answers,
+    time: FloatArray,
+    probed: FloatArray,
+    repeatability: float,
+    limits: Limits | None,
 ) -> tuple[_Answers, FloatArray, tuple[str, ...]]:
     """Return answers with what is learned from probings, what that adds, and why probings were refused."""
-    size = 0.0 if model.honest_error is None else model.honest_error.rms
-    learned = adaptation.begin(size, answers.directions.shape[1])
+    honest = model.honest_error
+    size, typical, drift = (0.0, 0.0, 0.0) if honest is None else (honest.rms, honest.typical, honest.none_rms)
+    most = adaptation.find_most(size, drift, math.inf if limits is None else limits.magnitude)
+    learned = adaptation.begin(size, answers.directions.shape[1], typical, most)
     shift, narrower, refused = np.zeros(len(time)), np.ones(len(time)), list[str]()
     rows = np.flatnonzero(np.isfinite(probed)).tolist()
     for row, following in zip(rows, [*rows, len(time)][1:], strict=True):

@@ -31,6 +31,7 @@ from thermocomp.runtime.advance import advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.gate import explain_implausible, is_number
 from thermocomp.runtime.group import Group
+from thermocomp.runtime.identity import remember, sift
 from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
@@ -245,7 +246,8 @@ class Compensator:
         now : float
             The clock of the reading's source, now [s].
         probings : mapping of str to Probing, optional
-            By target or axis, made at the time of the reading. They count from the next reading on.
+            By target or axis, made at the time of the reading. They count from the next reading on, each once: see
+            `thermocomp.runtime.identity`.
         tick : float, optional
             The monotone clock of the process, now [s]: corrections move by it. Without it `now` is taken; then a clock
             that goes back makes them wait until it is where it was.
@@ -255,13 +257,13 @@ class Compensator:
         state : CompensatorState
         said : Compensated
         """
-        probings, tick = probings or {}, now if tick is None else tick
+        (fresh, known_before), tick = sift(state, probings), now if tick is None else tick
         instant, untimely = place(state, reading, now, tick, self.limits)
         if not untimely:
             state, reading = self._believe(state, reading, instant.time)
         if why := untimely or self.gate(state, reading):
             state, said = self.wait(state, tick, why)
-            return state, said._replace(refused=dict.fromkeys(probings, f"its reading is rejected: {why}"))
+            return state, said._replace(refused=dict.fromkeys(probings or (), f"its reading is rejected: {why}"))
         dt = 0.0 if state.time is None else instant.time - state.time
         travel = self._travel(state, tick)
         stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
@@ -272,7 +274,7 @@ class Compensator:
         )
         references, raw, held = dict(state.references), dict(state.raw), dict[str, str]()
         deviations, widths, states_of = dict[str, Deviation](), dict[str, float](), dict[str, Status]()
-        refused = dict.fromkeys(probings, "no model drives its correction")
+        refused, moved = dict.fromkeys(fresh, "no model drives its correction"), dict[str, float]()
         arrived = state.away is not None
         for target, line in self.lines.items():
             if not all(map(math.isfinite, stepped.said[line.models])):
@@ -280,9 +282,9 @@ class Compensator:
                 continue
             if target not in references:
                 references[target] = Reference(reading.time, "start: mean over the first readings")
-            zero, probing = references[target].shift, probings.get(target)
-            known = learned.get(target)
-            answer = evaluate(line, self.models, stepped, instant.time, known, probing, failed, zero)
+            zero, probing = references[target].shift, fresh.get(target)
+            known, most = learned.get(target), self.limits.magnitude
+            answer = evaluate(line, self.models, stepped, instant.time, known, probing, failed, zero, most)
             raw[target], deviations[target] = answer.raw, answer.deviation
             if failed and (why := _unjudged(self.models[line.models], failed)):
                 held[target] = why  # no band either: how wrong the model is without these was never judged
@@ -291,8 +293,8 @@ class Compensator:
                 widths[target] = answer.half_width
             if answer.learned is not None:
                 learned[target] = answer.learned
-            if target in probings:
-                refused[target] = answer.refused
+            if probing is not None:
+                refused[target], moved[target] = answer.refused, answer.moved
             corrections[target], states_of[target] = self._drive(state, target, answer.deviation, travel)
             arrived &= states_of[target].word != "restarting"
         rest = self._idle(state, corrections, tick, held, driven=states_of)
@@ -303,6 +305,7 @@ class Compensator:
             idle=rest.idle,
             gathered=stepped.gathered,
             learned=learned,
+            probed=remember(state, {t: fresh[t] for t in moved}, instant.time) if moved else state.probed,
             references=references,
             raw=raw,
             away=None if arrived else state.away,
@@ -310,9 +313,10 @@ class Compensator:
             origin=instant.origin,
             taken=rest.clock,
         )
-        told_of = {t: why for t, why in refused.items() if why}
+        refused = known_before | {t: why for t, why in refused.items() if why}
+        every = states_of | rest.states
         return new, Compensated(
-            *(rest.corrections, "", stepped.outside, failed, states_of | rest.states, deviations, widths, told_of)
+            *(rest.corrections, "", stepped.outside, failed, every, deviations, widths, refused, moved)
         )
 
     def wait(self, state: CompensatorState, tick: float, why: str) -> tuple[CompensatorState, Compensated]:

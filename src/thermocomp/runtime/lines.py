@@ -31,6 +31,7 @@ class Said(NamedTuple):
     half_width: float  #: of the band about it [um]; nan without one
     learned: Adaptation | None  #: after the probing, if there was one
     refused: str  #: why the probing was; empty if it was not, or there was none
+    moved: float  #: by how much the probing moves the deviation [um]
     raw: Deviation  #: what the models alone say, from their own zero
 
 
@@ -61,6 +62,7 @@ def evaluate(
     probing: Probing | None,
     failed: Collection[str],
     zero: Deviation,
+    magnitude: float,
 ) -> Said:
     """Return what a line says of a reading.
 
@@ -81,19 +83,21 @@ def evaluate(
         Sensors that are not believed.
     zero : Deviation
         What is taken off what the models say: where the target counts from.
+    magnitude : float
+        What a correction may be at most [um]: no probing moves the deviation further.
 
     Returns
     -------
     Said
     """
     first, end = line.models.start, line.models.stop
-    raw, refused, single = line.deviation(spoken.said[first:end]), "", end == first + 1
+    raw, refused, moved, single = line.deviation(spoken.said[first:end]), "", 0.0, end == first + 1
     deviation = raw.less(zero) if zero.offset or zero.slope else raw
     width, band = math.nan, models[first].band if single else None
     if band is not None:
         width = spoken.half_widths[first] * (models[first].widening(failed) if failed else 1.0)
     if learned is None and probing is None:
-        return Said(deviation, width, None, "", raw)
+        return Said(deviation, width, None, "", 0.0, raw)
     directions = models[first].directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
@@ -102,12 +106,16 @@ def evaluate(
             width *= float(learned.narrowing(time, directions, band.floor))
     if probing is not None:
         error = probing.deviation - deviation.at(probing.position)
-        before = learned or adaptation.begin(_size(line, models[line.models]), len(directions))
+        own = models[line.models]
+        size, typical, drift = (_mean_square(line, own, name) for name in ("rms", "typical", "none_rms"))
+        most = adaptation.find_most(size, drift, magnitude)
+        before = (learned or adaptation.begin(size, len(directions), typical))._replace(most=most)
         learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
-    return Said(wanted, width, learned, refused, raw)
+        moved = float(learned.shift(time, directions) - before.shift(time, directions))
+    return Said(wanted, width, learned, refused, moved, raw)
 
 
-def _size(line: DeviationLine, models: Sequence[ErrorModel]) -> float:
-    """Return the root mean square of what a line is wrong by on cycles that its models had not seen [um]."""
-    errors = np.diag([0.0 if m.honest_error is None else m.honest_error.rms for m in models])
+def _mean_square(line: DeviationLine, models: Sequence[ErrorModel], name: str) -> float:
+    """Return a root mean square over cycles that the models of a line had not seen, of the line [um]."""
+    errors = np.diag([0.0 if m.honest_error is None else getattr(m.honest_error, name) for m in models])
     return math.hypot(*(line.deviation(one).offset for one in errors.tolist()))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction, Deviation
@@ -52,6 +53,8 @@ class CompensatorState(NamedTuple):
     raw: dict[str, Deviation]  #: what the models said last, by target or axis
     orders: dict[str, Status]  #: targets or axes that somebody, or the controller, has taken out, and why
     away: float | None  #: so long nothing ran before the last restart, until the corrections have caught up [s]
+    #: when each key of a probing came first, by target or axis [s]
+    probed: Mapping[str, dict[str, float]] = MappingProxyType({})
 
 
 class Compensated(NamedTuple):
@@ -65,6 +68,7 @@ class Compensated(NamedTuple):
     deviations: dict[str, Deviation]  #: what the models say, with what was learned from probings
     half_widths: dict[str, float]  #: of the band about the deviation, by target or axis that has one [um]
     refused: dict[str, str]  #: targets or axes whose probing was not used, and why
+    moved: Mapping[str, float] = MappingProxyType({})  #: by how much probings move deviations from now on [um]
 
     @property
     def held(self) -> dict[str, str]:

@@ -17,6 +17,7 @@ from thermocomp.core.reading import Measurement, Reading
 from thermocomp.files import statefile
 from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.identity import KNOWN, is_known
 from thermocomp.runtime.orders import order, rezero, withdraw
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume, silence
 from thermocomp.service.clock import Clock
@@ -173,21 +174,32 @@ class Service:
         One that contains the correction (``left`` is false: LinuxCNC's ``#5063`` is a position of the motor) is the
         deviation as it is.
         """
-        line = self.compensator.lines.get(found.target)
-        now, stamp = self.clock.now(), self.clock.of(found.time)
-        if line is None or now - stamp > self.compensator.limits.reading_age:
-            why = f"no target is named {found.target}" if line is None else f"it is {now - stamp:.0f} s old"
+        in_force = self.in_force(found.target) if found.target in self.compensator.lines else None
+        probing = Probing(found.measured, found.repeatability, found.position, found.keys)
+        if found.left and in_force is not None:
+            deviation = uncompensated(found.measured, in_force.at(found.position))
+            probing = probing._replace(deviation=deviation, keys=probing.identity)
+        if why := self._refuse(found, probing, in_force):
             self._say("probing", f"{found.target} refused: {why}")
             return
-        in_force = self.in_force(found.target)
-        deviation = found.measured
-        if found.left:
-            if in_force is None:
-                self._say("probing", f"{found.target} refused: what is in force at the controller is not known")
-                return
-            deviation = uncompensated(found.measured, in_force.at(found.position))
         self.measured[found.target] = (found, in_force)
-        self.probings[found.target] = Probing(deviation, found.repeatability, found.position)
+        self.probings[found.target] = probing
+
+    def _refuse(self, found: Measurement, probing: Probing, in_force: Correction | None) -> str:
+        """Say why a measurement is not used with the next reading; the empty string if it is."""
+        target, old = found.target, self.clock.now() - self.clock.of(found.time)
+        if target not in self.compensator.lines:
+            return f"no target is named {target}"
+        if abs(old) > self.compensator.limits.reading_age:
+            return f"it is {old:.0f} s old" if old > 0 else f"its time is {-old:.0f} s ahead of the clock"
+        waiting = self.probings.get(target)
+        if is_known(self.state, target, probing) or (waiting and set(waiting.identity) & set(probing.identity)):
+            return KNOWN
+        if waiting:
+            return "another one waits for the next reading"
+        if found.left and in_force is None:
+            return "what is in force at the controller is not known"
+        return ""
 
     def in_force(self, target: str) -> Correction | None:
         """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""
@@ -315,8 +327,8 @@ class Service:
         for name in (before.failed if before else {}).keys() - said.failed.keys():
             self._say("sensor", f"{name} is believed again")
         for target in probings:
-            why = said.refused.get(target)
-            self._say("probing", f"{target} {'refused: ' + why if why else 'taken'}")
+            why, moved = said.refused.get(target), said.moved.get(target, 0.0)
+            self._say("probing", f"{target} refused: {why}" if why else f"{target} taken: it moves by {moved:+.1f} um")
         now = self.clock.now()
         if said.deviations and (not self.curves or now - self.curves[-1]["time"] >= EVERY):
             self.curves.append({"time": now, **self._numbers(said)})
@@ -330,8 +342,7 @@ class Service:
             found = check(self.clock.now(), target, probing, said.deviations[target], after, refused)
             self.checked.append(found)
             if self.recorder is not None:
-                added = said.deviations[target].offset + (0.0 if refused else found.residual)
-                self.recorder.update(found, added)
+                self.recorder.update(found, said.deviations[target].offset + said.moved.get(target, 0.0))
                 if not refused and target in self.measured:  # what is not believed is no deviation
                     self.recorder.measure(found.time, *self.measured[target])
             if not refused:
