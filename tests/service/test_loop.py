@@ -451,16 +451,16 @@ def test_a_real_broker_that_repeats_a_probing(
         await events(service, 5)
 
     asyncio.run(running(service, work))
-    after = MqttProbe(topic="m/7/probe", port=broker.port)
-    later = Service(machine(), [source], [], state_path=tmp_path / "state.json", probes=[after])
+    feed, after = Given(), MqttProbe(topic="m/7/probe", port=broker.port)
+    later = Service(machine(), [feed], [], state_path=tmp_path / "state.json", probes=[after])
 
     async def again() -> None:
         await until(lambda: after.status().state == "connected")
         await asyncio.sleep(0.3)
-        say(source, 20.0)
+        say(feed, 20.0)
         await send(1)
         await events(later, 1)
-        say(source, 20.0)
+        say(feed, 20.0)
         await until(lambda: later.counts["readings"] == 2)
 
     asyncio.run(running(later, again))
