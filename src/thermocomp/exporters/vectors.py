@@ -8,8 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP
+from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.reading import Reading
+from thermocomp.core.validity import Validity
+from thermocomp.core.zero import Zeroing
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.warming import Warming
 from thermocomp.runtime.compensator import Compensator
@@ -91,12 +95,20 @@ def replay(
     return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
 
 
+#: of a model, what is in no code: how it was judged decides what it may do, and must not be rounded
+_UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
+
+
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value in which all numbers that are not whole are rounded."""
+    """Return a value in which all numbers that a code holds and that are not whole are rounded; a row of them at once."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return rounded(value)
+    if isinstance(value, _UNWRITTEN):
+        return value
+    if type(value) is tuple and value and all(isinstance(v, float) for v in value):
+        return tuple(rounded(np.array(value)).tolist())
     if isinstance(value, tuple):
         parts = [round_all(v, rounded) for v in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
