@@ -127,7 +127,7 @@ def test_the_printed_error_is_that_of_a_replay(tmp_path: Path) -> None:
 def test_what_is_not_confirmed_is_marked() -> None:
     texts = macro()
     lines, page = texts["tc.nc"].decode().splitlines(), texts["tc.md"].decode()
-    assert lines[1].startswith("O9701 (Z_UM: ACCEPTED ON UNSEEN CYCLES")
+    assert lines[1].startswith("O7701 (Z_UM: ACCEPTED ON UNSEEN CYCLES")
     begin = next(k for k, line in enumerate(lines) if line.startswith("(#500"))
     assert sum(line.startswith("(UNCONFIRMED") for line in lines[:begin]) == len(UNCONFIRMED)
     for line in lines[begin:]:

@@ -13,7 +13,7 @@ from thermocomp.exporters.c99 import translate
 from thermocomp.exporters.ctest import write_test
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.pages import describe
-from thermocomp.exporters.vectors import Answers, FloatArray, Readings, make_readings, replay, round_all
+from thermocomp.exporters.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 
 _README = """{facts}
@@ -102,7 +102,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(name, tables, readings, answers, _double(tables), single),
+        f"{name}_test.c": write_test(name, tables, readings, answers, find_tolerance(tables), single),
         f"{name}.md": _README.format(
             facts="  \n".join(said),
             name=name,
@@ -114,11 +114,6 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         ),
     }
     return {file: text.encode() for file, text in texts.items()}
-
-
-def _double(tables: Tables) -> float:
-    """Return how far double precision may be off: what feeds itself makes more of rounding."""
-    return 1e-11 if tables.sizes["CLOCKS"] else 1e-12
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:

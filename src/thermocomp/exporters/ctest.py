@@ -15,7 +15,7 @@ _PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
 #ifdef TC_FLOAT
 #define TOLERANCE {single:.0e} /* what rounding of numbers changes, ten times, or 1e-5 */
 #else
-#define TOLERANCE {double:.0e} /* 1e-11 with a model that feeds itself */
+#define TOLERANCE {double:.0e} /* a model that feeds itself makes more of rounding */
 #endif
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
