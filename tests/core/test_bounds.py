@@ -31,7 +31,7 @@ def bounds_in_source() -> list[tuple[str, float]]:
                 for part in node.args[first:end]:
                     text = ast.unparse(part)
                     if "self" not in text and not (path.stem == "bounds" and text in ("least", "most")):
-                        found.append((f"{path.name}: {text}", float(eval(text, vars(module)))))  # noqa: S307
+                        found.append((f"{path.name}: {text}", float(eval(text, vars(module)))))
     return found
 
 

@@ -61,8 +61,8 @@ def test_it_goes_there_or_is_refused_as_documented(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     method: str,
-    speed: bool,  # noqa: FBT001 - parametrised
-    watched: bool,  # noqa: FBT001
+    speed: bool,
+    watched: bool,
     target: str,
 ) -> None:
     if target == "onnx":

@@ -48,7 +48,7 @@ def at_the_bounds() -> ErrorModel:
     """Return a watched model whose scales, limits and time constants are as small as they may be."""
     model = watched_model("z_um")
     assert model.watch is not None
-    tiny = {"off": LEAST, "jump": LEAST, "moved": LEAST, "still": LEAST}
+    tiny: dict[str, Any] = {"off": LEAST, "jump": LEAST, "moved": LEAST, "still": LEAST}
     states = tuple((i, power, LEAST, LEAST) for i, power, *_ in model.watch.states)
     watch = replace(
         model.watch,

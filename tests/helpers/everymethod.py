@@ -63,9 +63,9 @@ def section() -> str:
 
 def documented() -> dict[str, tuple[str, str, str]]:
     """Return by method: without a speed, to a target that holds the whole model, to one that holds less."""
-    found = {}
-    for names, *words in re.findall(r"^(``.*``)\s+(yes|no)\s+(whole|no)\s+(reduced|no)$", section(), re.M):
-        found |= dict.fromkeys(re.findall(r"``(.+?)``", names), tuple(words))
+    found: dict[str, tuple[str, str, str]] = {}
+    for names, alone, whole, less in re.findall(r"^(``.*``)\s+(yes|no)\s+(whole|no)\s+(reduced|no)$", section(), re.M):
+        found |= dict.fromkeys(re.findall(r"``(.+?)``", names), (alone, whole, less))
     return found
 
 

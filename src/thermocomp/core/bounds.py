@@ -58,13 +58,15 @@ _FLOORS = np.array([0.0, LEAST**2, LEAST, TICK])
 _CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
 
 
-def round_within(values: ArrayLike, least: ArrayLike = -_LARGEST, most: ArrayLike = _LARGEST) -> FloatArray:
+def round_within(
+    values: ArrayLike, least: float | FloatArray = -_LARGEST, most: float | FloatArray = _LARGEST
+) -> FloatArray:
     """Return numbers as single precision holds them, as near as can be within bounds.
 
     Parameters
     ----------
     values : array-like of float
-    least, most : array-like of float
+    least, most : float or ndarray
         Bounds, the same for all or one per number; a number of single precision lies within them.
 
     Returns

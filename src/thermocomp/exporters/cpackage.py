@@ -127,14 +127,15 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
     except SettingError:  # a free run that decays in double precision alone
         return 0.0
 
-    def moved(way: int, **rounded: Callable[[FloatArray], FloatArray]) -> float:
-        said = replay(coarse, tables, readings._replace(values=_shifted(readings.values, way)), **rounded)
+    def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
+        rows = readings._replace(values=_shifted(readings.values, way))
+        said = replay(coarse, tables, rows, rounded=rounded)
         if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
             return math.inf
         pairs = (answers.correction, said.correction), (answers.slope, said.slope)
         return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
 
-    found = max(1e-5, 10.0 * moved(0, rounded=round_single), 2.0 * moved(1), 2.0 * moved(-1))
+    found = max(1e-5, 10.0 * moved(0, round_single), 2.0 * moved(1), 2.0 * moved(-1))
     return found if found <= _COARSE else 0.0
 
 

@@ -12,7 +12,6 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.exporters.facts import Facts
 
-
 #: of eight digits
 _LARGEST = Decimal(99_999_999)
 

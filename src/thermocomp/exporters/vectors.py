@@ -101,19 +101,17 @@ _UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
 
 
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value in which all numbers that a code holds and that are not whole are rounded; a row of them at once."""
+    """Return a value in which all numbers that a code holds are rounded, unless whole; a row of them at once."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return rounded(value)
-    if isinstance(value, _UNWRITTEN):
-        return value
     if type(value) is tuple and value and all(isinstance(v, float) for v in value):
         return tuple(rounded(np.array(value)).tolist())
     if isinstance(value, tuple):
         parts = [round_all(v, rounded) for v in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if is_dataclass(value) and not isinstance(value, type):
+    if is_dataclass(value) and not isinstance(value, (type, *_UNWRITTEN)):
         return replace(value, **{f.name: round_all(getattr(value, f.name), rounded) for f in fields(value)})
     return value
 
