@@ -13,6 +13,7 @@ from driftmodels import ACCEPTED, growing
 from watchedmachine import watched_model
 
 from thermocomp.cli.app import run
+from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.provenance import HonestError
@@ -87,6 +88,10 @@ def test_a_dialect_is_of_structured_text_alone(tmp_path: Path, capsys: pytest.Ca
         (["--magnitude", "inf"], "--magnitude inf: c99 wants a finite number"),
         (["--hold", "inf"], "--hold inf: c99 wants a finite number"),
         (["--reading-age", "inf"], "--reading-age inf: c99 wants a finite number"),
+        (["--magnitude", "1e300"], "--magnitude 1e+300: c99 takes 1e-06 to 1e+09: give a number between them"),
+        (["--rate", "1e-50"], "--rate 1e-50: c99 takes 1e-06 to 1e+09: give a number between them"),
+        (["--hold", "5e-324"], "--hold 4.94066e-324: c99 takes 1e-06 to 1e+10: give a number between them"),
+        (["--reading-age", "1e-300"], "--reading-age 1e-300: c99 takes 1e-06 to 1e+10: give a number between them"),
         (["--name", "../x"], "--name '../x': want letters, digits and _"),
         (["--name", ""], "--name '': want letters"),
         (["--date", "2026-13-45"], "--date 2026-13-45: want a date such as 2026-01-31"),
@@ -166,7 +171,7 @@ def test_what_is_written_proves_itself(tmp_path: Path, flags: tuple[str, ...]) -
 @pytest.mark.parametrize(
     ("was", "becomes"),
     [
-        (r"c_rate = TC\(0.1\)", "c_rate = TC(0.11)"),
+        (r"c_rate = TC_ROUNDED\(0.1, [\d.]+\)", "c_rate = TC(0.11)"),
         (r"s->clock \+ w->dt", "s->clock + w->dt + 1e-6"),
         (r"/ 3600.0\)", "/ 3700.0)"),
         (r"c_hold = 1800.0", "c_hold = 1900.0"),
@@ -285,3 +290,75 @@ def test_onnx_is_loaded_by_nothing_that_does_without() -> None:
     code = "import sys, thermocomp.cli.export, thermocomp.exporters.onnxpackage; print('onnx' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(("to", "most"), [("linuxcnc", "2e+07"), ("beckhoff", "2e+08")])
+def test_a_correction_that_is_no_whole_number_of_32_bits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str, most: str
+) -> None:
+    command = ["export", str(written(tmp_path, watched_model("z_um"))), "--to", to, "-o", str(tmp_path / "out")]
+    assert run([*command, "--magnitude", "9e8"]) == 2
+    assert f"--magnitude 9e+08: {to} takes 1e-06 to {most}: give" in " ".join(capsys.readouterr().err.split())
+    assert run([*command, "--magnitude", most]) == 0
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "limits",
+    [
+        ["--hold", "1e-6", "--fade", "1e-6", "--reading-age", "1e-6"],
+        ["--hold", "1e10", "--fade", "1e10", "--reading-age", "1e10"],
+        ["--magnitude", "1e-6", "--rate", "1e-6"],
+        ["--magnitude", "1e9", "--rate", "1e9"],
+    ],
+)
+def test_limits_at_the_ends_of_what_they_may_be(tmp_path: Path, limits: list[str]) -> None:
+    model = written(tmp_path, watched_model("z_um"))
+    assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path), *limits]) == 0
+    for flags in ([], ["-DTC_FLOAT"]):
+        done = prove(tmp_path, *flags)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("to", ["c99", "st", "linuxcnc"])
+def test_a_name_in_any_script_stands_as_it_is(tmp_path: Path, to: str) -> None:
+    model = watched_model("z_um")
+    assert model.watch is not None
+    names = {"t1_C": "\u4e3b\u8f74_C", "t2_C": "\u00d6l_C"}
+
+    def named(inputs: tuple[Input, ...]) -> tuple[Input, ...]:
+        return tuple(replace(i, name=names.get(i.name, i.name)) for i in inputs)
+
+    model = replace(model, inputs=named(model.inputs), watch=replace(model.watch, inputs=named(model.watch.inputs)))
+    assert run(["export", str(written(tmp_path, model)), "--to", to, "-o", str(tmp_path / "out")]) == 0
+    text = "".join(f.read_text(encoding="utf-8") for f in (tmp_path / "out").glob("tc_thermal*[!d]"))
+    assert all(name in text for name in names.values())
+    assert "\\u4e3b" not in text
+    if CC and to == "c99":
+        assert prove(tmp_path / "out").returncode == 0
+    if to == "linuxcnc" and shutil.which("halcompile"):
+        subprocess.run(["halcompile", "--compile", "tc_thermal_hal.comp"], cwd=tmp_path / "out", check=True)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"[machine]\nname = 'mill'\n", "it is TOML, such as a machine file or a mapping: it begins with '[machine]'"),
+        (
+            b"time_s,t1_C,z_um\n0,20,0\n",
+            "it looks like a table, such as a recording: it begins with 'time_s,t1_C,z_um'",
+        ),
+        (b"", "it is empty"),
+        (b"G0 X1\n", "it begins with 'G0 X1'"),
+        (b"PK\x03\x04\xff\xfe", "it is no text, as an XLSX or a Parquet file is none"),
+        (b'{"format": "other"}', 'it has no "format": "thermocomp-model", found \'other\'; name the file that'),
+        (b"[1, 2]", 'it has no "format": "thermocomp-model", found none; name the file that'),
+    ],
+)
+def test_a_file_that_is_no_model(tmp_path: Path, capsys: pytest.CaptureFixture[str], content: bytes, said: str) -> None:
+    (tmp_path / "given").write_bytes(content)
+    assert run(["export", str(tmp_path / "given"), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    assert str(tmp_path / "given") in error
+    assert said in error
+    assert "name the file that 'thermocomp fit' wrote" in error or "name a model file" in error

@@ -49,7 +49,7 @@ def test_what_no_axis_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert exported(tmp_path, models=(growing("bed_um", 3.0),)) == 2
     assert "nothing to write: bed_um: its axis is not known" in capsys.readouterr().err
     assert exported(tmp_path / "two", models=(growing("z_um", 3.0), growing("z2_um", 3.0))) == 2
-    assert "z_um, z2_um are of one axis" in capsys.readouterr().err
+    assert "z_um, z2_um are all of Z: name one of each axis, such as --axes z_um=Z" in capsys.readouterr().err
     assert exported(tmp_path / "long", "--name", "a" * 40, models=(growing("z_um", 3.0),)) == 2
     assert "15 characters too long" in capsys.readouterr().err
 

@@ -125,7 +125,7 @@ def test_axes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "\nZ formula: <L>+0.003*(W<t>-20)" in text
     assert "ch1_um" not in text
     assert run([*line, "--axes", "ch5_um=z", "ch1_um=Z", "--overwrite"]) == 2
-    assert "are of one axis" in capsys.readouterr().err
+    assert "are all of Z: name one of each axis, such as --axes " in capsys.readouterr().err
 
 
 def test_a_limit_that_would_be_run_into(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

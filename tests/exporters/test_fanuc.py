@@ -4,14 +4,18 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from driftmodels import growing
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from poorcontroller import exported, growing_machine, left, page_numbers, temperatures
 
 from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.fanuc import UNCONFIRMED, write_fanuc
 from thermocomp.exporters.heidenhain import write_heidenhain
@@ -127,7 +131,7 @@ def test_the_printed_error_is_that_of_a_replay(tmp_path: Path) -> None:
 def test_what_is_not_confirmed_is_marked() -> None:
     texts = macro()
     lines, page = texts["tc.nc"].decode().splitlines(), texts["tc.md"].decode()
-    assert lines[1].startswith("O9701 (Z_UM: ACCEPTED ON UNSEEN CYCLES")
+    assert lines[1].startswith("O7701 (Z_UM: ACCEPTED ON UNSEEN CYCLES")
     begin = next(k for k, line in enumerate(lines) if line.startswith("(#500"))
     assert sum(line.startswith("(UNCONFIRMED") for line in lines[:begin]) == len(UNCONFIRMED)
     for line in lines[begin:]:
@@ -167,3 +171,34 @@ def test_the_vectors_hold_and_find_a_mistake(tmp_path: Path) -> None:
         (tmp_path / "other.nc").write_text(text.replace(was, becomes))
         done = subprocess.run([*line, str(tmp_path / "other.nc")], check=False, capture_output=True)
         assert done.returncode == 1, was
+
+
+@settings(max_examples=60)
+@given(
+    per_kelvin=st.one_of(st.floats(1e-9, 900.0), st.floats(-900.0, -1e-9)),
+    magnitude=st.floats(1e-4, 1e9),
+    rate=st.floats(2e-6, 1e9),
+)
+def test_every_number_has_eight_digits_and_no_limit_gets_larger(
+    per_kelvin: float, magnitude: float, rate: float
+) -> None:
+    text = macro(per_kelvin, Limits(magnitude=magnitude, rate=rate))["tc.nc"].decode()
+    code = [re.sub(r"\(.*?\)", "", line) for line in text.splitlines() if not line.startswith("%")]
+    numbers = re.findall(r"(?<![#\d.])\d+\.\d+", "\n".join(code))
+    assert numbers
+    for number in numbers:
+        whole, behind = number.split(".")
+        assert len(whole.lstrip("0")) + len(behind.rstrip("0")) <= 8, number
+        assert len(behind) <= 7, number
+    limits = [Fraction(n) for n in re.findall(r"THEN#[12]=(\d+\.\d+)", "\n".join(code))]
+    asked = [Fraction(repr(magnitude)) / 1000, Fraction(repr(rate)) * 60 / 1000]
+    for taken, wanted in zip(limits, asked, strict=True):
+        assert 0 < taken <= wanted
+        digits = max(Fraction(1, 10**7), wanted / 10**7)
+        assert wanted - taken < digits or taken == 99_999_999
+
+
+@pytest.mark.parametrize("limits", [Limits(rate=1.5e-6), Limits(magnitude=9e-5)])
+def test_a_limit_that_is_nothing_in_eight_digits_is_refused(limits: Limits) -> None:
+    with pytest.raises(InputError, match=r"takes eight digits, and this is 0 in them: give at least --(rate|magn)"):
+        macro(limits=limits)

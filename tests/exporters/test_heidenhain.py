@@ -97,3 +97,10 @@ def test_the_vectors_hold_and_find_a_mistake(tmp_path: Path) -> None:
     other = tmp_path / "other.txt"
     other.write_text(texts["tc.txt"].decode().replace("-20)", "-21)"))
     assert subprocess.run([*line, str(other)], check=False, capture_output=True).returncode == 1
+
+
+@pytest.mark.parametrize(("magnitude", "word"), [(500.0, 500), (12345.9, 12345), (1e9, 32767), (0.5, 0)])
+def test_the_limit_of_a_word_is_whole_and_never_larger(magnitude: float, word: int) -> None:
+    limits = Limits(magnitude=magnitude)
+    text = write_heidenhain([as_it_is(growing("z_um", 2.0), "Z")], limits, "tc", FACTS)["tc.txt"].decode()
+    assert f"rounded, within +-{word}\n" in text

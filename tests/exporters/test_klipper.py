@@ -4,6 +4,7 @@ import csv
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,3 +93,10 @@ def test_what_klipper_does_not_take() -> None:
         write_klipper([as_it_is(growing(t, 1.0), "Z") for t in ("z_um", "z2_um")], Limits(), "tc", FACTS)
     with pytest.raises(InputError, match="at most 1 mm/K"):
         write_klipper([as_it_is(growing("z_um", 1200.0), "Z")], Limits(), "tc", FACTS)
+
+
+def test_a_sensor_of_the_cold_has_limits_that_klipper_takes() -> None:
+    model = growing("z_um", 2.0)
+    cold = replace(model, inputs=(replace(model.inputs[0], reference=-260.0, low=0.0, high=10.0),))
+    text = write_klipper([as_it_is(cold, "Z")], Limits(), "tc", FACTS)["tc.cfg"].decode()
+    assert "min_temp: -273\n" in text  # Klipper: at least -273.15

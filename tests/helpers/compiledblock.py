@@ -69,8 +69,8 @@ class CompiledBlock:
     ) -> None:
         self.tables = gather(compensator)
         sources, t = translate(self.tables, "block"), self.tables
-        (folder / f"{sources.name}.h").write_text(sources.header, encoding="ascii")
-        (folder / f"{sources.name}.c").write_text(sources.source, encoding="ascii")
+        (folder / f"{sources.name}.h").write_text(sources.header, encoding="utf-8")
+        (folder / f"{sources.name}.c").write_text(sources.source, encoding="utf-8")
         counts = (len(t.channels), len(t.targets), len(t.models), len(t.sensors))
         self._shape, self._real = counts, np.float32 if "-DTC_FLOAT" in flags else np.float64
         text = _DRIVER.format(

@@ -17,6 +17,7 @@ from thermocomp.cli.extras import needs
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, Output
 from thermocomp.cli.terminal import console, words
+from thermocomp.core.bounds import GAP, LEAST, RANGE
 from thermocomp.core.correction import Limits
 from thermocomp.core.draft import drafts
 from thermocomp.core.exceptions import InputError
@@ -39,6 +40,10 @@ WRITERS: dict[Target, Callable[..., dict[str, bytes]]] = {
     "linuxcnc": linuxcncpackage.write_package,
     "onnx": onnxpackage.write_package,
 }
+
+
+#: largest correction that a target counts in whole numbers of 32 bits: of 0.01 um, of 0.1 um [um]
+MOST_UM = {"linuxcnc": 2e7, "beckhoff": 2e8}
 
 
 def export(
@@ -178,9 +183,13 @@ def _check(to: str, name: str, date: str | None, limits: Limits) -> None:
     """Refuse what would make no file, or one that no controller takes."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(f"--name {name!r}: want letters, digits and _, a letter first, such as mill_3")
-    for option in ("magnitude", "rate", "hold", "fade", "reading_age"):
-        if not math.isfinite(getattr(limits, option)):
-            raise InputError(f"--{option.replace('_', '-')} {getattr(limits, option)}: {to} wants a finite number")
+    most = {"magnitude": MOST_UM.get(to, RANGE), "rate": RANGE, "hold": GAP, "fade": GAP, "reading_age": GAP}
+    for option, end in most.items():
+        value, named = getattr(limits, option), f"--{option.replace('_', '-')}"
+        if not math.isfinite(value):
+            raise InputError(f"{named} {value}: {to} wants a finite number")
+        if not LEAST <= value <= end:
+            raise InputError(f"{named} {value:g}: {to} takes {LEAST:g} to {end:g}: give a number between them")
     if date is not None:
         try:
             datetime.strptime(date, "%Y-%m-%d").astimezone()

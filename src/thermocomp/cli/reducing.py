@@ -192,9 +192,12 @@ def _has(options: ReductionOptions, model: ErrorModel) -> bool:
 
 
 def _refuse_twice(wanted: Sequence[tuple[str, str]]) -> None:
-    letters = [axis for _, axis in wanted]
-    if twice := [target for target, axis in wanted if letters.count(axis) > 1]:
-        raise InputError(f"{', '.join(twice)} are of one axis: name those that are meant, such as --axes {twice[0]}=Z")
+    along = {axis: [t for t, other in wanted if other == axis] for _, axis in wanted}
+    twice = {axis: targets for axis, targets in along.items() if len(targets) > 1}
+    if twice:
+        found = "; ".join(f"{', '.join(targets)} are all of {axis}" for axis, targets in twice.items())
+        one = " ".join(f"{targets[0]}={axis}" for axis, targets in along.items())
+        raise InputError(f"{found}: name one of each axis, such as --axes {one}")
 
 
 def _check_limit(r: Reduced, limits: Limits, to: str) -> None:

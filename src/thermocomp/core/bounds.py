@@ -12,8 +12,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.exceptions import SettingError
+
+FloatArray = NDArray[np.float64]
 
 #: coefficients, weights, gains, thresholds, values of curves, intercepts: a micrometre per 1e-15 of an input [-]
 COEFFICIENT = 1e15
@@ -47,6 +50,72 @@ EXPONENT, POWER_OF_TEN = 30, 200
 ORDER = 100
 #: characters of a name
 NAME = 200
+
+#: single precision: its least and its largest number
+_TINY, _LARGEST = float(np.finfo(np.float32).smallest_subnormal), float(np.finfo(np.float32).max)
+#: magnitudes that a check lets nothing go below, and beyond; those that single precision does not hold exactly
+_FLOORS = np.array([0.0, LEAST**2, LEAST, TICK])
+_CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
+
+
+def round_within(
+    values: ArrayLike, least: float | FloatArray = -_LARGEST, most: float | FloatArray = _LARGEST
+) -> FloatArray:
+    """Return numbers as single precision holds them, as near as can be within bounds.
+
+    Parameters
+    ----------
+    values : array-like of float
+    least, most : float or ndarray
+        Bounds, the same for all or one per number; a number of single precision lies within them.
+
+    Returns
+    -------
+    ndarray of float
+        nan stays nan.
+    """
+    with np.errstate(over="ignore", under="ignore"):
+        near = np.clip(np.asarray(values, dtype=np.float64), least, most).astype(np.float32)
+        above, below = (np.nextafter(near, np.float32(end)) for end in (np.inf, -np.inf))
+        exact = near.astype(np.float64)  # else the bounds would be rounded before they are compared
+        return np.where(exact < least, above, np.where(exact > most, below, near)).astype(np.float64)
+
+
+def round_single(values: ArrayLike) -> FloatArray:
+    """Return numbers as single precision holds them, on the same side of every bound of a model as they are.
+
+    The one place where a number loses digits: what keeps to the bounds of this file does so afterwards. What is not
+    zero does not become zero, and what is finite stays finite.
+
+    Parameters
+    ----------
+    values : array-like of float
+        nan and infinities stay as they are.
+
+    Returns
+    -------
+    ndarray of float
+        Of the same shape. One row whose numbers rise strictly rises strictly.
+    """
+    exact = np.asarray(values, dtype=np.float64)
+    size = np.abs(exact)
+    floors = np.maximum(_FLOORS[np.searchsorted(_FLOORS, size, side="right") - 1], _TINY * (size > 0))
+    ceilings = _CEILINGS[np.minimum(np.searchsorted(_CEILINGS, size), len(_CEILINGS) - 1)]
+    found = np.where(np.isfinite(exact), np.copysign(round_within(size, floors, ceilings), exact), exact)
+    if found.ndim == 1 and np.isfinite(exact).all() and (np.diff(exact) > 0).all() and (np.diff(found) <= 0).any():
+        return _spread(found, ceilings)
+    return found
+
+
+def _spread(rising: FloatArray, most: FloatArray) -> FloatArray:
+    """Return numbers that rise, of which some have become the same, a step of single precision apart."""
+    found = rising.astype(np.float32)
+    for k in range(1, len(found)):
+        found[k] = max(found[k], np.nextafter(found[k - 1], np.float32(np.inf)))
+    found[-1] = round_within(found[-1], most=most[-1])
+    for k in range(len(found) - 2, -1, -1):
+        found[k] = min(found[k], np.nextafter(found[k + 1], np.float32(-np.inf)))
+    return found.astype(np.float64)
 
 
 def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:

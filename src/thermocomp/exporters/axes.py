@@ -55,6 +55,10 @@ def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
     return list(found.values())
 
 
+#: largest of a whole number (DINT)
+WHOLE = 2**31 - 1
+
+
 class Value(NamedTuple):
     """What a controller takes of an axis."""
 
@@ -79,8 +83,14 @@ def write_values(
         For ``offset``, ``slope`` and ``position``.
     direction : float
         1 if the controller adds what it is given to the command, -1 if it takes it off; an input that can be changed.
+
+    Raises
+    ------
+    InputError
+        A reference position is beyond what the controller's whole numbers hold.
     """
     scl, n = dialect == "scl", len(drives)
+    _check_whole(drives, taken["position"])
     mark = "#" if scl else ""
     most = 1 + max(d.target for d in drives)
     outputs = {v.name: array("int" if v.whole else "real", n) for v in taken.values()}
@@ -121,3 +131,13 @@ def write_values(
             else:
                 lines.append(f"{place} := {said};")
     return Unit(name, "\n".join(parts), "\n".join(lines), "END_FUNCTION_BLOCK")
+
+
+def _check_whole(drives: list[Drive], taken: Value) -> None:
+    """Refuse reference positions that do not fit into a whole number."""
+    for drive in drives:
+        if taken.whole and abs(drive.position * taken.factor) >= WHOLE:
+            raise InputError(
+                f"{drive.letter}: its slope counts from {drive.position:g} mm, and {taken.about} ends at "
+                f"{WHOLE / taken.factor:.0f} mm: record with positions in machine coordinates [mm]"
+            )

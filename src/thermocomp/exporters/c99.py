@@ -20,7 +20,7 @@ typedef double tc_real;
 #endif
 #endif
 
-#ifdef __cplusplus
+{refused}#ifdef __cplusplus
 extern "C" {{
 #endif
 
@@ -75,6 +75,12 @@ void {name}_step({name}_state *s, const tc_real value[{n}], double age, double d
 #endif
 """
 
+_REFUSED = """#ifdef TC_FLOAT
+#error "single precision is too coarse for this model: compile without -DTC_FLOAT"
+#endif
+
+"""
+
 _SOURCE = """{facts}#include "{name}.h"
 
 #include <math.h>
@@ -84,10 +90,13 @@ _SOURCE = """{facts}#include "{name}.h"
 #endif
 
 #define TC(x) ((tc_real)(x))
+/* TC_ROUNDED: a number, and the next one of single precision that keeps to its bounds */
 #ifdef TC_FLOAT
 #define TC_MATH(name) name##f
+#define TC_ROUNDED(x, single) TC(single)
 #else
 #define TC_MATH(name) name
+#define TC_ROUNDED(x, single) TC(x)
 #endif
 
 /* what is worked out anew in every call */
@@ -134,7 +143,7 @@ class Sources:
     source: str
 
 
-def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
+def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_only: bool = False) -> Sources:
     """Return a compensator in C99.
 
     What it does with values is what `Compensator.step` does with a reading.
@@ -147,6 +156,8 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
         Of the files and of all that is in them.
     facts : sequence of str
         What stands above them.
+    double_only : bool
+        It does not compile in single precision.
 
     Raises
     ------
@@ -168,6 +179,7 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = ()) -> Sources:
         name=name,
         n=n,
         facts=above,
+        refused=_REFUSED if double_only else "",
         guard=f"{name.upper()}_H",
         most=sizes["MOST"],
         inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
@@ -204,4 +216,4 @@ def comment(text: str) -> str:
     """Return a text that ends no comment."""
     for sign in ("*/", "/*", "??"):
         text = text.replace(sign, " ".join(sign))
-    return " ".join(text.encode("ascii", "backslashreplace").decode().split())
+    return " ".join(text.split())

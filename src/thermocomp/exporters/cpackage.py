@@ -1,15 +1,19 @@
 """All files of an export to C99: the code, its test, and how to use it."""
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from thermocomp.core.bounds import round_single
+from thermocomp.core.exceptions import SettingError
 from thermocomp.exporters.block.tables import Tables, gather
 from thermocomp.exporters.c99 import translate
 from thermocomp.exporters.ctest import write_test
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.pages import describe
-from thermocomp.exporters.vectors import Answers, FloatArray, Readings, make_readings, replay, round_all
+from thermocomp.exporters.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 
 _README = """{facts}
@@ -24,7 +28,7 @@ calls, faults among them, and compares with what thermocomp says.
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
 It prints how many calls are wrong (none), the largest difference, and how many bytes the state takes; its exit code is
-0 if all is well. For single precision add `-DTC_FLOAT`; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
+0 if all is well. {single}; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
 may be known earlier then, and the test does not fit). Compile all files of your program with the same of these:
 otherwise it does not link. Never compile with `-ffast-math`.
 
@@ -68,6 +72,12 @@ controller must not compensate for temperature itself at the same time.
 """
 
 
+#: last digits of single precision by which a difference of two readings is off
+_DIGITS = 2.0
+#: largest share of a correction by which single precision may be off; beyond it is refused
+_COARSE = 1.0
+
+
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
     """Return all files by their names.
 
@@ -84,40 +94,55 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         A model has no formula, or the models do not go together.
     """
     tables, said = gather(compensator), facts.lines(compensator)
-    sources = translate(tables, name, said)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
+    single = _single(compensator, tables, readings, answers)
+    sources = translate(tables, name, said, double_only=not single)
     name = sources.name
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(
-            name, tables, readings, answers, _double(tables), _single(compensator, tables, readings, answers)
-        ),
+        f"{name}_test.c": write_test(name, tables, readings, answers, find_tolerance(tables), single),
         f"{name}.md": _README.format(
-            facts="  \n".join(said), name=name, calls=len(readings.age), **describe(compensator, tables, "state.")
+            facts="  \n".join(said),
+            name=name,
+            calls=len(readings.age),
+            single="For single precision add `-DTC_FLOAT`"
+            if single
+            else "Single precision (`-DTC_FLOAT`) is too coarse for this model, and does not compile",
+            **describe(compensator, tables, "state."),
         ),
     }
     return {file: text.encode() for file, text in texts.items()}
 
 
-def _double(tables: Tables) -> float:
-    """Return how far double precision may be off: what feeds itself makes more of rounding."""
-    return 1e-11 if tables.sizes["CLOCKS"] else 1e-12
-
-
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return how far single precision may be off: ten times what rounding of all numbers changes."""
-    rows = readings._replace(values=_rounded(readings.values))
-    coarse = replace(compensator, models=round_all(compensator.models, _rounded))
-    said = replay(coarse, tables, rows, rounded=_rounded)
-    moved = [
-        float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0))
-        for a, b in ((answers.correction, said.correction), (answers.slope, said.slope))
-    ]
-    return max(1e-5, 10.0 * max(moved))
+    """Return how far single precision may be off: ten times what rounding of all numbers changes; 0 if too far.
+
+    Where a curve has steps, a reading beside one may get to its other side: so readings are moved to either side, too,
+    by what rounding does to the difference of two.
+    """
+    try:
+        coarse = replace(compensator, models=round_all(compensator.models, round_single))
+    except SettingError:  # a free run that decays in double precision alone
+        return 0.0
+
+    def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
+        rows = readings._replace(values=_shifted(readings.values, way))
+        said = replay(coarse, tables, rows, rounded=rounded)
+        if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
+            return math.inf
+        pairs = (answers.correction, said.correction), (answers.slope, said.slope)
+        return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
+
+    found = max(1e-5, 10.0 * moved(0, round_single), 2.0 * moved(1), 2.0 * moved(-1))
+    return found if found <= _COARSE else 0.0
 
 
-def _rounded(numbers: FloatArray) -> FloatArray:
-    with np.errstate(over="ignore"):  # what is that large is no reading
-        return numbers.astype(np.float32).astype(np.float64)
+def _shifted(values: FloatArray, way: int) -> FloatArray:
+    """Return readings in single precision, moved by its last digit: one up, the next down, the same always alike."""
+    near = round_single(values)
+    with np.errstate(invalid="ignore"):
+        last = np.where(np.isfinite(near), np.spacing(near.astype(np.float32)).astype(np.float64), 0.0)
+        odd = np.where(last != 0.0, near / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
+    return near + way * _DIGITS * np.where(odd, last, -last)

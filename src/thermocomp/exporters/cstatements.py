@@ -6,6 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
+
+from thermocomp.core.bounds import round_single, round_within
 from thermocomp.exporters.block.layout import Kind, Var
 from thermocomp.exporters.block.program import VARIABLES, Function, called, functions
 from thermocomp.exporters.block.tables import Tables
@@ -115,21 +118,25 @@ class _Writer(Printer):
         return _number(value, kind)
 
 
-def _number(value: float, kind: Kind) -> str:
-    """Return a number as C writes it, exact in double precision."""
+def _number(value: float, kind: Kind, *, cap: bool = False) -> str:
+    """Return a number as C writes it: exact in double precision, within its bounds in single."""
     if kind in ("int", "bool"):
         return str(int(value))
-    text = repr(float(value))
     if kind == "time":
-        return text
-    return f"TC({text})" if value >= 0 else f"(-TC({text[1:]}))"
+        return repr(float(value))
+    text, size = repr(abs(float(value))), abs(value)
+    single = float(round_within(size, 0.0, size) if cap else round_single(size))
+    with np.errstate(over="ignore"):
+        nearest = float(np.float32(size))
+    written = f"TC({text})" if single == nearest else f"TC_ROUNDED({text}, {single!r})"
+    return f"(-{written})" if math.copysign(1.0, value) < 0 else written
 
 
 def write_tables(tables: Tables, used: str) -> str:
     """Return the numbers that a text uses, as constants."""
     return "".join(
         f"/* {var.about} */\nstatic const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "
-        f"{_list(tables.values[name], var.kind)};\n"
+        f"{_list(tables.values[name], var)};\n"
         for name, var in _used("t", used, "c_").items()
     )
 
@@ -142,10 +149,10 @@ def _dims(var: Var, sizes: Mapping[str, int]) -> str:
     return "".join(f"[{'TC_ZERO_READINGS' if d == 'MOST' else max(sizes[d], 1)}]" for d in var.dims)
 
 
-def _list(value: Any, kind: Kind) -> str:
+def _list(value: Any, var: Var) -> str:
     if isinstance(value, list):
-        return f"{{{', '.join(_list(v, kind) for v in value) or '0'}}}"
-    return _number(value, kind)
+        return f"{{{', '.join(_list(v, var) for v in value) or '0'}}}"
+    return _number(value, var.kind, cap=var.cap)
 
 
 def write_variables(sizes: Mapping[str, int], owner: str, used: str) -> str:

@@ -15,7 +15,7 @@ _PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
 #ifdef TC_FLOAT
 #define TOLERANCE {single:.0e} /* what rounding of numbers changes, ten times, or 1e-5 */
 #else
-#define TOLERANCE {double:.0e} /* 1e-11 with a model that feeds itself */
+#define TOLERANCE {double:.0e} /* a model that feeds itself makes more of rounding */
 #endif
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
@@ -95,7 +95,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         Of the compensator.
     double, single : float
         Difference that is allowed in double and in single precision, as a share of a correction, or in um of one below
-        1 um.
+        1 um; 0: it is not made for single precision.
     """
     calls = range(len(readings.age))
     return _PROGRAM.format(

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.exporters.checkscript import FANUC, write_script
 from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.heidenhain import find_marks
-from thermocomp.exporters.reduced import Reduced, head, in_mm, in_um, vectors
+from thermocomp.exporters.reduced import Reduced, head, in_mm, in_um, shorten, vectors
 from thermocomp.exporters.reducedpage import write_page
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
@@ -47,8 +48,8 @@ All of this is **UNCONFIRMED** on a control: have the machine builder look at it
    theirs.
 2. Have the PMC write the temperatures in degC: {sensors}. It must write vacant, or leave the value alone, if a
    sensor fails; a zero within the plausible range is believed.
-3. Load `{name}.nc` under a free number in place of O9701.
-4. Call it (`G65 P9701`, which gives it local variables of its own) where the axes are clear and no cutter
+3. Load `{name}.nc` under a free number in place of O7701; programs from O8000 on are usually protected.
+4. Call it (`G65 P7701`, which gives it local variables of its own) where the axes are clear and no cutter
    compensation is active, such as at every start of a part: at least every {interval:g} s for it to keep up, and
    never more often for the rate to hold.
 5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the
@@ -89,27 +90,27 @@ def write_fanuc(
     Raises
     ------
     InputError
-        More sensors than variables.
+        More sensors than variables, or a limit that is 0 in the digits of a control.
     """
     marks = find_marks(reductions)
     if len(marks) > _ROOM:
         raise InputError(f"{len(marks)} temperatures, and the macro has room for {_ROOM}")
     place = {sensor: _FIRST + k for k, sensor in enumerate(marks)}
-    step = limits.rate * INTERVAL
+    most, step = (_cap(limits, option, times) for option, times in (("magnitude", 1.0), ("rate", INTERVAL)))
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     told = [f"({line})" for line in map(_comment, first)]
-    lines = ["%", f"O9701 {told[0]}", *told[1:]]
+    lines = ["%", f"O7701 {told[0]}", *told[1:]]
     lines += [f"(#{_ON}: 1 IS ON. ANYTHING ELSE TAKES THE CORRECTION BACK)"]
     lines += [f"(#{place[s]}: {m.upper()} IN DEGC. UNCONFIRMED: FROM THE PMC)" for s, m in marks.items()]
     for r in reductions:
-        lines += _axis(r, place, limits.magnitude, step)
+        lines += _axis(r, place, most, step)
     page = write_page(
         name,
         first,
         reductions,
         what="a custom macro of a Fanuc control",
-        about=_ABOUT.format(most=limits.magnitude, step=step, rate=limits.rate, interval=INTERVAL),
-        limits=f"at most {limits.magnitude:g} um and {step:g} um a call are in the macro; the errors above are those "
+        about=_ABOUT.format(most=most, step=step, rate=limits.rate, interval=INTERVAL),
+        limits=f"at most {most:g} um and {step:g} um a call are in the macro; the errors above are those "
         "of the formula alone.",
         failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the "
         "plausible range moves them.",
@@ -125,7 +126,7 @@ def write_fanuc(
     )
     texts = {
         f"{name}.nc": "\n".join([*lines, "M99", "%"]) + "\n",
-        f"{name}_vectors.csv": _vectors(reductions, marks, limits.magnitude),
+        f"{name}_vectors.csv": _vectors(reductions, marks, most),
         f"{name}_check.py": write_script(FANUC, name),
         f"{name}.md": page,
     }
@@ -163,6 +164,19 @@ def _within(variable: str, most: float) -> Iterator[str]:
     yield f"IF[{variable}LT-{limit}]THEN{variable}=-{limit}"
 
 
+def _cap(limits: Limits, option: str, times: float) -> float:
+    """Return a limit [um] in the digits of a control, so many times: no larger than it was asked for."""
+    asked: float = getattr(limits, option)
+    # the product in decimals: 0.1 um/s is 6 um in a minute, not a digit of double precision more
+    taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
+    if not taken:
+        raise InputError(
+            f"--{option} {asked:g}: a Fanuc control takes eight digits, and this is 0 in them: give at least "
+            f"--{option} {1e-4 / times:.2g}"
+        )
+    return taken
+
+
 def _plausible(r: Reduced) -> list[tuple[float, float]]:
     """Return beyond what a temperature is none; days of another zero included."""
     least, most = PLAUSIBLE["temperature"]
@@ -193,8 +207,8 @@ def _vectors(reductions: Sequence[Reduced], marks: dict[str, str], most: float) 
 
 
 def _real(number: float | str) -> str:
-    """Return a number with a decimal point: without it a control may read other units."""
-    text = number if isinstance(number, str) else in_um(number)
+    """Return a number of eight digits with a decimal point: without it a control may read other units."""
+    text = shorten(number if isinstance(number, str) else in_um(number))
     return text if "." in text else f"{text}.0"
 
 

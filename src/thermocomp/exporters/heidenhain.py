@@ -1,5 +1,6 @@
 """A linear formula of present temperatures for Heidenhain controls: MP7530 / TEMPCOMP, and the words of a TNC 360."""
 
+import math
 from collections.abc import Sequence
 
 from thermocomp.core.correction import Limits
@@ -76,7 +77,7 @@ def write_heidenhain(
     """
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     marks = find_marks(reductions)
-    most = min(limits.magnitude, _WORD)
+    most = min(math.floor(limits.magnitude), _WORD)  # in whole um
     lines = [f"; {line}" for line in first]
     for r in reductions:
         lines += [

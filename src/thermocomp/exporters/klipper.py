@@ -20,6 +20,8 @@ UNITS = "Units: temp_coeff in mm/K, temperatures in degC, times in s"
 _MOST = 1.0
 #: room for the sensor about what was recorded; Klipper stops the printer beyond [degC]
 _ROOM = 30.0
+#: what Klipper lets `min_temp` be, at least [degC]
+_COLDEST = -273
 
 _SECTION = """{head}
 
@@ -100,7 +102,10 @@ def write_klipper(
     (r,) = reductions
     ((sensor, factor),) = r.terms
     if abs(factor) > 1e3 * _MOST:
-        raise InputError(f"{r.model.target}: {factor:g} um/K, and Klipper takes at most {_MOST:g} mm/K")
+        raise InputError(
+            f"{r.model.target}: {factor:g} um/K, and Klipper takes at most {_MOST:g} mm/K: check the units of the "
+            "recording, or export to another controller"
+        )
     first = head(reductions, facts, SIGN, UNITS)
     zero = r.zeros[0]
     section = _SECTION.format(
@@ -108,7 +113,7 @@ def write_klipper(
         coefficient=in_mm(factor),
         sensor=sensor.name,
         most=in_mm(limits.magnitude),
-        low=math.floor(zero + sensor.low - _ROOM),
+        low=max(math.floor(zero + sensor.low - _ROOM), _COLDEST),
         high=math.ceil(zero + sensor.high + _ROOM),
     )
     page = write_page(

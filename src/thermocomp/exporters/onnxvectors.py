@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.exporters.block.tables import Tables
-from thermocomp.exporters.vectors import Answers, Readings, make_readings, replay
+from thermocomp.exporters.vectors import Answers, Readings, find_tolerance, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import CLOCK_SKEW
 
 FloatArray = NDArray[np.float64]
 
-#: share of a correction, or um of one below 1 um, that a runtime may be off
-TOLERANCE = 1e-9
+#: share of a correction, or um of one below 1 um, that a runtime may be off at least
+_TOLERANCE = 1e-9
 
 PROGRAM = '''"""Runs {name}.onnx over {name}_vectors.json; exits with 0 if all is well: {name}.md says how."""
 
@@ -125,7 +125,7 @@ def write_vectors(
     head = {
         "facts": list(facts),
         "sha256": sha256,
-        "tolerance": TOLERANCE,
+        "tolerance": max(_TOLERANCE, find_tolerance(tables)),
         "state": size,
         "inputs": [f"{c.name} [{c.unit}]" for c in tables.channels],
         "targets": list(tables.targets),

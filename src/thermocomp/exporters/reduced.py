@@ -4,13 +4,16 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
+from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from typing import NamedTuple
 
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.exporters.facts import Facts
+
+#: of eight digits
+_LARGEST = Decimal(99_999_999)
 
 
 @dataclass(frozen=True)
@@ -223,6 +226,24 @@ def in_mm(um: float) -> str:
 def in_um(um: float) -> str:
     """Return a number, digit by digit the same, without an exponent."""
     return _plain(Decimal(repr(um)))
+
+
+def shorten(text: str, *, cap: bool = False) -> str:
+    """Return a number in eight digits, seven of them behind the point at most: more a Fanuc control does not take.
+
+    Parameters
+    ----------
+    text : str
+        Without an exponent, as `in_mm` and `in_um` write it.
+    cap : bool
+        Nothing may exceed it: round it towards zero.
+    """
+    value = Decimal(text)
+    if abs(value) >= _LARGEST:
+        return _plain(_LARGEST.copy_sign(value))
+    behind = 8 - max(1, value.adjusted() + 1)
+    rounded = value.quantize(Decimal(1).scaleb(-behind), ROUND_DOWN if cap else ROUND_HALF_EVEN)
+    return _plain(min(max(rounded, -_LARGEST), _LARGEST)) if rounded else "0"
 
 
 def _plain(value: Decimal) -> str:

@@ -9,7 +9,7 @@ from thermocomp.exporters.facts import Facts
 from thermocomp.exporters.pages import describe
 from thermocomp.exporters.structuredtext import Unit, comment, translate
 from thermocomp.exporters.ststatements import Dialect
-from thermocomp.exporters.sttest import TOLERANCE, write_test
+from thermocomp.exporters.sttest import allow, write_test
 from thermocomp.exporters.vectors import make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 
@@ -36,7 +36,7 @@ yet.
 
 Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE: `wrong` has
 to be 0 then, and `largest`, the largest difference to thermocomp as a share of a correction (in um below 1 um), below
-{tolerance:g}. Faults are among the vectors. Remove the test and its vectors afterwards.
+{tolerance:.1g}. Faults are among the vectors. Remove the test and its vectors afterwards.
 
 ## Run it
 
@@ -141,7 +141,7 @@ def write_blocks(
         install=_INSTALL[dialect].format(name=name, kilobytes=_kilobytes(tables)),
         about=f"{about.lstrip()}\n" if about else "",
         calls=len(readings.age),
-        tolerance=TOLERANCE,
+        tolerance=allow(tables),
         **describe(compensator, tables),
     )
     if dialect == "twincat":

@@ -182,4 +182,4 @@ def comment(text: str) -> str:
     """Return a text that ends no comment."""
     for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
-    return " ".join(text.encode("ascii", "backslashreplace").decode().split())
+    return " ".join(text.split())

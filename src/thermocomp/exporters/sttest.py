@@ -9,10 +9,10 @@ from thermocomp.exporters.block.layout import Kind
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.structuredtext import NOTHING, Unit
 from thermocomp.exporters.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
-from thermocomp.exporters.vectors import Answers, Readings
+from thermocomp.exporters.vectors import Answers, Readings, find_tolerance
 
-#: difference that is allowed, as a share of a correction, or in um of one below 1 um
-TOLERANCE = 1e-9
+#: difference that is allowed at least, as a share of a correction, or in um of one below 1 um
+_TOLERANCE = 1e-9
 
 _BODY = """IF NOT {_}done THEN
     FOR {_}j := 0 TO {last} DO
@@ -111,12 +111,17 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         "targets": targets,
         "last_target": targets - 1,
         "calls": calls,
-        "tolerance": number(TOLERANCE),
+        "tolerance": number(allow(tables)),
         "sensors": sensors,
         "last_sensor": sensors - 1,
     }
     body = _BODY.format(**sizes, faults=_FAULTS.format(**sizes) if sensors else "")
     return [vectors, Unit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
+
+
+def allow(tables: Tables) -> float:
+    """Return the difference that is allowed, as a share of a correction, or in um of one below 1 um."""
+    return max(_TOLERANCE, find_tolerance(tables))
 
 
 def _finite(given: Iterable[float]) -> list[float]:

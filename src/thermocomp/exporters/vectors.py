@@ -8,8 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.autoregressive import Autoregressive, find_largest_root
+from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP
+from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.reading import Reading
+from thermocomp.core.validity import Validity
+from thermocomp.core.zero import Zeroing
 from thermocomp.exporters.block.tables import Tables
 from thermocomp.exporters.warming import Warming
 from thermocomp.runtime.compensator import Compensator
@@ -91,18 +96,43 @@ def replay(
     return Answers(table(0), table(1), table(2).astype(int), table(3), table(4).astype(int), passed)
 
 
+#: of a model, what is in no code: how it was judged decides what it may do, and must not be rounded
+_UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
+
+
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value in which all numbers that are not whole are rounded."""
+    """Return a value in which all numbers that a code holds are rounded, unless whole; a row of them at once."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
         return rounded(value)
+    if type(value) is tuple and value and all(isinstance(v, float) for v in value):
+        return tuple(rounded(np.array(value)).tolist())
     if isinstance(value, tuple):
         parts = [round_all(v, rounded) for v in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if is_dataclass(value) and not isinstance(value, type):
+    if is_dataclass(value) and not isinstance(value, (type, *_UNWRITTEN)):
         return replace(value, **{f.name: round_all(getattr(value, f.name), rounded) for f in fields(value)})
     return value
+
+
+def find_tolerance(tables: Tables) -> float:
+    """Return how far another code of double precision may be off: what feeds itself makes more of rounding.
+
+    Parameters
+    ----------
+    tables : Tables
+        Of the compensator.
+
+    Returns
+    -------
+    float
+        As a share of a correction, or in um of one below 1 um.
+    """
+    # what the last digit makes of a sum that decays, and of many ticks at once
+    slow = [(1.0 - sum(m.a)) * (1.0 - find_largest_root(m.a)) for m in tables.models if isinstance(m, Autoregressive)]
+    most = 10.0 * float(np.finfo(np.float64).eps) / min(slow, default=1.0)
+    return max(most, 1e-11 if tables.sizes["CLOCKS"] else 1e-12)
 
 
 def make_readings(tables: Tables) -> Readings:
@@ -144,8 +174,8 @@ def make_readings(tables: Tables) -> Readings:
     for dt in (math.nan, -1.0, 0.0):
         add(warm, dt)
     # silence: just before and just behind the end of the hold, then until all has faded
-    held = min(math.ceil(hold / age), 200)
-    waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * min(math.ceil(3 * fade / age), 200)
+    held = math.ceil(min(max(hold / age, 1.0), 200.0))
+    waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * math.ceil(min(3.0 * fade / age, 200.0))
     for dt in waits:
         rows.append((rows[-1][0], rows[-1][1] + dt + age, dt))
         machine.run(0.0, dt)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -109,7 +110,7 @@ def unpack(kind: Format, reader: SchemaValidator, text: str, source: str) -> Any
     ModelFileError
         Not JSON, of another kind or version, altered or incomplete, or not what they must be.
     """
-    content = _parse(text, f"{source}: not a {kind.words}", source)
+    content = _parse(text, f"{source}: not a {kind.words}", source, kind.command)
     _check_kind(kind, content, source)
     body = content.get("models")
     if not isinstance(body, list) or not body:
@@ -188,7 +189,7 @@ def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
 # -- JSON --------------------------------------------------------------------------------------------------------------
 
 
-def _parse(text: str, no: str, source: str) -> Any:
+def _parse(text: str, no: str, source: str, command: str) -> Any:
     for sign, most in _COUNTS.items():
         if text.count(sign) > most:
             raise ModelFileError(f"{no}: {sign} stands in it more than {most:,} times")
@@ -197,12 +198,26 @@ def _parse(text: str, no: str, source: str) -> Any:
     except RecursionError as e:
         raise ModelFileError(f"{no}: nested too deeply") from e
     except json.JSONDecodeError as e:
+        if not text.lstrip().startswith("{"):
+            raise ModelFileError(f"{no}: {_found(text)}; name the file that '{command}' wrote") from e
         where = f"line {e.lineno}, column {e.colno}"
         if e.pos >= len(text.rstrip()) - 1 or "Unterminated" in e.msg:
             raise ModelFileError(f"{source}: the file ends in the middle ({where}); copy it again, completely") from e
         raise ModelFileError(f"{no}: {e.msg} at {where}") from e
     except ValueError as e:
         raise ModelFileError(f"{no}: {e}") from e
+
+
+def _found(text: str) -> str:
+    """Return what a text is that is no JSON."""
+    line = next((line.strip() for line in text.splitlines() if line.strip()), "")
+    if not line:
+        return "it is empty"
+    if re.match(r"\[[\w.\"]+\]$|[\w.]+\s*=", line):
+        return f"it is TOML, such as a machine file or a mapping: it begins with {_short(line)}"
+    if any(line.count(sign) for sign in ",;\t"):
+        return f"it looks like a table, such as a recording: it begins with {_short(line)}"
+    return f"it begins with {_short(line)}"
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -232,7 +247,10 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
             raise ModelFileError(
                 f"{no} but a {other.words}, as '{other.command}' writes it; a {kind.words} comes from '{kind.command}'"
             )
-        raise ModelFileError(f'{no}: it has no "format": "{kind.name}"')
+        raise ModelFileError(
+            f'{no}: it has no "format": "{kind.name}", found {_short(found) if found else "none"}; name the file that '
+            f"'{kind.command}' wrote"
+        )
     version = content.get("version")
     if type(version) is not int or version < 1:
         raise ModelFileError(f"{source}: {kind.words} without a version; write it anew with '{kind.command}'")

@@ -16,11 +16,14 @@ class Var(NamedTuple):
         What it holds, and its unit.
     dims : tuple of str
         How many there are: names of `sizes`.
+    cap : bool
+        What nothing may exceed: where digits are lost it gets smaller, never larger.
     """
 
     kind: Kind
     about: str
     dims: tuple[str, ...] = ()
+    cap: bool = False
 
 
 #: what is kept from call to call, all 0 at the start
@@ -147,8 +150,8 @@ WATCH_WORK = {
 
 #: what the block knows: numbers of the models and of the limits
 TABLES = {
-    "magnitude": Var("real", "largest correction [um]"),
-    "rate": Var("real", "fastest change of a correction [um/s]"),
+    "magnitude": Var("real", "largest correction [um]", cap=True),
+    "rate": Var("real", "fastest change of a correction [um/s]", cap=True),
     "dead_band": Var("real", "a smaller change is none [um]"),
     "reading_age": Var("time", "older values are not used [s]"),
     "hold": Var("time", "so long a correction stays that nothing drives [s]"),

@@ -1,0 +1,165 @@
+"""Numbers at their bounds get into C: in single precision they keep to them, or it says that it does not do."""
+
+import re
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from compiledblock import COMPILERS, FLAGS, CompiledBlock
+from driftmodels import ACCEPTED
+from families import HEAD, SINGLES
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from watchedmachine import watched_model
+
+from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.autoregressive import Autoregressive
+from thermocomp.core.bounds import COEFFICIENT, LEAST, round_single
+from thermocomp.core.correction import Limits
+from thermocomp.core.inputs import Input
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.watch import Watch
+from thermocomp.exporters import cpackage, onnxpackage, stpackage
+from thermocomp.exporters.block.tables import gather
+from thermocomp.exporters.facts import Facts
+from thermocomp.exporters.vectors import make_readings, round_all
+from thermocomp.runtime.compensator import Compensator
+
+FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+
+def prove(folder: Path, texts: dict[str, bytes], switch: str) -> str:
+    """Compile and run the test of an export; return what it says, or why it does not compile."""
+    for file, text in texts.items():
+        (folder / file).write_bytes(text)
+    command = [COMPILERS[0], *FLAGS[:-1], switch, "tc_x.c", "tc_x_test.c", "-lm", "-o", "prove"]
+    built = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if built.returncode:
+        return built.stderr
+    return subprocess.run(["./prove"], cwd=folder, capture_output=True, text=True, check=False).stdout
+
+
+def at_the_bounds() -> ErrorModel:
+    """Return a watched model whose scales, limits and time constants are as small as they may be."""
+    model = watched_model("z_um")
+    assert model.watch is not None
+    tiny: dict[str, Any] = {"off": LEAST, "jump": LEAST, "moved": LEAST, "still": LEAST}
+    states = tuple((i, power, LEAST, LEAST) for i, power, *_ in model.watch.states)
+    watch = replace(
+        model.watch,
+        top_speed=LEAST,
+        time_constants=(LEAST,) * len(model.watch.time_constants),
+        states=states,
+        sensors=tuple(replace(s, **tiny) for s in model.watch.sensors),
+        pace=LEAST,
+    )
+    joint = JointSupport((0, 1), (LEAST, LEAST), ((0.0, COEFFICIENT),), LEAST, (3,), ((0.0,),), (LEAST,))
+    joint = replace(joint, speeds=(), levels=(), tolerances=()) if len(model.inputs) < 4 else joint
+    return replace(model, watch=watch, joint=joint)
+
+
+def test_numbers_at_their_bounds_stay_within_them() -> None:
+    model = at_the_bounds()
+    rounded = round_all(model, round_single)
+    assert rounded.watch.top_speed >= LEAST
+    assert rounded.watch.top_speed == np.float32(rounded.watch.top_speed)
+    texts = cpackage.write_package(Compensator.of([model]), "x", FACTS)
+    assert "tc_x.c" in texts
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(st.tuples(st.floats(LEAST, 1e10), st.floats(LEAST, 8.0), st.floats(LEAST, 1e10)), min_size=1, max_size=4),
+    st.floats(LEAST, 1e9),
+    st.one_of(st.just(LEAST), st.floats(LEAST, 1e12)),
+)
+def test_a_watch_of_any_numbers_can_be_rounded(states: list[Any], top: float, limit: float) -> None:
+    known = watched_model("z_um").watch
+    assert known is not None
+    (speed,) = known.speeds.tolist()
+    sensors = tuple(
+        replace(s, off=limit, jump=limit, moved=limit, weights=(*s.weights[: -len(known.states)], *[0.5] * len(states)))
+        for s in known.sensors
+    )
+    watch: Watch = replace(
+        known,
+        states=tuple((speed, power, slow, fast) for slow, power, fast in states),
+        top_speed=top,
+        sensors=sensors,
+    )
+    round_all(watch, round_single)  # refuses what is beyond its bounds
+
+
+def test_what_was_judged_is_not_rounded() -> None:
+    judged = replace(ACCEPTED, none_rms=5.1, lost={"t1_C": 5.1})
+    model = replace(watched_model("z_um"), honest_error=judged)
+    assert model.may_lose(["t1_C"])
+    rounded = round_all(model, round_single)
+    assert rounded.honest_error == judged
+    assert rounded.may_lose(["t1_C"])
+
+
+@needs_compiler
+@pytest.mark.parametrize("most", [0.3, 0.7, 1.1])
+def test_no_correction_is_larger_than_its_limit(tmp_path: Path, most: float) -> None:
+    compensator = Compensator.of([watched_model("z_um")], Limits(magnitude=most, rate=0.1))
+    block = CompiledBlock(compensator, tmp_path, flags=("-DTC_FLOAT",))
+    readings = make_readings(gather(compensator))
+    said = np.abs(block.run(readings).correction)
+    assert 0.99 * most < said.max() <= most
+
+
+@needs_compiler
+def test_steps_that_readings_are_beside(tmp_path: Path) -> None:
+    edges = np.arange(-1.0, 3.0, 0.0005)
+    curve = Curve(tuple(edges.tolist()), tuple((0.01 * np.arange(len(edges) + 1)).tolist()), "step")
+    model = Additive(**HEAD, variables=(SINGLES[0],), curves=(curve,), honest_error=ACCEPTED)
+    texts = cpackage.write_package(Compensator.of([model]), "x", FACTS)
+    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
+        assert " 0 wrong" in prove(tmp_path, texts, switch)
+
+
+@needs_compiler
+def test_points_of_a_curve_that_single_precision_does_not_tell_apart(tmp_path: Path) -> None:
+    x = [-2.0, 1.0]
+    x += [float(np.nextafter(x[-1], 2.0)), 1.0 + 1e-9, 3.0]
+    model = Additive(**HEAD, variables=(SINGLES[0],), curves=(Curve(tuple(x), (0.0, 3.0, 3.0, 3.0, 9.0)),))
+    texts = cpackage.write_package(Compensator.of([replace(model, honest_error=ACCEPTED)]), "x", FACTS)
+    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
+        assert " 0 wrong" in prove(tmp_path, texts, switch)
+
+
+def slow(*poles: float) -> Autoregressive:
+    a = (-np.poly(poles)[1:]).tolist()
+    speed = Input("n", "spindle_speed", "1/min", 0.0, False, 0.0, 3000.0)
+    gain = 0.01 * (1.0 - sum(a))
+    return Autoregressive(
+        target="z_um", unit="um", inputs=(speed,), a=tuple(a), b=((gain,),), interval=15.0, honest_error=ACCEPTED
+    )
+
+
+@needs_compiler
+@pytest.mark.parametrize("poles", [(0.9972, 0.9972), (0.999, 0.999), (0.9999, 0.9999), (0.9999,), (0.99, 0.98, 0.5)])
+def test_a_free_run_that_decays_slowly(tmp_path: Path, poles: tuple[float, ...]) -> None:
+    texts = cpackage.write_package(Compensator.of([slow(*poles)]), "x", FACTS)
+    assert " 0 wrong" in prove(tmp_path, texts, "-UTC_FLOAT")
+    single, refused = prove(tmp_path, texts, "-DTC_FLOAT"), b"too coarse for this model" in texts["tc_x.md"]
+    assert ("single precision is too coarse for this model" in single) == refused
+    assert refused or " 0 wrong" in single
+    assert refused == (poles == (0.999, 0.999))
+
+
+def test_the_other_proofs_of_it_allow_as_much() -> None:
+    compensator = Compensator.of([slow(0.9999, 0.9999)])
+    text = stpackage.write_package(compensator, "x", FACTS)["tc_x_test.st"].decode()
+    assert re.search(r"apart <= 0\.002\d* *\)", text)
+    quick = stpackage.write_package(Compensator.of([slow(0.9)]), "x", FACTS)["tc_x_test.st"].decode()
+    assert "apart <= 1.0E-09" in quick
+    pytest.importorskip("onnx")
+    vectors = onnxpackage.write_package(compensator, "x", FACTS)["tc_x_vectors.json"].decode()
+    assert '"tolerance": 0.002' in vectors
