@@ -228,6 +228,22 @@ def test_time_that_passed_goes_with_the_dates_it_runs_through(heading: str, tmp_
     assert recording.time.tolist() == [600.0 * k for k in range(90)]
 
 
+def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> None:
+    """From 20:00 on: at midnight the date changes, and the time runs on."""
+    begin = datetime(2024, 3, 5, 20)
+    days = [f"{begin + timedelta(minutes=10 * k):%Y-%m-%d}" for k in range(200)]
+    passed = [f"{k // 6:02}:{k % 6}0:00,{20 + k / 9:.2f},{k / 4}\n" for k in range(200)]
+    for count in (100, 200):  # beyond a day nothing else is possible
+        body = "".join(f"{day},{row}" for day, row in zip(days[:count], passed, strict=False))
+        path = write(tmp_path, f"Date,Time,T1 [degC],Z [um]\n{body}")
+        with pytest.raises(InputError) as caught:
+            read(path)
+        if count == 100:
+            assert "time that passed, or a pause of a whole day?" in str(caught.value)
+            remedy = check_content(dict(caught.value.remedies[0]), "m")
+            assert read(path, remedy).time.tolist() == [600.0 * k for k in range(count)]
+
+
 def test_a_date_that_never_changes_is_that_of_the_test(tmp_path: Path) -> None:
     body = "".join(f"2024-01-31,{3600 * k},{20 + k / 9:.2f},{k / 4}\n" for k in range(60))
     assert read(write(tmp_path, f"Calibrated,time_s,T1 [degC],Z [um]\n{body}"), Mapping()).time[-1] == 59 * 3600

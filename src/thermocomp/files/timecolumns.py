@@ -131,7 +131,8 @@ def _by_name(
     clock = next((plain[name] for name in _CLOCKS if name in plain), None)
     if date is not None and clock is not None:
         whole = next((k for k in (clock, date) if kinds(k) == "stamp"), None)
-        return (clock, date, []) if whole is None else (whole, None, [])
+        alone = clock if kinds(clock) == "passed" else whole
+        return (clock, date, []) if alone is None else (alone, None, [])
     names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
     bare = [plain[name] for name in names if name not in _NEEDS_UNIT or kinds(plain[name]) in ("date", "stamp")]
     if bare or named:

@@ -94,6 +94,7 @@ def read_times(
         if columns.date is not None:
             shown = plain_dates(cells[columns.date]) + " " + plain_clocks(shown)
         time, start, found = _read_stamps(shown, columns, mapping, table, source)
+        _refuse_passed(time, start, cells, columns, mapping, table, source)
     else:
         raw = shown.to_numpy(dtype=np.float64)
         missing = np.flatnonzero(~np.isfinite(raw))
@@ -291,6 +292,35 @@ def _refuse_falling(
     raise RecordingError(
         f"{text}; time must rise: delete or correct the row, or split the file into tests", [skip_row(table, row)]
     )
+
+
+def _refuse_passed(
+    time: FloatArray,
+    start: str,
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+) -> None:
+    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day."""
+    if columns.date is None or mapping.time.format or not start:
+        return
+    dates, begin = cells[columns.date], pd.Timestamp(start)
+    changes = (dates != dates.shift()).to_numpy(dtype=np.bool_)[1:]
+    steps = np.diff(time)
+    usual = float(np.median(steps[~changes])) if not changes.all() else 0.0
+    more = steps - _DAY / 1e9
+    rows = np.flatnonzero(changes & (more > 0) & (more <= 2 * usual)) + 1
+    if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
+        heading, name = table.headings[columns.time], table.headings[columns.date]
+        raise TwoReadingsError(
+            f"{source}: {table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with zero, runs "
+            f"on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time that passed, "
+            f'leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = "ignore"; if '
+            "not, say how both are written: [time] column, date and format",
+            [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
+        )
 
 
 def _refuse_set_forward(
