@@ -210,11 +210,12 @@ def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> Choice:
     if choice.by == "going on" or (choice.by == "days in a row" and choice.order == "ymd"):
         return choice
     year_first = read.get("ymd")
-    if year_first is None or not rises(year_first) or find_longest_step(year_first) >= _MONTH:
+    if year_first is None or not rises(year_first):
         return day_first
-    if not rises(read["dmy"]) and choice.order == "ymd":
-        return choice
-    return Choice("", "", "") if find_longest_step(read["dmy"]) >= _YEAR else day_first
+    longest, other = find_longest_step(read["dmy"]), find_longest_step(year_first)
+    if not rises(read["dmy"]):
+        return choice if choice.order == "ymd" and other < _MONTH else day_first
+    return Choice("", "", "") if longest >= _YEAR and longest > other else day_first
 
 
 def _instants(stamps: "pd.Series[pd.Timestamp]") -> IntArray:
