@@ -10,8 +10,8 @@ IntArray = NDArray[np.int64]
 
 _SECOND = 1_000_000_000
 _DAY = 86_400 * _SECOND
-#: rows so near to each other belong together, however often the others come
-_NEAR = 1800 * _SECOND
+#: rows so near to each other belong together, however often the others come; those further apart may not
+_NEAR, _FAR = 1800 * _SECOND, 6 * 3600 * _SECOND
 #: a step in days that only a wrong order makes: a month is 28 days at least, and a row may come early on its last one
 _MONTH = 26
 #: changes of the date that show days in a row, and days from one to the next: a weekend may lie between
@@ -43,8 +43,8 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
     An order is taken if it is the only one
 
     1. in which time rises; else
-    2. in which a row follows on the one before across a change of the date: after half an hour or two usual steps at
-       most, where every other order puts about a month or more between them; else
+    2. in which a row follows on the one before across a change of the date: at most half an hour or two usual steps
+       later, and six hours, where every other order puts about a month or more between them; else
     3. in which at least four dates follow each other, one to four days apart, where every other order puts about a
        month or more between each and the next. Where these would be the first days of months, and a date has several
        rows, both are possible.
@@ -59,7 +59,7 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
     first, *others = steps.values()
     alike = np.logical_and.reduce([first == other for other in others])
     usual = first[alike & (first > 0)]
-    near = max(_NEAR, 2 * int(np.median(usual)) if usual.size else 0)
+    near = min(max(_NEAR, 2 * int(np.median(usual)) if usual.size else 0), _FAR)
     going_on = {order: ~alike & (s >= 0) & (s <= near) for order, s in steps.items()}
     for order, follows in going_on.items():
         rest = [o for o in steps if o != order]
