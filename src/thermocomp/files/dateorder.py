@@ -51,13 +51,16 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
 
     Tests on two or three days with a pause between them may be a month apart as well: nothing tells.
     """
+    begun, *others = readings.values()
+    if all(np.array_equal(begun, t) for t in others):
+        return Choice(next(iter(readings)), "", "")  # the fifth of May
     rising = [order for order, t in readings.items() if rises(t)]
     if len(rising) == 1:
         return Choice(rising[0], "rising", "otherwise time would not rise")
     tried = {order: readings[order] for order in rising or readings}
     steps = {order: np.diff(t) for order, t in tried.items()}
-    first, *others = steps.values()
-    alike = np.logical_and.reduce([first == other for other in others])
+    first, *more = steps.values()
+    alike = np.logical_and.reduce([first == other for other in more])
     usual = first[alike & (first > 0)]
     near = min(max(_NEAR, 2 * int(np.median(usual)) if usual.size else 0), _FAR)
     going_on = {order: ~alike & (s >= 0) & (s <= near) for order, s in steps.items()}
