@@ -228,6 +228,12 @@ def test_time_that_passed_goes_with_the_dates_it_runs_through(heading: str, tmp_
     assert recording.time.tolist() == [600.0 * k for k in range(90)]
 
 
+def test_a_stamp_that_never_changes_is_no_time(tmp_path: Path) -> None:
+    body = "".join(f"2024-01-31 08:00:00,{10 * k},{20 + k / 9:.2f},{k / 4}\n" for k in range(60))
+    with pytest.raises(InputError, match="no time column found among Begun, Since"):
+        read(write(tmp_path, f"Begun,Since,T1 [degC],Z [um]\n{body}"))
+
+
 def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> None:
     """From 20:00 on: at midnight the date changes, and the time runs on."""
     begin = datetime(2024, 3, 5, 20)

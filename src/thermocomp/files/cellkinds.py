@@ -40,7 +40,8 @@ def find_kind(cells: Sequence[str]) -> Kind:
     Returns
     -------
     Kind
-        What most of them hold; ``date`` also of dates of which a spreadsheet made midnights.
+        What most of them hold; ``date`` also of dates of which a spreadsheet made midnights. Stamps that are all the
+        same are no time of the rows, and count as words.
     """
     if not cells:
         return ""
@@ -56,7 +57,7 @@ def find_kind(cells: Sequence[str]) -> Kind:
         return "number"
     texts = [_WEEKDAY.sub("", text) for text in texts]
     if are(lambda t: is_stamp(t) and ":" in _MIDNIGHT.sub("", t)):
-        return "stamp"
+        return "stamp" if len(texts) == 1 or len(set(texts)) > 1 else "other"
     return "date" if are(is_stamp) else "other"
 
 

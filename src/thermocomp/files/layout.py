@@ -181,7 +181,7 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
     """Put the units of a row into the headings above them, where these have none.
 
     What a column holds decides: dates, times of day and words have no unit, whatever stands there (``Unit``,
-    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. Before the units may stand what the row is.
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. In the first column may stand what the row is.
 
     Parameters
     ----------
@@ -194,7 +194,6 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
     list of str
     """
     said = [_bare(unit) for unit in units]
-    label = next((k for k, unit in enumerate(said) if unit), -1)
     found = []
     for k, heading in enumerate(headings):
         unit = said[k] if k < len(said) else ""
@@ -202,7 +201,7 @@ def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Seq
         cell = next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "")
         if is_stamp(cell):
             fits = bool(find_date_order(unit))
-        elif k == label or is_time_name(heading) or (cell and not is_number_like(cell)):
+        elif k == 0 or is_time_name(heading) or (cell and not is_number_like(cell)):
             fits = known
         else:
             fits = known or not is_time_name(unit)
