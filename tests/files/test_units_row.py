@@ -199,6 +199,14 @@ def test_dates_that_the_time_does_not_go_with_are_trouble(
     is_whole(read(path, check_content(dict(caught.value.remedies[0]), "m")))
 
 
+def test_of_two_columns_of_dates_the_wrong_one_is_not_taken(tmp_path: Path) -> None:
+    printed = rows("%H:%M:%S,2024-05-01,%Y-%m-%d")
+    path = write(tmp_path, f"Time,Printed,Measured,T1 [degC],Z [um]\n{printed}")
+    with pytest.raises(TwoReadingsError, match="'Measured' says 2024-03-07 in line 22") as caught:
+        read(path)
+    is_whole(read(path, check_content(dict(caught.value.remedies[0]), "m")))
+
+
 def test_numbers_of_a_day_do_not_go_with_dates_either(tmp_path: Path) -> None:
     body = "".join(
         f"{t:%Y-%m-%d},{t.hour * 3600 + t.minute * 60},{a},{z}\n" for t, (a, z) in zip(INSTANTS, CELLS, strict=True)

@@ -32,12 +32,12 @@ def check_dates(
     *,
     is_stamp: bool,
 ) -> tuple[str, ...]:
-    """Refuse times without a date that do not go with the dates of another column.
+    """Refuse times without a date of their own that do not go with the dates of another column.
 
     Parameters
     ----------
     time : ndarray of shape (n_rows,)
-        Since the first row, from times of day or times that passed [s].
+        Since the first row [s].
     cells : DataFrame
         With the columns of dates that were not used, named by position.
     columns : ColumnPlan
@@ -67,7 +67,7 @@ def check_dates(
         name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
         row = _find_contradiction(time, cells[k])
         if row is None:
-            if is_stamp and not has_passed(heading) and not ignored:
+            if is_stamp and columns.date is None and not has_passed(heading) and not ignored:
                 notes.append(
                     f"left out: {name!r} holds dates, and {heading!r} only a time of day: name it in a mapping, "
                     f"[time] column = {_quoted(heading)} and date = {_quoted(name)}"
@@ -75,7 +75,7 @@ def check_dates(
             continue
         said = (
             f"{name!r} says {cells[k].iloc[row]} in {table.place(row)}, which is not the day {time[row] / 3600:.2f} h "
-            f"after {cells[k].dropna().iloc[0]}, as the time in {heading!r} says, which has no date"
+            f"after {cells[k].dropna().iloc[0]}, as the time in {heading!r} says"
         )
         if ignored:
             notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")

@@ -130,7 +130,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     notes.extend(told)
     time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     notes.extend(told)
-    if not start:
+    if not start or columns.date is not None:
         notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp))
     data, changed = {}, list[str]()
     for column in columns.columns:
