@@ -38,7 +38,8 @@ def map(
     output : Path
         TOML file to write; without it the mapping is printed.
     yes : bool
-        Ask nothing: take the best guess, and mend what `check` calls trouble.
+        Ask nothing: take the best guess, and mend what `check` calls trouble. What changes how long a recording
+        took, as the order of day and month may, is not guessed but refused.
     overwrite : bool
         Write over an existing file.
     json : bool
@@ -115,14 +116,15 @@ def _ask(question: "Question") -> Remedy | None:
     _stderr.print("  [bold]0[/] leave it as it is")
     own = next((name for name in question.options[0].get("columns", ())), "")
     more = ', or keys of your own, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""
-    best = 0 if question.severity in ("warning", "info") else 1
+    best = "0" if question.severity in ("warning", "info") else "1" if question.may_guess else ""
     while True:
-        _stderr.print(f"  number{more} [{best}]: ", end="", markup=False, soft_wrap=True)
+        _stderr.print(f"  number{more}{best and f' [{best}]'}: ", end="", markup=False, soft_wrap=True)
         try:
             said = input().strip()
         except EOFError as e:
-            raise InputError("there is no answer to come on the input; --yes takes the best guess") from e
-        said = {"": str(best), "y": "1", "yes": "1", "n": "0", "no": "0"}.get(said.lower(), said)
+            way = "--yes takes the best guess" if question.may_guess else "write it into a mapping"
+            raise InputError(f"there is no answer to come on the input; {way}") from e
+        said = {"": best, "y": "1", "yes": "1", "n": "0", "no": "0"}.get(said.lower(), said)
         if said.isdigit() and int(said) <= len(question.options):
             return question.options[int(said) - 1] if int(said) else None
         try:

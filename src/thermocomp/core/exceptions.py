@@ -68,6 +68,10 @@ class RecordingError(InputError):
     """A recording, or the file it comes from, cannot be used."""
 
 
+class TwoReadingsError(RecordingError):
+    """The times of a recording can be read in several ways that differ in how long it took: nobody may guess."""
+
+
 class UnitError(InputError):
     """A unit is unknown, or does not belong to the quantity it stands for."""
 

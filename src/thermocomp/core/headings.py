@@ -258,7 +258,7 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
         return base, find_unit(symbol)
     except UnitError:
         # [kW], [%] or (front) are columns of no use here; [degX] is a slip that would lose a sensor silently
-        other = symbol.casefold() in _OTHERS or _FORMAT.fullmatch(symbol)
+        other = is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)
         words = get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
         if not other and (words or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)):
             raise
@@ -282,6 +282,11 @@ def _behind(heading: str) -> tuple[str, Unit] | None:
 def strip_heading(heading: str) -> str:
     """Return a heading without blanks and colons around it."""
     return heading.strip().rstrip(":").strip()
+
+
+def is_foreign_unit(symbol: str) -> bool:
+    """Return whether a text is a unit of what is no use here, such as ``%`` or ``kW``."""
+    return symbol.casefold() in _OTHERS
 
 
 def is_time_name(heading: str) -> bool:

@@ -3,23 +3,18 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError, UnitError
-from thermocomp.core.headings import (
-    BRACKETS,
-    Meaning,
-    is_time_name,
-    plain_name,
-    understand,
-)
+from thermocomp.core.headings import Meaning, understand
 from thermocomp.core.machine import Channel
 from thermocomp.core.units import Unit, find_unit
+from thermocomp.files.cellkinds import Kinds
 from thermocomp.files.mapping import ColumnMap, Mapping, Place
 from thermocomp.files.tables import tell_places
+from thermocomp.files.timecolumns import find_position, find_time
 
 FloatArray = NDArray[np.float64]
 
@@ -30,18 +25,6 @@ _SCPI_INFINITY = 9.9e37
 _DOUBTFUL = ({"unit": "degC"}, {"role": "ignore"})
 # A factor, such as the base of a level, turns one of these into another.
 _GEOMETRY = ("displacement", "angle", "position")
-#: headings of a time without unit, those that say more first
-_BARE = (
-    *("timestamp", "datetime", "date_time", "date time", "date/time", "datum/uhrzeit", "datum/zeit", "datum uhrzeit"),
-    *("datum und uhrzeit", "zeitstempel", "time stamp", "timestamps", "date and time", "date & time", "date&time"),
-)
-#: those that mean a time only beside a unit or another one
-_NEEDS_UNIT = ("t", "data", "tag", "day")
-#: headings of a date, and of the time of day beside it
-_DATES = ("date", "datum", "fecha", "data", "tag", "day")
-_CLOCKS = ("time", "uhrzeit", "zeit", "heure", "hora", "ora", "clock", "time of day", "tijd", "čas", "czas")
-#: milliseconds beside a time of whole seconds
-_FRACTIONS = ("ms", "msec", "millisecond", "milliseconds", "millisekunden")
 
 
 @dataclass(frozen=True)
@@ -125,6 +108,8 @@ class ColumnPlan:
         Position of a column of dates that goes with a time of day.
     fraction : int or None
         Position of a column of milliseconds that goes with whole seconds.
+    unused : tuple of int
+        Positions of further columns that hold dates.
     beside : tuple of int
         Positions of further columns that must hold the same times: one beside each channel.
     cycle : int or None
@@ -142,6 +127,7 @@ class ColumnPlan:
     time_unit: str
     date: int | None
     fraction: int | None
+    unused: tuple[int, ...]
     beside: tuple[int, ...]
     cycle: int | None
     columns: tuple[Column, ...]
@@ -150,7 +136,7 @@ class ColumnPlan:
     notes: tuple[str, ...] = ()
 
 
-def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
+def plan(headings: Sequence[str], mapping: Mapping, source: str, kinds: Kinds) -> ColumnPlan:
     """Decide which columns are read, and as what.
 
     Parameters
@@ -160,6 +146,8 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     mapping : Mapping
     source : str
         The file, for messages.
+    kinds : callable
+        Tells what the cells of a column hold.
 
     Raises
     ------
@@ -171,14 +159,14 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
     """
     meanings = _understand_all(headings, mapping, source)
     try:
-        time, date, notes = _find_time(headings, meanings, mapping, source)
+        time, date, fraction, unused, told = find_time(headings, meanings, mapping, source, kinds)
     except RecordingError:
         _refuse_twins(headings, mapping, source)
         raise
-    twins = [k for k, heading in enumerate(headings) if heading == headings[time] and k != time]
+    notes = [*told]
+    twins = [k for k, heading in enumerate(headings) if heading and heading == headings[time] and k != time]
     beside = () if mapping.time.column else tuple(twins)
     _refuse_twins(headings, mapping, source, headings[time] if beside else "")
-    fraction = None if mapping.time.column else _find_fraction(headings, time)
     cycle = _find_cycle(headings, mapping, source)
     columns: list[Column] = []
     tables: dict[int, str] = {}
@@ -187,7 +175,7 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
         place = rule.column or name
         if rule.role == "ignore" and isinstance(place, str) and place not in headings:
             continue
-        index = _position(place, headings, f"[columns.{name}]", source)
+        index = find_position(place, headings, f"[columns.{name}]", source)
         heading = headings[index]
         ignored.add(index)
         if rule.role == "ignore":
@@ -213,11 +201,14 @@ def plan(headings: Sequence[str], mapping: Mapping, source: str) -> ColumnPlan:
         left_out = [k for k, h in enumerate(headings) if h and k not in ignored]
     _check_names(columns, headings, source)
     columns.sort(key=lambda c: c.index)
-    time_unit, note = _time_unit(headings[time], meanings[time], mapping, source)
+    is_stamp = kinds(time) in ("date", "clock", "passed", "stamp")
+    # what the cells hold goes before what a heading says
+    said = None if is_stamp else meanings[time]
+    time_unit, note = _time_unit(headings[time], said, mapping, source)
     notes.extend([note] if note else [])
     aliases = _aliases(columns, headings, meanings)
     found = tuple(columns), tuple(left_out), aliases, tuple(notes)
-    return ColumnPlan(time, time_unit, date, fraction, beside, cycle, *found)
+    return ColumnPlan(time, time_unit, date, fraction, unused, beside, cycle, *found)
 
 
 def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -> tuple[Unit, str]:
@@ -262,49 +253,6 @@ def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> l
     return meanings
 
 
-def _find_time(
-    headings: Sequence[str], meanings: Sequence[Meaning | None], mapping: Mapping, source: str
-) -> tuple[int, int | None, list[str]]:
-    """Find the time column, and the column of dates where the time column holds only a time of day."""
-    if mapping.time.column:
-        date = _position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
-        return _position(mapping.time.column, headings, "[time]", source), date, []
-    timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
-    # of two columns of one name the first is meant
-    plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
-    named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
-    clear = [k for k in named if timed[k].base != "T"]  # T_s may be the temperature of a surface
-    if clear:
-        return clear[0], None, []
-    date = next((plain[name] for name in _DATES if name in plain), None)
-    clock = next((plain[name] for name in _CLOCKS if name in plain), None)
-    if date is not None and clock is not None:
-        return clock, date, []
-    names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
-    bare = [plain[name] for name in names if name not in _NEEDS_UNIT]
-    if bare or named:
-        return [*bare, *named][0], None, []
-    if len(timed) == 1:
-        index = next(iter(timed))
-        return index, None, [f"{headings[index]!r} is taken as the time"]
-    raise RecordingError(
-        f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
-        'time_h, timestamp) in the heading line, or give a mapping with [time] column = "..." and unit = "s"'
-    )
-
-
-def _find_fraction(headings: Sequence[str], time: int) -> int | None:
-    """Find a column of milliseconds next to the time."""
-    after = time + 1
-    return after if after < len(headings) and _bare_name(headings[after]) in _FRACTIONS else None
-
-
-def _bare_name(heading: str) -> str:
-    """Return a heading in small letters without whatever stands in brackets."""
-    found = BRACKETS.fullmatch(heading.strip())
-    return plain_name(found["base"] if found else heading)
-
-
 def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: str) -> tuple[str, str]:
     """Return the unit of time, the mapping's before the heading's, and a note where the two differ."""
     given = mapping.time.unit or ("timestamp" if mapping.time.format else "")
@@ -323,10 +271,10 @@ def _time_unit(heading: str, meaning: Meaning | None, mapping: Mapping, source: 
 
 def _find_cycle(headings: Sequence[str], mapping: Mapping, source: str) -> int | None:
     if mapping.cycles.column:
-        return _position(mapping.cycles.column, headings, "[cycles]", source)
+        return find_position(mapping.cycles.column, headings, "[cycles]", source)
     for name, rule in mapping.columns.items():
         if rule.role == "cycle":
-            return _position(rule.column or name, headings, f"[columns.{name}]", source)
+            return find_position(rule.column or name, headings, f"[columns.{name}]", source)
     mapped = _mapped(mapping)
     return next((k for k, h in enumerate(headings) if h.casefold() == "cycle" and h not in mapped), None)
 
@@ -368,18 +316,6 @@ def _numbered(heading: str, *places: int) -> dict[str, dict[str, object]]:
     suffix = meaning.name.removeprefix("_".join(meaning.base.split()))
     base = meaning.name.removesuffix(suffix)
     return {f"{base}_{k}{suffix}": {"column": place} for k, place in enumerate(places, start=1)}
-
-
-def _position(heading: Place, headings: Sequence[str], table: str, source: str) -> int:
-    if isinstance(heading, int):
-        if 1 <= heading <= len(headings):
-            return heading - 1
-        raise RecordingError(f"{source}: mapping {table}: there are {len(headings)} columns, and no number {heading}")
-    if heading in headings:
-        return list(headings).index(heading)
-    near = get_close_matches(heading, headings, n=3, cutoff=0.5)
-    hint = f"the nearest are {', '.join(near)}" if near else f"there are {', '.join(h for h in headings if h)}"
-    raise RecordingError(f"{source}: mapping {table}: the file has no column {heading!r}; {hint}")
 
 
 def _check_names(columns: Sequence[Column], headings: Sequence[str], source: str) -> None:

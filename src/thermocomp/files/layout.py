@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from thermocomp.core.headings import BRACKETS, is_time_name, is_understood
+from thermocomp.core.headings import BRACKETS, find_date_order, is_foreign_unit, is_time_name, is_understood
 from thermocomp.core.units import is_unit
 from thermocomp.files.numbers import is_filler, is_number_like
 
@@ -19,8 +19,14 @@ _TIME = re.compile(
 _LONGEST = 60
 #: share of the columns of numbers that have one in a row of the table
 _ROW = 0.5
-#: what stands for no unit in a row of units
-_NO_UNIT = frozenset(("", "-", "--", "1"))
+#: what stands for no unit in a row of units, in small letters: of numbers that have none, and before the row
+_NO_UNIT = frozenset(
+    (
+        *("", "-", "--", "---", "1", "n/a", "na", "none", "unitless", "ohne", "rn", "no", "nr", "#", "count", "index"),
+        *("unit", "units", "einheit", "einheiten", "unité", "unités", "unità", "unidad", "unidades", "eenheid"),
+        *("jednotka", "jednostka", "enhet", "enhed", "单位", "単位"),
+    )
+)
 #: text rows between the headings and the first row of numbers
 _MOST_BETWEEN = 12
 #: rows at the end of a file that may be none of its table
@@ -63,22 +69,32 @@ def find_layout(rows: Sequence[Sequence[str]]) -> Layout | None:
     if len(rows) < 2:
         return None
     # a preamble is over in the later half
-    width, columns = find_columns(rows[len(rows) // 2 :])
+    later = rows[len(rows) // 2 :]
+    width, columns = find_columns(later)
+    numbers = [k for k in columns if _holds_numbers(later, k)]
     is_row = [_is_row(row, columns) for row in rows]
     # a row of the numbers of channels, say, is no row of the table: units follow it
-    labels = [k + 1 < len(rows) and _is_units(rows[k + 1]) for k in range(len(rows))]
+    is_units = [_is_units(row, numbers) for row in rows]
+    labels = [*is_units[1:], False]
     for begin in range(1, len(rows)):
         if not is_row[begin] or labels[begin]:
             continue
         first = begin
-        while first and begin - first < _MOST_BETWEEN and _is_text(rows[first - 1], width):
+        while first and begin - first < _MOST_BETWEEN:
             above = rows[first - 1]
+            if not any(map(str.strip, above)) and not any(map(_names_time, rows[first:begin])):
+                first -= 1  # an empty row between the headings and the table
+                continue
+            if not _is_text(above, width):
+                break
             if any(k < len(above) and _is_value(above[k]) for k in columns) and not labels[first - 1]:
                 break  # perhaps a row of the table with words in it, which is not passed over
             first -= 1
         block = range(first, begin)
-        units = [k for k in block if _is_units(rows[k])]
+        units = [k for k in block if is_units[k]]
         names = [k for k in block if k not in units and _is_heading(rows[k])]
+        if not names and units and _names_time(rows[units[0]]):  # headings that are units: Time, rpm, um
+            names = [units.pop(0)]
         if names:
             said = {k: sum(is_time_name(cell) or is_understood(cell) for cell in rows[k]) for k in names}
             known = sorted((k for k in names if said[k]), key=lambda k: -said[k])  # of as many the first
@@ -161,13 +177,36 @@ def tell_rows(numbers: Sequence[int], word: str) -> str:
     return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
 
 
-def join_units(headings: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Put the units of a row into the headings above them, where these have none."""
+def join_units(headings: Sequence[str], units: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Put the units of a row into the headings above them, where these have none.
+
+    What a column holds decides: dates, times of day and words have no unit, whatever stands there (``Unit``,
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. In the first column may stand what the row is.
+
+    Parameters
+    ----------
+    headings, units : sequence of str
+    rows : sequence of sequence of str
+        Cells of the first rows of the table.
+
+    Returns
+    -------
+    list of str
+    """
+    said = [_bare(unit) for unit in units]
     found = []
     for k, heading in enumerate(headings):
-        unit = units[k].strip().strip("[]()").strip() if k < len(units) else ""
-        bare = unit in _NO_UNIT or is_time_name(unit) or not heading or BRACKETS.fullmatch(heading)
-        found.append(heading if bare else f"{heading} [{unit}]")
+        unit = said[k] if k < len(said) else ""
+        known = is_unit(unit) or is_foreign_unit(unit)
+        cell = next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "")
+        if is_stamp(cell):
+            fits = bool(find_date_order(unit))
+        elif k == 0 or is_time_name(heading) or (cell and not is_number_like(cell)):
+            fits = known
+        else:
+            fits = known or not is_time_name(unit)
+        fits = fits and unit.casefold().rstrip(".:") not in _NO_UNIT
+        found.append(f"{heading} [{unit}]" if fits and heading and not BRACKETS.fullmatch(heading) else heading)
     return found
 
 
@@ -221,10 +260,26 @@ def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
     return not values or (not timed and (counted or (len(row) < width and columns[0] in words)))
 
 
-def _is_units(row: Sequence[str]) -> bool:
-    """Return whether most of a row's filled cells are units."""
-    filled = [cell.strip().strip("[]()").strip() for cell in row if cell.strip() not in _NO_UNIT]
-    return bool(filled) and 2 * sum(map(is_unit, filled)) > len(filled)
+def _is_units(row: Sequence[str], numbers: Sequence[int]) -> bool:
+    """Return whether most of what stands over columns of numbers is a unit."""
+    over = [row[k] for k in numbers if k < len(row)] if numbers else row
+    filled = [unit for unit in map(_bare, over) if unit.casefold().rstrip(".:") not in _NO_UNIT]
+    known = sum(map(is_unit, filled))
+    return known > 0 and 2 * (known + sum(is_foreign_unit(u) and not is_unit(u) for u in filled)) > len(filled)
+
+
+def _bare(unit: str) -> str:
+    return unit.strip().strip("[]()").strip()
+
+
+def _holds_numbers(rows: Sequence[Sequence[str]], column: int) -> bool:
+    """Return whether most values of a column are numbers, no dates or times of day."""
+    values = [row[column] for row in rows if column < len(row) and _is_value(row[column])]
+    return 2 * sum(map(is_number_like, values)) > len(values)
+
+
+def _names_time(row: Sequence[str]) -> bool:
+    return any(map(is_time_name, row))
 
 
 def _count_filled(row: Sequence[str], columns: Sequence[int]) -> int:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import tomlkit
 from tomlkit.items import Table
 
-from thermocomp.core.exceptions import InputError, RecordingError, Remedy, UnitError
+from thermocomp.core.exceptions import InputError, RecordingError, Remedy, TwoReadingsError, UnitError
 from thermocomp.files.guesses import guess_columns, understand_or_none
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, check_content
 from thermocomp.files.recordings import open_table, read
@@ -45,11 +45,14 @@ class Question:
         Parts of a mapping, the likeliest first.
     severity : {'error', 'column', 'trouble', 'warning', 'info'}
         What it is about: the file cannot be read, a column is left out, or something that `check` finds.
+    may_guess : bool
+        False: how long the recording took depends on the answer.
     """
 
     text: str
     options: tuple[Remedy, ...]
     severity: str
+    may_guess: bool = True
 
     @property
     def others(self) -> tuple[str, ...]:
@@ -62,7 +65,12 @@ Decide = Callable[[Question], Remedy | None]
 
 
 def take_best(question: Question) -> Remedy | None:
-    """Decide for the likeliest, but leave alone what is no trouble, and move no values: that takes who was there."""
+    """Decide for the likeliest, but leave alone what is no trouble, and move no values: that takes who was there.
+
+    Nor is a time decided for where another one is as likely.
+    """
+    if not question.may_guess:
+        return None
     best = question.options[0]
     moves = any(step["do"] in ("shift", "rezero", "swap") for step in best.get("clean", ()))
     return None if moves or question.severity in ("warning", "info") else best
@@ -287,7 +295,8 @@ class _Dialogue:
             except (RecordingError, UnitError) as e:
                 if not e.remedies or (_skips(e.remedies[0]) and self._skipped() >= MOST_SKIPPED):
                     raise
-                if not self.ask(Question(str(e), e.remedies, "error")):
+                may_guess = not isinstance(e, TwoReadingsError)
+                if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
                     raise
         return action()
 
@@ -309,9 +318,17 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
     except InputError as e:
         if not dialogue.decided or any(map(_skips, e.remedies[:1])):
             return ""
+        if isinstance(e, TwoReadingsError):
+            return _offer_choice(dialogue.draft.text, e.remedies, name)
         how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
     other = "".join(f"\n# or: {way}" for q, _ in dialogue.decided for way in q.others)
     return f"{how}, save it as {name} and give it with --mapping {name}:\n\n{dialogue.draft.text.strip()}{other}"
+
+
+def _offer_choice(text: str, remedies: Sequence[Remedy], name: str) -> str:
+    """Return words that offer what somebody has to choose from."""
+    ways = "\n# or:\n".join(re.sub(r"^", "# ", to_toml(way), flags=re.MULTILINE) for way in remedies)
+    return f"choose one, save it as {name} without the # and give it with --mapping {name}:\n\n{text}{ways}"
 
 
 def _file_name(path: Path) -> str:

@@ -22,6 +22,7 @@ from thermocomp.files.tables import (
     clean_heading,
     convert_all,
     first_is_number,
+    first_texts,
 )
 
 if TYPE_CHECKING:
@@ -75,6 +76,11 @@ class ParquetTable:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
         found = self._first_cells.get(column)
         return column not in self.others if found is None else first_is_number(found, empty=empty)
+
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column; see `thermocomp.files.tables.FileTable.head`."""
+        found = self._first_cells.get(column)
+        return [] if found is None else first_texts(found)
 
     @cached_property
     def _first_cells(self) -> dict[int, "pd.Series[Any]"]:

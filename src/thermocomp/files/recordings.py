@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime, timedelta
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from pydantic import ValidationError
 from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.headings import understand
+from thermocomp.files.cellkinds import find_kind
 from thermocomp.files.columns import Column, ColumnPlan, plan
+from thermocomp.files.datecheck import check_dates
 from thermocomp.files.guesses import guess
 from thermocomp.files.leftout import refuse_nameless, why_left_out
 from thermocomp.files.limits import Limits, check_file
@@ -112,7 +115,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         mapping = mapping.over(described)
         notes.extend(note)
     with _guessing(table, mapping):
-        columns = plan(table.headings, mapping, str(source))
+        columns = plan(table.headings, mapping, str(source), cache(lambda k: find_kind(table.head(k))))
     notes.extend(columns.notes)
     is_stamp = columns.time_unit == "timestamp" or not (columns.time_unit or table.is_number(columns.time))
     numbers = [c.index for c in columns.columns]
@@ -121,11 +124,14 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         numbers.append(columns.fraction)
     times = [columns.time, *columns.beside]
     numbers += [] if is_stamp else times
-    texts = [k for k in (*(times if is_stamp else ()), columns.date, columns.cycle, *more.values()) if k is not None]
+    maybe = (*(times if is_stamp else ()), columns.date, *columns.unused, columns.cycle, *more.values())
+    texts = [k for k in maybe if k is not None]
     cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
     notes.extend(told)
     time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     notes.extend(told)
+    if not start or columns.date is not None:
+        notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp))
     data, changed = {}, list[str]()
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)

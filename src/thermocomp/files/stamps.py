@@ -7,8 +7,11 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.headings import find_date_order
+from thermocomp.files.dateorder import Choice, IntArray, find_longest_step, find_order, rises
 
 _CHUNK = 100_000
+#: steps of rows that only a wrong order makes [d]: of a day and month, of a day and year
+_MONTH, _YEAR = 26, 300
 _DATE = (
     r"'?(?P<a>\d{1,4}|[^\W\d_]{3,9})(?P<sep>[./-]|\.? )(?P<b>\d{1,2}|[^\W\d_]{3,9})(?P<sep2>[./-]|[.,]? )(?P<c>\d{1,4})"
 )
@@ -53,23 +56,36 @@ class Parsed(NamedTuple):
 
 
 class AmbiguousDatesError(ValueError):
-    """Dates can be read in two ways.
+    """Dates can be read in several ways.
 
     Parameters
     ----------
-    formats : list of str
-        In the letters of `datetime.strptime`.
-    orders : str
-        In words.
+    readings : dict of str to Series of Timestamp
+        By the format in the letters of `datetime.strptime`, the likeliest first.
+    orders : list of str
+        In words, of each.
     """
 
-    def __init__(self, formats: list[str], orders: str) -> None:
-        super().__init__(orders)
-        self.formats = formats
+    def __init__(self, readings: "dict[str, pd.Series[pd.Timestamp]]", orders: list[str]) -> None:
+        super().__init__(" or ".join(orders))
+        self.readings = readings
         self.orders = orders
 
+    def differ(self) -> bool:
+        """Return whether the time between any two rows depends on the order."""
+        first, *others = (np.diff(_instants(stamps)) for stamps in self.readings.values())
+        return any((first != other).any() for other in others)
 
-def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parsed | None:
+    def tell(self) -> str:
+        """Return from when to when the rows go in each order, and how long, in words."""
+        told = []
+        for order, stamps in zip(self.orders, self.readings.values(), strict=True):
+            begin, end = stamps.iloc[0].tz_localize(None), stamps.iloc[-1].tz_localize(None)
+            told.append(f"{order}: from {begin} to {end}, {(end - begin).total_seconds() / 3600:.2f} h")
+        return "; ".join(told)
+
+
+def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     """Read timestamps whose form is not known beforehand.
 
     Parameters
@@ -77,8 +93,6 @@ def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parse
     text : Series of str
     heading : str
         May state the order of day, month and year.
-    rising : bool
-        No stamp may be before the one above it.
 
     Returns
     -------
@@ -88,7 +102,8 @@ def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parse
     Raises
     ------
     AmbiguousDatesError
-        Day, month and year can be told apart neither by their numbers nor by time that must rise.
+        Day, month and year can be told apart neither by their numbers nor by how the rows go on
+        (`thermocomp.files.dateorder.find_order`).
     """
     first = text.iloc[0].strip()
     if _ISO.fullmatch(first):
@@ -102,18 +117,22 @@ def parse_stamps(text: "pd.Series[Any]", heading: str, *, rising: bool) -> Parse
     notes: tuple[str, ...] = ()
     if len(orders) > 1 and stated in orders:
         orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading says",)
-    read = {order: parse(plain, _format(shape, order)) for order in orders}
+    read = {"dmy": parse(plain, _format(shape, "dmy"))} if _has_points(shape) and "dmy" in orders else {}
+    if not any(_is_one_stretch(stamps) for stamps in read.values()):
+        read |= {order: parse(plain, _format(shape, order)) for order in orders if order not in read}
     whole = [order for order, stamps in read.items() if stamps.notna().all()]
     if len(whole) > 1:
-        up = [o for o in whole if not rising or (np.diff(read[o].to_numpy(dtype="M8[ns]").view(np.int64)) >= 0).all()]
-        if len(up) != 1:
-            formats = [_shown_format(shape, order) for order in whole]
-            if "%p" in formats[0]:  # who writes AM and PM writes the month first, as a rule
-                formats.sort(key=lambda form: not form.startswith("%m"))
-            raise AmbiguousDatesError(formats, " or ".join(_WORDS[o] for o in whole))
-        notes = (f"the dates are {_WORDS[up[0]]}: otherwise time would not rise",)
-        whole = up
-    elif whole and len(orders) > 1:
+        choice = _choose(shape, {o: _instants(read[o]) for o in whole})
+        if not choice.order:
+            possible = [o for o in whole if rises(_instants(read[o]))] or whole
+            # who writes AM and PM writes the month first, as a rule
+            possible.sort(key=lambda o: not (shape["half"] and o == "mdy"))
+            asked = {_shown_format(shape, o): read[o] for o in possible}
+            raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible])
+        if choice.why:
+            notes = (f"the dates are {_WORDS[choice.order]}: {choice.why}",)
+        whole = [choice.order]
+    elif whole and len(orders) > 1 and not (_has_points(shape) and whole == ["dmy"]):
         notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is none otherwise",)
     best = whole[0] if whole else max(orders, key=lambda o: int(read[o].notna().sum()))
     if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
@@ -131,6 +150,19 @@ def parse(text: "pd.Series[Any]", form: str) -> "pd.Series[pd.Timestamp]":
         other = form.replace("%S.%f", "%S") if "%S.%f" in form else form.replace("%S", "%S.%f")
         stamps = stamps.fillna(pd.to_datetime(text, format=other, utc=True, errors="coerce"))
     return stamps
+
+
+def read_days(text: "pd.Series[Any]") -> list[IntArray]:
+    """Return the days on which stamps may be, counted from 1970, under each order in which all are dates."""
+    plain = text.str.strip()
+    if _ISO.fullmatch(plain.iloc[0]):
+        read = [parse(plain, "ISO8601")]
+    elif (shape := _STAMP.fullmatch(plain.iloc[0])) is not None and not shape["clock"]:
+        plain = _simplify(text, shape)
+        read = [parse(plain, _format(shape, order)) for order in _orders(shape)]
+    else:
+        return []
+    return [_instants(stamps) // 86_400_000_000_000 for stamps in read if stamps.notna().all()]
 
 
 def _parsed(stamps: "pd.Series[pd.Timestamp]", first: str, form: str, notes: tuple[str, ...]) -> Parsed:
@@ -158,6 +190,38 @@ def _simplify(text: "pd.Series[Any]", shape: re.Match[str]) -> "pd.Series[Any]":
     return plain
 
 
+def _has_points(shape: re.Match[str]) -> bool:
+    return shape["sep"].startswith(".") and shape["a"].isdigit() and shape["b"].isdigit() and len(shape["a"]) < 3
+
+
+def _is_one_stretch(stamps: "pd.Series[pd.Timestamp]") -> bool:
+    """Return whether all are dates and rise without a gap that a wrong order would make."""
+    return bool(stamps.notna().all()) and rises(t := _instants(stamps)) and find_longest_step(t) < _MONTH
+
+
+def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> Choice:
+    """Choose the order of dates that fit several."""
+    choice = find_order(read)
+    if not _has_points(shape) or "dmy" not in read:
+        return choice
+    day_first = Choice("dmy", "", "")  # as wherever dates are written with points
+    if choice.order == "dmy":
+        return day_first
+    if choice.by == "going on" or (choice.by == "days in a row" and choice.order == "ymd"):
+        return choice
+    year_first = read.get("ymd")
+    if year_first is None or not rises(year_first):
+        return day_first
+    longest, other = find_longest_step(read["dmy"]), find_longest_step(year_first)
+    if not rises(read["dmy"]):
+        return choice if choice.order == "ymd" and other < _MONTH else day_first
+    return Choice("", "", "") if longest >= _YEAR and longest > other else day_first
+
+
+def _instants(stamps: "pd.Series[pd.Timestamp]") -> IntArray:
+    return stamps.to_numpy(dtype="M8[ns]").view(np.int64)
+
+
 def _month(found: re.Match[str]) -> str:
     return _MONTHS.get(found[0].casefold(), found[0])
 
@@ -168,8 +232,8 @@ def _orders(shape: re.Match[str]) -> list[str]:
         return ["ymd"]
     if not a.isdigit():
         return ["mdy"]
-    if not b.isdigit() or shape["sep"] == ".":
-        return ["dmy"]  # with points the day comes first, wherever they are used
+    if not b.isdigit():
+        return ["dmy"]
     return ["dmy", "mdy"] if len(c) == 4 else ["dmy", "mdy", "ymd"]
 
 

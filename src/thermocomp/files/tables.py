@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float64]
 
 #: before thermocomp's own description of the columns, as a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
+#: cells that tell what a column holds
+_HEAD = 100
 #: places of cells that are listed
 _MOST_TOLD = 40
 _UNGROUPED = re.compile(r"[-+]?\d{4}")
@@ -46,6 +48,9 @@ class FileTable(Protocol):
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
+
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column, as texts; none of one that holds numbers by its type."""
 
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read some columns, as float64 and as they are, and say what was made of their cells.
@@ -93,6 +98,10 @@ class FrameTable:
         """Return whether the first filled cell of a column is a number; `empty` if there is none."""
         return first_is_number(self.frame[column], empty=empty)
 
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column; see `FileTable.head`."""
+        return first_texts(self.frame[column])
+
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `FileTable.load`."""
         data = {k: self.frame[k] for k in texts}
@@ -119,6 +128,13 @@ def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
     filled = (str(cell) for cell in cells.dropna())
     first = next((cell for cell in filled if not is_filler(cell)), None)
     return empty if first is None else is_number_like(first)
+
+
+def first_texts(cells: "pd.Series[Any]") -> list[str]:
+    """Return the first cells of a column that hold something, as texts; none of a column of numbers."""
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        return []
+    return [text for text in map(str, cells.iloc[:_HEAD].dropna()) if not is_filler(text)]
 
 
 def as_floats(cells: "pd.Series[Any]") -> FloatArray:

@@ -85,6 +85,10 @@ class CsvTable:
         first = next((c for c in cells if not is_filler(c)), None)
         return empty if first is None else is_number_like(first)
 
+    def head(self, column: int) -> list[str]:
+        """Return the first filled cells of a column; see `thermocomp.files.tables.FileTable.head`."""
+        return [row[column] for row in self.sample if column < len(row) and not is_filler(row[column])]
+
     def load(self, numbers: Sequence[int], texts: Sequence[int]) -> tuple[pd.DataFrame, tuple[str, ...]]:
         """Read columns; see `thermocomp.files.tables.FileTable.load`."""
         signs = Signs()
@@ -201,7 +205,7 @@ def open_csv(path: Path, options: ReadOptions, limits: Limits = Limits()) -> Csv
     headings += [""] * (body.width - len(headings))
     check_headings(path, headings, body.n_rows, limits)
     if layout.units != layout.heading:
-        headings = join_units(headings, split(first[layout.units][1]))
+        headings = join_units(headings, split(first[layout.units][1]), rows)
     headings, named = name_stamps(headings, rows)
     if body.odd and not options.encoding:
         told += (f"written in {encoding}, not in UTF-8",)

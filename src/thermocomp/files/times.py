@@ -1,6 +1,5 @@
 """Times of a recording: numbers with a unit, timestamps, or times of day."""
 
-import re
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -8,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
+from thermocomp.files.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
 from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.stamps import AmbiguousDatesError, Parsed, parse, parse_stamps
@@ -17,11 +17,6 @@ from thermocomp.files.tables import FileTable, skip_row, tell_places
 
 FloatArray = NDArray[np.float64]
 
-#: a time of day, or one that has passed: hh:mm:ss beyond 24 h, with days before it
-_CLOCK = re.compile(
-    r"(?:(?P<days>\d+)(?: days?,? |\.))?(?P<hours>\d+):(?P<minutes>\d\d)(?::(?P<seconds>\d\d(?:[.,]\d+)?))?"
-)
-_HALF = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:\.\d+)?)? ?[AaPp]\.?[Mm]\.?")
 #: seconds since 1970 between the years 2000 and 2100, whole or in parts of a second
 _EPOCH = 946684800.0, 2240611200.0
 _PARTS = {1: "seconds", 1000: "milliseconds", 1000000: "microseconds", 1000000000: "nanoseconds"}
@@ -97,8 +92,9 @@ def read_times(
         )
     if is_stamp:
         if columns.date is not None:
-            shown = _date(cells[columns.date]) + " " + _clock(shown)
-        time, start, found = _read_stamps(shown, columns, mapping, table, source, rising=rising)
+            shown = plain_dates(cells[columns.date]) + " " + plain_clocks(shown)
+        time, start, found = _read_stamps(shown, columns, mapping, table, source)
+        _refuse_passed(time, start, cells, columns, mapping, table, source)
     else:
         raw = shown.to_numpy(dtype=np.float64)
         missing = np.flatnonzero(~np.isfinite(raw))
@@ -125,7 +121,7 @@ def read_times(
 
 
 def _read_stamps(
-    cells: "pd.Series[Any]", columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path, *, rising: bool
+    cells: "pd.Series[Any]", columns: ColumnPlan, mapping: Mapping, table: FileTable, source: Path
 ) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read timestamps, times of day, or durations; mixed offsets (summer time) are brought to one clock."""
     heading, wanted = table.headings[columns.time], mapping.time.format
@@ -137,7 +133,7 @@ def _read_stamps(
         return _seconds(cells - cells.iloc[0]), cells.iloc[0].isoformat(), ()
     text = cells.astype(str)
     first = text.iloc[0].strip()
-    if not wanted and columns.date is None and (_CLOCK.fullmatch(first) or _HALF.fullmatch(first)):
+    if not wanted and columns.date is None and (CLOCK.fullmatch(first) or HALF.fullmatch(first)):
         return _read_clock(text, table, source, heading)
     if wanted:
         begin = pd.to_datetime(text.iloc[:1], format=wanted, errors="coerce").iloc[0]
@@ -146,15 +142,17 @@ def _read_stamps(
     else:
         titles = [table.headings[k] for k in (columns.date, columns.time) if k is not None]
         try:
-            found = parse_stamps(text, titles[0], rising=rising)
+            found = parse_stamps(text, titles[0])
         except AmbiguousDatesError as e:
-            ways = " or ".join(f'format = "{form}"' for form in e.formats)
+            ways = " or ".join(f'format = "{form}"' for form in e.readings)
             place = {"column": heading, **({"date": titles[0]} if columns.date is not None else {})}
             where = ", ".join(f'{key} = "{title}"' for key, title in place.items())
-            raise RecordingError(
-                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e.orders}, and no row "
-                f"tells which; say how it is written in a mapping: [time] {where} and {ways}",
-                [{"time": {**place, "format": form}} for form in e.formats],
+            differ = e.differ()
+            raise (TwoReadingsError if differ else RecordingError)(
+                f"{source}: {table.place(0)}, column {titles[0]!r}: {first!r} can be read as {e}, and no row "
+                f"tells which{f' ({e.tell()})' if differ else ''}; say how it is written in a mapping: [time] {where} "
+                f"and {ways}",
+                [{"time": {**place, "format": form}} for form in e.readings],
             ) from e
     if found is None or pd.isna(found.stamps.iloc[0]):
         hint = f"does not fit the format {wanted!r}" if wanted else "is not an ISO timestamp"
@@ -179,10 +177,10 @@ def _read_clock(
 ) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read times of day, or times that have passed: neither says the day."""
     first = text.iloc[0].strip()
-    halves = _HALF.fullmatch(first) is not None
-    parts = text.str.strip().str.extract(_CLOCK)
+    halves = HALF.fullmatch(first) is not None
+    parts = text.str.strip().str.extract(CLOCK)
     if not halves and pd.isna(parts["seconds"].iloc[0]):
-        raise RecordingError(
+        raise TwoReadingsError(
             f"{source}: {table.place(0)}, column {heading!r}: {first!r} can be read as hours and minutes or as "
             f'minutes and seconds; say how it is written in a mapping: [time] column = "{heading}" and format = '
             '"%H:%M" or format = "%M:%S"',
@@ -194,7 +192,7 @@ def _read_clock(
         stamps = parse(upper, form.replace("%S", "%S.%f") if "." in first.upper().rstrip("M.PA ") else form)
         seconds = ((stamps - stamps.dt.normalize()).dt.total_seconds()).to_numpy(dtype=np.float64)
     else:
-        texts = parts["seconds"].str.replace(",", ".", regex=False)
+        texts = parts["seconds"].str.replace(r"[,:]", ".", regex=True)
         days, hours, minutes, rest = (
             pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64)
             for c in (parts["days"].fillna("0"), parts["hours"], parts["minutes"], texts)
@@ -296,6 +294,35 @@ def _refuse_falling(
     )
 
 
+def _refuse_passed(
+    time: FloatArray,
+    start: str,
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+) -> None:
+    """Refuse times that begin with zero and run on where the date changes: they passed, and are none of the day."""
+    if columns.date is None or mapping.time.format or not start:
+        return
+    dates, begin = cells[columns.date], pd.Timestamp(start)
+    changes = (dates != dates.shift()).to_numpy(dtype=np.bool_)[1:]
+    steps = np.diff(time)
+    usual = float(np.median(steps[~changes])) if not changes.all() else 0.0
+    more = steps - _DAY / 1e9
+    rows = np.flatnonzero(changes & (more > 0) & (more <= 2 * usual)) + 1
+    if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
+        heading, name = table.headings[columns.time], table.headings[columns.date]
+        raise TwoReadingsError(
+            f"{source}: {table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with zero, runs "
+            f"on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time that passed, "
+            f'leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = "ignore"; if '
+            "not, say how both are written: [time] column, date and format",
+            [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
+        )
+
+
 def _refuse_set_forward(
     time: FloatArray, steps: FloatArray, start: str, table: FileTable, source: Path, heading: str
 ) -> None:
@@ -327,16 +354,6 @@ def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[Float
 
 def _seconds(passed: "pd.Series[pd.Timedelta]") -> FloatArray:
     return np.asarray(passed.dt.total_seconds(), dtype=np.float64)
-
-
-def _date(cells: "pd.Series[Any]") -> "pd.Series[str]":
-    """Return dates, of which a spreadsheet may have made midnights."""
-    return cells.astype(str).str.strip().str.replace(r"[ T]00:00:00(?:\.0+)?$", "", regex=True)
-
-
-def _clock(cells: "pd.Series[Any]") -> "pd.Series[str]":
-    """Return times of day, to which a spreadsheet may have given the day from which it counts."""
-    return cells.astype(str).str.strip().str.replace(r"^1(?:899-12-3[01]|904-01-01)[ T]", "", regex=True)
 
 
 def _refuse_missing(table: FileTable, source: Path, row: int, heading: str) -> None:

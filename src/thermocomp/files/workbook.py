@@ -149,7 +149,8 @@ def _table(
     begin = layout.begin
     headings = [_text(cell).strip() for cell in first[layout.heading]]
     if layout.units != layout.heading:
-        headings = join_units(headings, [_text(cell) for cell in first[layout.units]])
+        units, *below = ([_text(cell) for cell in row] for row in (first[layout.units], *first[begin:]))
+        headings = join_units(headings, units, below)
     remarks = _count_remarks(first[begin:], list(tail)[-max(len(places) - begin, 1) :])
     columns = body.close(first[begin:])
     n_rows = len(places) - begin - remarks

@@ -1,0 +1,111 @@
+"""Dates that a file holds and that the time which was read does not know."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from thermocomp.core.exceptions import Remedy, TwoReadingsError
+from thermocomp.files.cellkinds import plain_dates
+from thermocomp.files.columns import ColumnPlan
+from thermocomp.files.mapping import Mapping
+from thermocomp.files.stamps import read_days
+from thermocomp.files.tables import FileTable
+from thermocomp.files.timecolumns import has_passed, is_ignored
+
+FloatArray = NDArray[np.float64]
+
+_DAY = 86_400.0
+#: clocks are set, for summer time too [s]
+_SET = 5400.0
+
+
+def check_dates(
+    time: FloatArray,
+    cells: pd.DataFrame,
+    columns: ColumnPlan,
+    mapping: Mapping,
+    table: FileTable,
+    source: Path,
+    *,
+    is_stamp: bool,
+) -> tuple[str, ...]:
+    """Refuse times without a date of their own that do not go with the dates of another column.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        Since the first row [s].
+    cells : DataFrame
+        With the columns of dates that were not used, named by position.
+    columns : ColumnPlan
+    mapping : Mapping
+    table : FileTable
+        That the cells come from.
+    source : Path
+        The file.
+    is_stamp : bool
+        The times are no numbers.
+
+    Returns
+    -------
+    tuple of str
+        Notes on dates that the mapping leaves out.
+
+    Raises
+    ------
+    TwoReadingsError
+        Tests of several days would become one.
+    """
+    notes = []
+    heading = table.headings[columns.time]
+    # a number has no date even where the mapping names the column of one
+    more = (columns.date,) if columns.date is not None and not is_stamp else ()
+    for k in (*columns.unused, *more):
+        name, ignored = table.headings[k] or k + 1, is_ignored(table.headings[k], k, mapping)
+        row = _find_contradiction(time, cells[k])
+        if row is None:
+            if is_stamp and columns.date is None and not has_passed(heading) and not ignored:
+                notes.append(
+                    f"left out: {name!r} holds dates, and {heading!r} only a time of day: name it in a mapping, "
+                    f"[time] column = {_quoted(heading)} and date = {_quoted(name)}"
+                )
+            continue
+        said = (
+            f"{name!r} says {cells[k].iloc[row]} in {table.place(row)}, which is not the day {time[row] / 3600:.2f} h "
+            f"after {cells[k].dropna().iloc[0]}, as the time in {heading!r} says"
+        )
+        if ignored:
+            notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")
+            continue
+        use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if mapping.time.format else {})}}
+        mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
+        raise TwoReadingsError(
+            f"{source}: column {said}; if it holds the dates of the rows, "
+            f'{mend if is_stamp else "split the file into tests"}; if not, leave it out, role = "ignore"',
+            [*([use] if is_stamp else []), {"columns": {str(name): {"column": name, "role": "ignore"}}}],
+        )
+    return tuple(notes)
+
+
+def _quoted(place: str | int) -> str:
+    return f'"{place}"' if isinstance(place, str) else str(place)
+
+
+def _find_contradiction(time: FloatArray, cells: "pd.Series[Any]") -> int | None:
+    """Return the first row whose date no time of day at the first row explains; None if there is none."""
+    there = np.flatnonzero(cells.notna())
+    texts = plain_dates(cells.iloc[there])
+    if texts.nunique() < 2:
+        return None  # a date of the test, or of the sensor
+    t, found = time[there], []
+    for days in read_days(texts):
+        since = (days - days[0]) * _DAY - (t - t[0])
+        # what the first row may be after midnight at least, and at most
+        wrong = np.flatnonzero(np.maximum.accumulate(since) >= np.minimum.accumulate(since) + _DAY + _SET)
+        if not wrong.size:
+            return None
+        found.append(int(there[wrong[0]]))
+    return max(found, default=int(there[np.flatnonzero(texts != texts.iloc[0])[0]]))

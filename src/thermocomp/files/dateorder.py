@@ -1,0 +1,100 @@
+"""In which order day, month and year stand: where dates alone do not tell, a recording that goes on does."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int64]
+
+_SECOND = 1_000_000_000
+_DAY = 86_400 * _SECOND
+#: rows so near to each other belong together, however often the others come; those further apart may not
+_NEAR, _FAR = 1800 * _SECOND, 6 * 3600 * _SECOND
+#: a step in days that only a wrong order makes: a month is 28 days at least, and a row may come early on its last one
+_MONTH = 26
+#: changes of the date that show days in a row, and days from one to the next: a weekend may lie between
+_CHANGES, _PAUSE = 3, 4
+
+
+class Choice(NamedTuple):
+    """An order that was chosen."""
+
+    order: str  #: empty if several are possible
+    by: Literal["rising", "going on", "days in a row", ""]
+    why: str  #: what speaks against the others, in words
+
+
+def find_order(readings: Mapping[str, IntArray]) -> Choice:
+    """Choose the order in which rows go on.
+
+    Parameters
+    ----------
+    readings : mapping of str to ndarray of shape (n_rows,)
+        Instants under each order [ns], all of which are dates.
+
+    Returns
+    -------
+    Choice
+
+    Notes
+    -----
+    An order is taken if it is the only one
+
+    1. in which time rises; else
+    2. in which a row follows on the one before across a change of the date: at most half an hour or two usual steps
+       later, and six hours, where every other order puts about a month or more between them; else
+    3. in which at least four dates follow each other, one to four days apart, where every other order puts about a
+       month or more between each and the next. Where these would be the first days of months, and a date has several
+       rows, both are possible.
+
+    Tests on two or three days with a pause between them may be a month apart as well: nothing tells.
+    """
+    begun, *others = readings.values()
+    if all(np.array_equal(begun, t) for t in others):
+        return Choice(next(iter(readings)), "", "")  # the fifth of May
+    rising = [order for order, t in readings.items() if rises(t)]
+    if len(rising) == 1:
+        return Choice(rising[0], "rising", "otherwise time would not rise")
+    tried = {order: readings[order] for order in rising or readings}
+    steps = {order: np.diff(t) for order, t in tried.items()}
+    first, *more = steps.values()
+    alike = np.logical_and.reduce([first == other for other in more])
+    usual = first[alike & (first > 0)]
+    near = min(max(_NEAR, 2 * int(np.median(usual)) if usual.size else 0), _FAR)
+    going_on = {order: ~alike & (s >= 0) & (s <= near) for order, s in steps.items()}
+    for order, follows in going_on.items():
+        rest = [o for o in steps if o != order]
+        apart = [follows & (np.abs(steps[o]) >= _MONTH * _DAY) for o in rest]
+        if all(a.any() for a in apart) and not any((going_on[o] & ~follows).any() for o in rest):
+            days = min(int(np.abs(steps[o])[a].max()) for o, a in zip(rest, apart, strict=True)) // _DAY
+            why = f"otherwise a gap of {days} days would lie between two rows that follow each other"
+            return Choice(order, "going on", why)
+    for order, t in tried.items():
+        if all(_are_days_in_a_row(t, other) for o, other in tried.items() if o != order):
+            why = "so they are days in a row, otherwise each would be a month or more after the one before"
+            return Choice(order, "days in a row", why)
+    return Choice("", "", "")
+
+
+def rises(t: IntArray) -> bool:
+    """Return whether no instant is before the one above it."""
+    return bool((np.diff(t) >= 0).all())
+
+
+def find_longest_step(t: IntArray) -> float:
+    """Return the longest time between neighbouring rows, in days."""
+    return float(np.diff(t).max(initial=0)) / _DAY
+
+
+def _are_days_in_a_row(t: IntArray, other: IntArray) -> bool:
+    """Return whether dates follow each other by days, and by months in another order."""
+    day, far = t // _DAY, other // _DAY
+    changes = np.flatnonzero(np.diff(day))
+    passed, apart = np.diff(day)[changes], np.diff(far)[changes]
+    if len(changes) < _CHANGES or not ((passed >= 1) & (passed <= _PAUSE)).all() or not (apart >= _MONTH).all():
+        return False
+    months: NDArray[Any] = far.astype("M8[D]").astype("M8[M]")
+    firsts = bool((far.astype("M8[D]") == months.astype("M8[D]")).all())
+    return not (firsts and len(t) > len(changes) + 1)

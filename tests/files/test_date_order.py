@@ -1,0 +1,230 @@
+"""The order of day and month is that in which a recording goes on; where several do, it is asked for, never guessed."""
+
+from contextlib import suppress
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from thermocomp.cli.app import run
+from thermocomp.core.exceptions import InputError, TwoReadingsError
+from thermocomp.files.mapping import Mapping, TimeColumn
+from thermocomp.files.mending import read_or_offer
+from thermocomp.files.recordings import read
+from thermocomp.recording.recording import Recording
+
+#: how dates are written of which day and month cannot be told apart
+SLASHES = ("%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d/%m/%y", "%m/%d/%y", "%y/%m/%d", "%y-%m-%d")
+#: the last one nobody writes
+POINTS = ("%d.%m.%Y", "%d.%m.%y", "%y.%m.%d", "%m.%d.%Y")
+CLOCKS = (" %H:%M:%S", " %H:%M", " %I:%M:%S %p", ",%H:%M:%S")
+
+
+def series(begin: datetime, step: timedelta, count: int) -> list[datetime]:
+    return [begin + k * step for k in range(count)]
+
+
+def written(path: Path, instants: list[datetime], form: str) -> Path:
+    """Write a recording; a comma in the format parts date and time of day."""
+    heading = "Date,Time" if "," in form else "Timestamp"
+    rows = "".join(f"{t.strftime(form)},{20 + k % 40 / 10:.1f},{k % 40 / 5:.1f}\n" for k, t in enumerate(instants))
+    path.write_text(f"{heading},t1_C,z_um\n{rows}", encoding="utf-8")
+    return path
+
+
+def seconds(instants: list[datetime]) -> list[float]:
+    return [(t - instants[0]).total_seconds() for t in instants]
+
+
+def as_it_was(recording: Recording, instants: list[datetime]) -> None:
+    np.testing.assert_allclose(recording.time, seconds(instants), rtol=0, atol=1e-6)
+    assert recording.start == instants[0].isoformat()
+
+
+OVER_NIGHT = series(datetime(2024, 3, 5, 20, 20), timedelta(minutes=24), 60)
+#: five days in a row, eight hours each
+DAYS = [t for d in range(4, 9) for t in series(datetime(2024, 3, d, 8), timedelta(minutes=30), 17)]
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("form", [*SLASHES, *POINTS])
+def test_rows_that_go_on_over_midnight_tell_the_order(form: str, clock: str, tmp_path: Path) -> None:
+    as_it_was(read(written(tmp_path / "night.csv", OVER_NIGHT, form + clock)), OVER_NIGHT)
+
+
+@pytest.mark.parametrize("form", SLASHES)
+def test_days_in_a_row_tell_the_order(form: str, tmp_path: Path) -> None:
+    recording = read(written(tmp_path / "days.csv", DAYS, f"{form} %H:%M"))
+    as_it_was(recording, DAYS)
+    daily = series(datetime(2024, 2, 1, 7), timedelta(days=1), 12)
+    as_it_was(read(written(tmp_path / "daily.csv", daily, f"{form} %H:%M")), daily)
+
+
+@pytest.mark.parametrize("form", ["%d/%m/%Y", "%m/%d/%y"])
+def test_a_late_proof_is_one(form: str, tmp_path: Path) -> None:
+    """Two tests with a pause between them say nothing, but the second goes over midnight."""
+    instants = series(datetime(2024, 3, 5, 8), timedelta(minutes=10), 40)
+    instants += series(datetime(2024, 3, 7, 18), timedelta(minutes=10), 50)
+    recording = read(written(tmp_path / "late.csv", instants, f"{form} %H:%M"))
+    as_it_was(recording, instants)
+    assert any("a gap of 30 days would lie between two rows that follow each other" in n for n in recording.notes)
+
+
+def test_uneven_rows_and_a_short_pause_at_midnight_tell_it_too(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    passed = np.cumsum(rng.uniform(5, 1200, 200))
+    instants = [datetime(2024, 4, 9, 12) + timedelta(seconds=int(s)) for s in passed]
+    as_it_was(read(written(tmp_path / "uneven.csv", instants, "%m/%d/%Y %H:%M:%S")), instants)
+    paused = series(datetime(2024, 4, 9, 22), timedelta(seconds=1), 7000)
+    paused += series(datetime(2024, 4, 10, 0, 8), timedelta(seconds=1), 600)
+    as_it_was(read(written(tmp_path / "paused.csv", paused, "%d/%m/%Y %H:%M:%S")), paused)
+
+
+def two_days(path: Path, form: str = "%m/%d/%Y") -> Path:
+    days = [t for d in (5, 6) for t in series(datetime(2024, 3, d, 8), timedelta(minutes=30), 17)]
+    return written(path, days, f"{form} %H:%M")
+
+
+def test_two_days_with_a_pause_may_be_a_month_apart_and_are_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(TwoReadingsError) as caught:
+        read_or_offer(two_days(tmp_path / "two.csv"))
+    said = str(caught.value)
+    assert "day/month/year: from 2024-05-03 08:00:00 to 2024-06-03 16:00:00, 752.00 h" in said
+    assert "month/day/year: from 2024-03-05 08:00:00 to 2024-03-06 16:00:00, 32.00 h" in said
+    assert '[time] column = "Timestamp" and format = "%d/%m/%Y %H:%M" or format = "%m/%d/%Y %H:%M"' in said
+    (offer,) = caught.value.__notes__
+    assert offer.startswith("choose one, save it as two.toml")
+    lines = offer.split("\n\n")[1].splitlines()
+    assert all(line.startswith("# ") for line in lines)
+    assert '# format = "%m/%d/%Y %H:%M"' in lines
+
+
+@pytest.mark.parametrize("command", ["check", "map"])
+def test_no_command_guesses_how_long_a_recording_took(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, output = two_days(tmp_path / "two.csv"), tmp_path / "two.toml"
+    assert run([command, str(path), *(["--yes", "-o", str(output)] if command == "map" else [])]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert all(part in said for part in ("752.00 h", "32.00 h", "[time]"))
+    assert not output.exists()
+
+
+def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "short.csv"
+    path.write_text("Zeit,t1_C,z_um\n" + "".join(f"00:{k:02},20.{k},{k}\n" for k in range(30)), encoding="utf-8")
+    assert run(["map", str(path), "--yes"]) == 2
+    assert "hours and minutes or as minutes and seconds" in " ".join(capsys.readouterr().err.split())
+
+
+def test_what_changes_no_duration_is_taken_without_a_question(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = series(datetime(2024, 3, 5, 8), timedelta(minutes=10), 48)
+    path = written(tmp_path / "day.csv", day, "%d/%m/%Y %H:%M")
+    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row tells which; say how"):
+        read(path)
+    assert run(["map", str(path), "--yes"]) == 0
+    assert "%d/%m/%Y" in capsys.readouterr().out
+
+
+def test_a_question_without_a_likely_answer_has_none_beforehand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = iter(["", "2", *["0"] * 20])
+    monkeypatch.setattr("builtins.input", lambda: next(answers))
+    assert run(["map", str(two_days(tmp_path / "two.csv"))]) == 0
+    said = capsys.readouterr()
+    assert "want a number from 0 to 2" in said.err
+    assert "%m/%d/%Y" in said.out
+
+
+@pytest.mark.parametrize(
+    ("stamps", "asks"),
+    [
+        # automatic checks on the first of each month are four days of January otherwise
+        ([f"01/0{m}/2024 {h:02}:00" for m in range(5, 9) for h in (8, 9, 10)], True),
+        # a row on each is no recording of months
+        ([f"01/0{m}/2024 08:00" for m in range(5, 9)], False),
+        (["03/04/2024 08:00", "03/05/2024 08:00", "03/06/2024 08:00"], True),
+        (["24.05.03 08:00", "24.05.03 09:00", "24.05.06 08:00"], True),
+        (["19.01.01 06:00", "19.01.02 06:10", "19.02.02 06:20"], True),
+        (["05/05/2024 08:00", "05/05/2024 09:00", "06/06/2024 08:00"], False),
+        (["03.05.24 08:00", "03.05.24 09:00", "06.05.24 08:00"], False),
+        (["03.05.2024 08:00", "03.06.2024 08:00", "03.07.2024 08:00", "03.08.2024 08:00"], False),
+        (["24.12.31 23:50", "25.01.01 00:00", "25.01.01 00:10"], False),
+    ],
+)
+def test_nothing_is_read_that_may_be_otherwise(stamps: list[str], asks: bool, tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text("Time,t1_C\n" + "".join(f"{s},20.{k}\n" for k, s in enumerate(stamps)), encoding="utf-8")
+    if asks:
+        with pytest.raises(TwoReadingsError, match="can be read as"):
+            read(path)
+    else:
+        assert len(read(path)) == len(stamps)
+
+
+def test_points_put_the_day_first_unless_rows_go_on_otherwise(tmp_path: Path) -> None:
+    tests = [t for m in (5, 6) for t in series(datetime(2024, m, 3, 8), timedelta(minutes=30), 17)]
+    as_it_was(read(written(tmp_path / "points.csv", tests, "%d.%m.%Y %H:%M")), tests)
+
+
+def test_a_row_of_units_may_state_the_order(tmp_path: Path) -> None:
+    path = tmp_path / "units.csv"
+    rows = "".join(f"03/0{d}/2024,0{h}:00:00,20.{h},{h}\n" for d in (5, 6) for h in (7, 8, 9))
+    path.write_text("Date,Time,T1,Z\nmm/dd/yyyy,hh:mm:ss,degC,um\n" + rows, encoding="utf-8")
+    recording = read(path)
+    assert (recording.time[-1], recording.start) == (26 * 3600, "2024-03-05T07:00:00")
+
+
+def test_text_in_a_workbook_goes_on_too(tmp_path: Path) -> None:
+    path = tmp_path / "night.xlsx"
+    rows = [[f"{t:%m/%d/%Y}", f"{t:%H:%M:%S}", 20.0 + k / 9, k / 5] for k, t in enumerate(OVER_NIGHT)]
+    pd.DataFrame(rows, columns=["Date", "Time", "t1_C", "z_um"]).to_excel(path, index=False)
+    as_it_was(read(path), OVER_NIGHT)
+
+
+def test_a_clock_that_is_set_back_does_not_hide_the_order(tmp_path: Path) -> None:
+    night = [*series(datetime(2024, 11, 3, 0, 0), timedelta(minutes=10), 12)]
+    night += series(datetime(2024, 11, 3, 1, 0), timedelta(minutes=10), 150)
+    path = written(tmp_path / "autumn.csv", night, "%m/%d/%Y %H:%M")
+    with pytest.raises(InputError, match=r"the clock was set back \(daylight saving\).*\[time\] zone"):
+        read(path)
+    recording = read(path, Mapping(TimeColumn(zone="America/New_York")))
+    assert np.diff(recording.time).tolist() == [600.0] * (len(night) - 1)
+
+
+# -- whatever is written is read as it was, or asked for --------------------------------------------------------------
+
+
+@st.composite
+def drawn(draw: st.DrawFn) -> list[datetime]:
+    """Draw some tests on days of the first half of a year, hours to weeks apart."""
+    when = datetime(draw(st.integers(2019, 2031)), draw(st.integers(1, 12)), draw(st.integers(1, 28)))
+    when += timedelta(minutes=draw(st.integers(6 * 60, 20 * 60)))
+    step = draw(st.sampled_from((10, 60, 300, 600, 1800, 3600)))
+    uneven = draw(st.sampled_from((0, 0, step // 3)))
+    rng = np.random.default_rng(draw(st.integers(0, 99)))
+    found: list[datetime] = []
+    for _ in range(draw(st.integers(1, 5))):
+        for _ in range(draw(st.integers(2, 60))):
+            found.append(when)
+            when += timedelta(seconds=step + int(rng.integers(-uneven, uneven + 1)))
+        when += timedelta(minutes=draw(st.sampled_from((5, 14 * 60, 24 * 60, 3 * 24 * 60, 7 * 24 * 60, 31 * 24 * 60))))
+    return found
+
+
+@settings(deadline=None, max_examples=300)
+@given(drawn(), st.sampled_from((*SLASHES, *POINTS[:3])), st.sampled_from(CLOCKS))
+def test_no_duration_is_wrong(tmp_path_factory: pytest.TempPathFactory, found: list[datetime], f: str, c: str) -> None:
+    path = written(tmp_path_factory.getbasetemp() / "drawn.csv", found, f + c)
+    kept = [datetime.strptime(t.strftime(f + c), f + c) for t in found]  # to the minute, in some forms
+    with suppress(InputError):  # it is asked for
+        np.testing.assert_allclose(read(path).time, seconds(kept), rtol=0, atol=1e-6)

@@ -1,0 +1,263 @@
+"""A row of units below the headings: whatever it says of dates and times of day, what their cells hold decides."""
+
+from collections.abc import Sequence
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+
+from thermocomp.cli.app import run
+from thermocomp.core.exceptions import InputError, TwoReadingsError
+from thermocomp.files.mapping import Mapping, check_content
+from thermocomp.files.recordings import read
+from thermocomp.recording.quality import check
+from thermocomp.recording.recording import Recording
+
+#: three tests on three days, each beginning at a later hour than the last one ended
+INSTANTS = [
+    datetime(2024, 3, day, hour) + timedelta(minutes=6 * k)
+    for day, hour in ((5, 9), (7, 12), (10, 15))
+    for k in range(20)
+]
+CELLS = [(20 + k / 8, k / 4) for k in range(60)]
+#: of a row over Date, Time, T1, Z
+UNITS = (
+    *("Unit,,degC,um", "Units,,degC,um", "Einheit,,°C,µm", "unit:,,C,um", "Einh.,,°C,µm", "[-],[-],[degC],[um]"),
+    *("-,-,degC,um", "yyyy-mm-dd,hh:mm:ss,degC,um", "[yyyy-mm-dd],[hh:mm:ss],[°C],[µm]", "n/a,n/a,degC,um"),
+    *("NO.,Time,degC,um", "Date,Time,degC,um", "Time,,degC,um", ",,degC,um", "[date],[time],[°C],[µm]", "TS,,Deg C,um"),
+    *("d,h,degC,um", "s,s,degC,um", ",hh:mm:ss,degC,um", "Measure,of,degC,um", "(Unit),,(C),(um)", "JJJJ-MM-TT,,°C,µm"),
+)
+
+
+def rows(form: str = "%Y-%m-%d,%H:%M:%S", delimiter: str = ",") -> str:
+    return "".join(
+        f"{t.strftime(form)},{a:.3f},{z:.2f}\n".replace(",", delimiter)
+        for t, (a, z) in zip(INSTANTS, CELLS, strict=True)
+    )
+
+
+def write(folder: Path, content: str) -> Path:
+    path = folder / "logger.csv"
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+def is_whole(recording: Recording, units: Sequence[str] = ("degC", "um")) -> None:
+    assert recording.start == "2024-03-05T09:00:00"
+    assert recording.time.tolist() == [(t - INSTANTS[0]).total_seconds() for t in INSTANTS]
+    assert [c.unit for c in recording.channels] == list(units)
+    np.testing.assert_allclose(recording.table.to_numpy(), CELLS, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_no_label_throws_the_date_away_or_hides_the_units(units: str, tmp_path: Path) -> None:
+    is_whole(read(write(tmp_path, f"Device Type,GM10\nDate,Time,T1,Z\n{units}\n{rows()}")))
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", "|"])
+@pytest.mark.parametrize("units", ["Einheit,,°C,µm", "tt.mm.jjjj,hh:mm:ss,°C,µm", "[-],[-],[°C],[µm]"])
+def test_other_delimiters(delimiter: str, units: str, tmp_path: Path) -> None:
+    head = f"Datum,Uhrzeit,T1,Z\n{units}\n".replace(",", delimiter)
+    is_whole(read(write(tmp_path, head + rows("%d.%m.%Y,%H:%M:%S", delimiter))))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Date,Time,T1,Z\n\nUnit,,degC,um\n\n",
+        "Date,Time,T1,Z\n,,,\nUnit,,degC,um\n",
+        "Date,Time,T1,Z\nUnit,,degC,um\n,,,\n",
+        "Date,Time,T1,Z\nLabel,,TC_K,DC\nUnit,,degC,um\n",
+        "Date,Time,T1,Z\nUnit,,degC,um\nType,,Avg,Smp\n",
+        "Date,Time,CH1,CH2\nTag,,T1,Z\nUnit,,degC,um\n",
+    ],
+)
+def test_rows_between(head: str, tmp_path: Path) -> None:
+    is_whole(read(write(tmp_path, head + rows())))
+
+
+@pytest.mark.parametrize(
+    "units", ["Unit,,,degC,um", "NO.,yyyy-mm-dd,hh:mm:ss,degC,um", "[-],[-],[-],[°C],[µm]", ",,,C,um"]
+)
+def test_a_number_of_the_row_may_come_first(units: str, tmp_path: Path) -> None:
+    numbered = "".join(f"{k},{row}\n" for k, row in enumerate(rows().splitlines(), start=1))
+    recording = read(write(tmp_path, f"No.,Date,Time,T1,Z\n{units}\n{numbered}"))
+    is_whole(recording)
+    assert not any("No. [" in note for note in recording.notes)
+
+
+def test_a_datalogger_of_four_heading_lines(tmp_path: Path) -> None:
+    """Units of no use here are units too, and the number of the record has none."""
+    body = "".join(
+        f'"{t}",{k},{a},{z},{50 + k / 9:.1f},3.1\n' for k, (t, (a, z)) in enumerate(zip(INSTANTS, CELLS, strict=True))
+    )
+    head = (
+        '"TOA5","CR1000","CR1000","83014","CR1000.Std.32","CPU:drift.CR1","12345","Table1"\n'
+        '"TIMESTAMP","RECORD","T1_Avg","Z","RH","BattV"\n'
+        '"TS","RN","Deg C","um","%","V"\n"","","Avg","Smp","Avg","Min"\n'
+    )
+    is_whole(read(write(tmp_path, head + body)))
+
+
+def test_the_second_heading_line_of_a_recorder(tmp_path: Path) -> None:
+    """Alarms are words: what stands over them is no unit, and none of them counts."""
+    body = "".join(
+        f"{k},{t:%Y/%m/%d %H:%M:%S},0,+{a:.3f},{z:+.2f},LLLLLLLLLL,LLLL\n"
+        for k, (t, (a, z)) in enumerate(zip(INSTANTS, CELLS, strict=True), start=1)
+    )
+    head = "Number,Date&Time,ms,CH1,CH2,Alarm1-10,AlarmOut\nNO.,Time,ms,degC,um,A1234567890,A1234\n"
+    is_whole(read(write(tmp_path, head + body)))
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("s", 1), ("[s]", 1), ("min", 60), ("h", 3600), ("ms", 1e-3), ("(sec)", 1)]
+)
+def test_a_time_of_numbers_takes_its_unit(unit: str, factor: float, tmp_path: Path) -> None:
+    body = "".join(f"{k},{20 + k / 8},{k / 4}\n" for k in range(30))
+    recording = read(write(tmp_path, f"Time,T1,Z\n{unit},degC,um\n{body}"))
+    np.testing.assert_allclose(recording.time, np.arange(30) * factor)
+
+
+def test_a_time_of_numbers_takes_no_label(tmp_path: Path) -> None:
+    body = "".join(f"{k},{20 + k / 8},{k / 4}\n" for k in range(30))
+    with pytest.raises(InputError, match=r"column 'Time' holds numbers .* says no unit"):
+        read(write(tmp_path, f"Time,T1,Z\nUnit,degC,um\n{body}"))
+
+
+@pytest.mark.parametrize("unit", ["ms", "[ms]", "", "-"])
+def test_milliseconds_beside_are_added(unit: str, tmp_path: Path) -> None:
+    body = "".join(f"2024-03-05,09:00:{k // 2:02},{500 * (k % 2) + 125},2{k % 10},{k}\n" for k in range(40))
+    recording = read(write(tmp_path, f"Date,Time,ms,T1,Z\nUnit,,{unit},degC,um\n{body}"))
+    np.testing.assert_allclose(recording.time, np.arange(40) / 2)
+
+
+def test_a_workbook_with_dates_and_times_of_day(tmp_path: Path) -> None:
+    for k, labels in enumerate((("Unit", None), ("yyyy-mm-dd", "hh:mm:ss"), ("[-]", "[-]"), ("Einheit", "s"))):
+        book = openpyxl.Workbook()
+        sheet = book.active
+        assert sheet is not None
+        for row in (("Date", "Time", "T1", "Z"), (None,), (*labels, "degC", "um")):
+            sheet.append(row)
+        for t, (a, z) in zip(INSTANTS, CELLS, strict=True):
+            sheet.append((date(t.year, t.month, t.day), time(t.hour, t.minute), a, z))
+        path = tmp_path / f"book{k}.xlsx"
+        book.save(path)
+        is_whole(read(path))
+
+
+# -- a column of dates is not passed over ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("headings", "form"),
+    [
+        ("Messtag,Uhrzeit", "%Y-%m-%d,%H:%M:%S"),
+        ("Datum der Messung,Uhrzeit der Messung", "%d.%m.%Y,%H:%M:%S"),
+        ("Clock,Recorded on", "%H:%M:%S,%d-%b-%Y"),
+        ("Date [d],Time [h]", "%Y-%m-%d,%H:%M"),
+        ("Date,Time", "%Y%m%d,%H:%M:%S"),
+        ("Day,Time", "%a %Y-%m-%d,%I:%M:%S %p"),
+        ("Date,Time", "%Y-%m-%d 00:00:00,1899-12-30 %H:%M:%S"),
+    ],
+)
+def test_what_the_cells_hold_finds_it(headings: str, form: str, tmp_path: Path) -> None:
+    is_whole(read(write(tmp_path, f"{headings},T1 [degC],Z [um]\n{rows(form)}")))
+
+
+def test_a_mapping_that_names_the_time_of_day_alone_finds_it_too(tmp_path: Path) -> None:
+    path = write(tmp_path, f"Datum,Uhrzeit,T1 [degC],Z [um]\n{rows()}")
+    recording = read(path, check_content({"time": {"column": "Uhrzeit"}, "read": {"only_mapped": False}}, "m"))
+    is_whole(recording)
+    assert "'Datum' holds the dates, 'Uhrzeit' the time of day" in recording.notes
+
+
+@pytest.mark.parametrize(
+    ("headings", "keys"),
+    [
+        ("Datum,Uhrzeit", {"time": {"column": "Uhrzeit", "format": "%H:%M:%S"}}),
+        ("Datum,Laufzeit", {}),
+    ],
+)
+def test_dates_that_the_time_does_not_go_with_are_trouble(
+    headings: str, keys: dict[str, object], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, f"{headings},T1 [degC],Z [um]\n{rows()}")
+    with pytest.raises(
+        TwoReadingsError, match=r"'Datum' says 2024-03-07 in line 22, which is not the day 3\.00 h after"
+    ):
+        read(path, check_content(keys, "m"))
+    mapping = tmp_path / "mapping.toml"
+    mapping.write_text('[time]\ncolumn = "Uhrzeit"\nformat = "%H:%M:%S"\n' if keys else "", encoding="utf-8")
+    for command in (["check"], ["map", "--yes"], ["fit", "--target", "Z_um", "-o", str(tmp_path / "m.json")]):
+        assert run([command[0], str(path), "--mapping", str(mapping), *command[1:]]) == 2
+        assert "date = " in capsys.readouterr().err
+    # the first remedy reads it
+    with pytest.raises(TwoReadingsError) as caught:
+        read(path, check_content(keys, "m"))
+    is_whole(read(path, check_content(dict(caught.value.remedies[0]), "m")))
+
+
+def test_of_two_columns_of_dates_the_wrong_one_is_not_taken(tmp_path: Path) -> None:
+    printed = rows("%H:%M:%S,2024-05-01,%Y-%m-%d")
+    path = write(tmp_path, f"Time,Printed,Measured,T1 [degC],Z [um]\n{printed}")
+    with pytest.raises(TwoReadingsError, match="'Measured' says 2024-03-07 in line 22") as caught:
+        read(path)
+    is_whole(read(path, check_content(dict(caught.value.remedies[0]), "m")))
+
+
+def test_numbers_of_a_day_do_not_go_with_dates_either(tmp_path: Path) -> None:
+    body = "".join(
+        f"{t:%Y-%m-%d},{t.hour * 3600 + t.minute * 60},{a},{z}\n" for t, (a, z) in zip(INSTANTS, CELLS, strict=True)
+    )
+    path = write(tmp_path, f"Date,Time,T1,Z\n,s,degC,um\n{body}")
+    for keys in ({}, {"time": {"column": "Time [s]", "date": "Date"}}):
+        with pytest.raises(TwoReadingsError, match="split the file into tests"):
+            read(path, check_content(keys, "m"))
+
+
+def test_a_mapping_that_leaves_the_dates_out_is_warned_of(tmp_path: Path) -> None:
+    path = write(tmp_path, f"Datum,Uhrzeit,T1 [degC],Z [um]\n{rows()}")
+    keys = {"time": {"column": "Uhrzeit"}, "columns": {"Datum": {"role": "ignore"}}}
+    (warning,) = (f for f in check(read(path, check_content(keys, "m"))) if f.kind == "left out")
+    assert warning.severity == "warning"
+    assert "'Datum' says 2024-03-07 in line 22" in warning.text
+
+
+@pytest.mark.parametrize("heading", ["Elapsed", "Laufzeit", "Rel. time"])
+def test_time_that_passed_goes_with_the_dates_it_runs_through(heading: str, tmp_path: Path) -> None:
+    begin = datetime(2024, 3, 5, 20)
+    body = "".join(
+        f"{begin + timedelta(minutes=10 * k):%d/%m/%Y},{k // 6:02}:{k % 6}0:00,{20 + k / 9:.2f},{k / 4}\n"
+        for k in range(90)
+    )
+    recording = read(write(tmp_path, f"Datum,{heading},T1 [degC],Z [um]\n{body}"))
+    assert recording.time.tolist() == [600.0 * k for k in range(90)]
+
+
+def test_a_stamp_that_never_changes_is_no_time(tmp_path: Path) -> None:
+    body = "".join(f"2024-01-31 08:00:00,{10 * k},{20 + k / 9:.2f},{k / 4}\n" for k in range(60))
+    with pytest.raises(InputError, match="no time column found among Begun, Since"):
+        read(write(tmp_path, f"Begun,Since,T1 [degC],Z [um]\n{body}"))
+
+
+def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> None:
+    """From 20:00 on: at midnight the date changes, and the time runs on."""
+    begin = datetime(2024, 3, 5, 20)
+    days = [f"{begin + timedelta(minutes=10 * k):%Y-%m-%d}" for k in range(200)]
+    passed = [f"{k // 6:02}:{k % 6}0:00,{20 + k / 9:.2f},{k / 4}\n" for k in range(200)]
+    for count in (100, 200):  # beyond a day nothing else is possible
+        body = "".join(f"{day},{row}" for day, row in zip(days[:count], passed, strict=False))
+        path = write(tmp_path, f"Date,Time,T1 [degC],Z [um]\n{body}")
+        with pytest.raises(InputError) as caught:
+            read(path)
+        if count == 100:
+            assert "time that passed, or a pause of a whole day?" in str(caught.value)
+            remedy = check_content(dict(caught.value.remedies[0]), "m")
+            assert read(path, remedy).time.tolist() == [600.0 * k for k in range(count)]
+
+
+def test_a_date_that_never_changes_is_that_of_the_test(tmp_path: Path) -> None:
+    body = "".join(f"2024-01-31,{3600 * k},{20 + k / 9:.2f},{k / 4}\n" for k in range(60))
+    assert read(write(tmp_path, f"Calibrated,time_s,T1 [degC],Z [um]\n{body}"), Mapping()).time[-1] == 59 * 3600
