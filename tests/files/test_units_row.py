@@ -261,3 +261,23 @@ def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> Non
 def test_a_date_that_never_changes_is_that_of_the_test(tmp_path: Path) -> None:
     body = "".join(f"2024-01-31,{3600 * k},{20 + k / 9:.2f},{k / 4}\n" for k in range(60))
     assert read(write(tmp_path, f"Calibrated,time_s,T1 [degC],Z [um]\n{body}"), Mapping()).time[-1] == 59 * 3600
+
+
+def test_tests_on_several_days_are_not_asked_for_the_unit_of_their_times(tmp_path: Path) -> None:
+    """Temperatures that take days for their span: the stamps tell how long that was."""
+    days = [datetime(2024, 3, day, 9) + timedelta(minutes=8 * k) for day in (5, 7, 10) for k in range(15)]
+    cells = "".join(f"{t:%Y/%m/%d,%H:%M:%S},{20 + k % 15 / 4 + k / 9:.2f},{k % 15:.2f}\n" for k, t in enumerate(days))
+    path = write(tmp_path, f"Date,Time,T,Z\nUnit,,degC,um\n{cells}")
+    assert not [f for f in check(read(path)) if f.kind == "time unit"]
+    assert run(["map", str(path), "--yes", "-o", str(tmp_path / "map.toml")]) == 0
+    mapping = (tmp_path / "map.toml").read_text()
+    assert 'unit = "ms"' not in mapping
+
+
+def test_a_sign_may_stand_apart_from_its_number(tmp_path: Path) -> None:
+    cells = "".join(
+        f"{t:%Y/%m/%d,%H:%M:%S},+   {a:.1f},-  {z:.1f}\n" for t, (a, z) in zip(INSTANTS, CELLS, strict=True)
+    )
+    found = read(write(tmp_path, f"Date,Time,T,Z\nUnit,,degC,um\n{cells}"))
+    assert found.table["T_C"].to_numpy()[-1] == 27.4
+    assert found.table["Z_um"].to_numpy()[-1] == -14.8

@@ -35,7 +35,7 @@ _FILLERS = frozenset(
 _RUN = re.compile(r"([-+*?#.])\1*|err:\d+")
 #: separators of thousands besides point and comma
 _SPACES = "'’\u00a0\u202f "
-_PLAIN = re.compile(r"[-+]? ?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?")
+_PLAIN = re.compile(r"[-+]? *(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?")
 _GROUPED = re.compile(rf"[-+]?[1-9]\d{{0,2}}(?:([.,{_SPACES}])\d{{3}})(?:\1\d{{3}})*(?:(?!\1)[.,]\d*)?")
 _OPEN = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 

@@ -74,7 +74,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         signal, mine = _channel(channel, values, time, moved, probed=channel.name in probed)
         found += mine
         signals.append(signal)
-    found += _together(signals, time, moved, speed)
+    found += _together(signals, time, moved, speed, stamped=bool(recording.start))
     return tuple(sorted(found, key=lambda f: SEVERITIES.index(f.severity)))
 
 
@@ -106,13 +106,14 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def _together(
-    signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None
+    signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
 ) -> Iterator[Finding]:
-    """Yield what several channels, or a channel and the clock, tell together."""
+    """Yield what several channels, or a channel and the clock, tell together; a time from stamps has no unit."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
-    yield from suspects.time_unit(time, of["temperature"])
+    if not stamped:
+        yield from suspects.time_unit(time, of["temperature"])
     yield from suspects.zeros([*of["displacement"], *of["angle"]], time)
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))
