@@ -126,6 +126,8 @@ def revise(program: Path, proof: str) -> dict[str, float]:
     options = [
         *model,
         "--cold",
+        "--controller",
+        "linuxcnc",
         "--rotation",
         "none",
         "--no-g92",

@@ -191,12 +191,11 @@ def test_refused_with_line_and_words(run: Run, text: str, line: int, reason: str
 
 def test_an_endless_loop_ends(run: Run) -> None:
     with pytest.raises(ProgramError, match="takes more than 1 s to interpret: has it an endless loop"):
-        run("#1 = 1\no1 while [#1 GT 0]\n#1 = 1\no1 endwhile\nM2\n", seconds=1)
+        run("G21\n#1 = 1\no1 while [#1 GT 0]\nG0 X#1\no1 endwhile\nM2\n", seconds=1)
 
 
-@pytest.mark.long
 def test_a_loop_that_does_nothing_ends_before_its_time(run: Run) -> None:
-    with pytest.raises(ProgramError, match=r"line [3-5]: .* run for 20 s and done nothing: has it an endless loop"):
+    with pytest.raises(ProgramError, match=r"line 3: .* 300,000 lines without a move"):
         run("G21\nG0 X1\no1 while [1]\n#1 = 1\no1 endwhile\nM2\n", seconds=200)
 
 

@@ -318,15 +318,17 @@ def test_a_fitted_pipeline(recording: Recording) -> None:
 
 @pytest.mark.usefixtures("job_folder")
 def test_revise() -> None:
-    done = tc.revise("part.ngc", "model.json", "out.ngc", cold=True, unproved=True, date="2026-01-31")
+    done = tc.revise(
+        "part.ngc", "model.json", "out.ngc", controller="linuxcnc", cold=True, unproved=True, date="2026-01-31"
+    )
     assert done.written
     assert all(p.exists() for p in done.files)
     assert Path("out.ngc").read_text(encoding="ascii") != PLATE
     assert done.summary["files"]
     with pytest.raises(InputError, match="exists already"):
-        tc.revise("part.ngc", "model.json", "out.ngc", cold=True, unproved=True)
+        tc.revise("part.ngc", "model.json", "out.ngc", controller="linuxcnc", cold=True, unproved=True)
     with pytest.raises(InputError, match="no option 'colde'; the nearest are cold"):
-        tc.revise("part.ngc", "model.json", "out2.ngc", colde=True)
+        tc.revise("part.ngc", "model.json", "out2.ngc", controller="linuxcnc", colde=True)
     with pytest.raises(InputError, match="how warm is the machine"):
-        tc.revise("part.ngc", "model.json", "out2.ngc", unproved=True)
+        tc.revise("part.ngc", "model.json", "out2.ngc", controller="linuxcnc", unproved=True)
     assert not Path("out2.ngc").exists()

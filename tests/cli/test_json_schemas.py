@@ -158,8 +158,12 @@ def test_an_export(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert (len(found["files"]), found["refused"]) == (4, {})
 
 
+#: of the program of `reviseruns`
+REVISION = ("part.ngc", "--model", "model.json", "--cold", "--controller", "linuxcnc", "-o", "out.ngc")
+
+
 def test_a_revision(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert held("revise", capsys, "part.ngc", "--model", "model.json", "--cold", "-o", "out.ngc")["axes"]
+    assert held("revise", capsys, *REVISION)["axes"]
 
 
 def test_a_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -181,7 +185,7 @@ def test_a_revision_with_its_proof(
     monkeypatch.chdir(tmp_path)
     write_models([judged(lags("z_um"))], "model.json")
     Path("part.ngc").write_text(PLATE, encoding="ascii")
-    assert held("revise", capsys, "part.ngc", "--model", "model.json", "--cold", "-o", "out.ngc")["proof"]
+    assert held("revise", capsys, *REVISION)["proof"]
 
 
 @pytest.mark.long

@@ -10,7 +10,7 @@ import pytest
 from reviseruns import revise
 
 CODE = "import sys\nfrom thermocomp.cli.app import run\nsys.exit(run(sys.argv[1:]))"
-OPTIONS = ["--model", "model.json", "--cold", "--unproved"]
+OPTIONS = ["--model", "model.json", "--cold", "--unproved", "--controller", "linuxcnc"]
 
 
 def started(program: str, out: str) -> subprocess.Popen[bytes]:

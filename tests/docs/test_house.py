@@ -89,7 +89,7 @@ def compared(folder: Path) -> None:
 def revised(folder: Path) -> None:
     (folder / "part.ngc").write_text(PLATE, encoding="ascii")
     words = ["--model", str(folder / "model.json"), "--cold", "-o", str(folder / "out.ngc"), "--tolerance", "0.1 um"]
-    assert run(["revise", str(folder / "part.ngc"), *words]) == 0
+    assert run(["revise", str(folder / "part.ngc"), *words, "--controller", "linuxcnc"]) == 0
 
 
 def compensated(_: Path) -> None:

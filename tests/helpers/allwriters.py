@@ -86,7 +86,7 @@ def _inputs(program: str, version: int) -> Path:
 
 def _revise(controller: str) -> Writer:
     """A program with all that stands beside it; a Fanuc's is written out first."""
-    options = {"linuxcnc": [], "fanuc": ["--controller", "fanuc", "--expand"]}
+    options = {"linuxcnc": ["--controller", "linuxcnc"], "fanuc": ["--controller", "fanuc", "--expand"]}
     ends = ["", ".diff", ".csv", ".job.json", ".png", *([".expanded"] if controller == "fanuc" else [])]
     program = PLATE if controller == "linuxcnc" else _FANUC
 

@@ -51,13 +51,19 @@ def write_models(models: Sequence[ErrorModel], path: str) -> None:
 
 
 def revise(
-    *options: str, program: str = "part.ngc", out: str = "out.ngc", start: str = "--cold", proved: bool = False
+    *options: str,
+    program: str = "part.ngc",
+    out: str = "out.ngc",
+    start: str = "--cold",
+    proved: bool = False,
+    dialect: bool = True,
 ) -> int:
-    """Run the command; unless asked for no interpreter starts, which takes its time."""
+    """Run the command, for LinuxCNC unless said; unless asked for no interpreter starts, which takes its time."""
     given = ["--model", "model.json"] if "--model" not in options else []
     begun = [start] if start else []
     proof = [] if proved else ["--unproved"]
-    return run(["revise", program, *given, *begun, *proof, *options, "-o", out])
+    whose = [] if "--controller" in options or not dialect else ["--controller", "linuxcnc"]
+    return run(["revise", program, *given, *begun, *proof, *whose, *options, "-o", out])
 
 
 def table(path: str = "out.ngc.csv") -> list[dict[str, str]]:

@@ -234,8 +234,8 @@ REFUSED = [
     ("IF[#3003EQ1]GOTO5\nN5", 1, "unknown"),
     ("GOTO5", 1, "there is no N5"),
     ("GOTO5\nN5\nN005", 1, "N5 stands in lines 2 and 3"),
-    ("#1=1\nN1 GOTO1", 2, "never end"),
-    ("#1=0\nWHILE[#1LT1]DO1\nX1.\nEND1", 0, "never end"),
+    ("#1=1\nN1 GOTO1", 2, "has no end: no variable changes"),
+    ("#1=0\nWHILE[#1LT1]DO1\nX1.\nEND1", 2, "has no end: no variable changes"),
     ("WHILE[1EQ1]DO1\nX1.", 1, "DO1 without END1"),
     ("END1", 1, "without its DO1"),
     ("DO1\nDO1\nEND1\nEND1", 2, "inside DO1"),
@@ -260,11 +260,57 @@ def test_what_is_not_certain_is_refused(text: str, line: int, reason: str, monke
 
 def test_it_ends_where_too_much_comes_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thermocomp.nc.expansion.unroll.MOST", 2000)
-    endless = unroll(["#1=0\n", "WHILE[#1LT1]DO1\n", "G0 X1.\n", "END1\n"], FANUC)
+    endless = unroll(["#1=0\n", "WHILE[#1LT1]DO1\n", "#1=#1-1\n", "G0 X1.\n", "END1\n"], FANUC)
     assert len(list(islice(endless, 1000))) == 1000
-    with pytest.raises(ProgramError, match="a loop never end"):
+    with pytest.raises(
+        ProgramError, match=r"line 2: the loop that begins here has run more than .* seems to have no end"
+    ):
         for _ in endless:
             pass
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "reason"),
+    [
+        # nothing changes from one pass to the next
+        ("N10 #100=1\nGOTO 10", 1, "no variable changes"),
+        ("N10 X1.\nX2.\nGOTO10", 1, "no variable changes"),
+        ("WHILE[1EQ1]DO1\nDO2\nEND2\nEND1", 2, "no variable changes"),
+        ("DO1\nM98 P2\nEND1\nM30\nO2\n#1=5\nM99", 1, "no variable changes"),
+        ("DO1\nG65 P2 A1.\nEND1\nM30\nO2\n#2=#1\n#101=3\nM99", 1, "no variable changes"),
+        ("M98 P2\nM30\nO2\nN5 X1.\nIF[1EQ1]GOTO5\nM99", 4, "no variable changes"),
+        ("N1 M98 P2\nN3 M30\nO2\nM99 P1", 1, "no variable changes"),
+        # a counter runs away
+        ("#1=0\nN10 #1=#1+1\nGOTO10", 2, "200,000 lines and written none"),
+        ("#1=9\nWHILE[#1GT0]DO1\n#2=0\nWHILE[#2LT3]DO2\n#2=#2+1\nEND2\n#1=#1+1\nEND1", 2, "200,000 lines and"),
+        ("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1", 2, "more than 220,000 lines that would be"),
+        ("#1=9\nN1 #1=#1+1\nM98 P2\nGOTO1\nM30\nO2\n#3=1\n#3=2\n#3=3\nX#1\nM99", 2, "more than 1,000,000 lines"),
+    ],
+)
+def test_a_loop_without_end_is_refused_where_it_begins(text: str, line: int, reason: str) -> None:
+    with pytest.raises(ProgramError) as caught:
+        for _ in unroll(split_lines(f"{text}\nM30\n"), FANUC):
+            pass
+    assert (caught.value.line, reason in caught.value.reason) == (line, True)
+    assert "no end" in caught.value.reason
+
+
+def test_a_subprogram_that_calls_itself_is_refused() -> None:
+    with pytest.raises(ProgramError, match="more than 4 calls inside each other"):
+        written("M98 P2\nM30\nO2\nM98 P2\nM99\n")
+
+
+def test_a_loop_that_ends_is_written_out() -> None:
+    """Also where a variable gets back a value it had."""
+    text = "#2=0\n#1=0\nN1 #1=1-#1\nX#1\n#2=#2+1\nIF[#2LT9]GOTO1\nM98 P2 L20\nM30\nO2\nN5 #3=1\nX9.\nM99\n"
+    assert sum(line.startswith("X9") for line, _ in written(text)) == 20
+
+
+@pytest.mark.long
+def test_a_long_loop_is_written_out() -> None:
+    rows = ["#1=0\n", "WHILE[#1LT400]DO1\n", "#2=0\n", "WHILE[#2LT500]DO2\n", "G1 X#2 Y#1 F1000\n", "#2=#2+1\n"]
+    lines = unroll([*rows, "END2\n", "#1=#1+1\n", "END1\n", "M30\n"], FANUC)
+    assert sum(text.startswith("G1") for text, _ in lines) == 200_000
 
 
 def test_lines_that_are_skipped_call_nothing() -> None:

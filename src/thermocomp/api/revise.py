@@ -92,7 +92,8 @@ def revise(
     'speed.json'
     >>> lines = ["G21 G90 G94 G54", "S4000 M3", "G0 X0 Y0 Z5", "G1 Z-1 F100", "X50", "G0 Z50", "M2"]
     >>> _ = Path("part.ngc").write_text("\n".join(lines))
-    >>> done = tc.revise("part.ngc", "speed.json", "revised.ngc", axis=["z_at_0_um=Z"], cold=True, unproved=True)
+    >>> options = {"controller": "linuxcnc", "axis": ["z_at_0_um=Z"], "cold": True, "unproved": True}
+    >>> done = tc.revise("part.ngc", "speed.json", "revised.ngc", **options)
     >>> done.summary["changed"], f"{done.summary['axes'][0]['left_um']:.1f} um"  # lines changed, drift left
     (2, '0.1 um')
     >>> print("\n".join(Path("revised.ngc").read_text().splitlines()[-4:]))

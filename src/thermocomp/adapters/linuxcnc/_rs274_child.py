@@ -1,12 +1,12 @@
 """Run an NC program through LinuxCNC's interpreter and write its canonical calls to standard output, in blocks.
 
 A script for Debian's ``/usr/bin/python3``, whose package linuxcnc-uspace brings the module `gcode`; it uses nothing of
-thermocomp but `_rs274_hooks.py` and `_rs274_kinds.py` beside it. `rs274process.py` starts it with the
-folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line with
-the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON list of
-what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a block
-without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a record
-tells of its centre.
+thermocomp but `_rs274_hooks.py`, `_rs274_kinds.py` and `_rs274_reading.py` beside it. `rs274process.py` starts it with
+the folders of jobs, which are run one after the other, each in a process of its own, and reads what it writes: a line
+with the names of the kinds (JSON), then blocks of two numbers (records, bytes of JSON), as many records, and a JSON
+list of what is no row of numbers: the first number of such a record is its place in the list. Behind each job stands a
+block without records and the code it ended with. A move stands in program coordinates [inch, deg]; before an arc a
+record tells of its centre.
 
 The module tells of moves, offsets and comments only. Spindle, coolant, stops and the like are empty functions in it:
 the interpreter's entries for them are turned to functions of this script, and a missing one is an error. Lengths come
@@ -52,8 +52,8 @@ RECORD, KINDS, CODES, TOLD, PYTHON = kinds.RECORD, kinds.KINDS, kinds.CODES, kin
 RAPID, FEED, PROBE, ARC, CENTRE = (CODES[kind] for kind in ("rapid", "feed", "probe", "arc", "centre"))
 
 
-class RefusedError(Exception):
-    """The program wants something that is not done for it."""
+reading = load_sibling("_rs274_reading")
+RefusedError = reading.RefusedError
 
 
 class Canon:
@@ -93,6 +93,8 @@ class Canon:
         self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
         self.spindle: int = job["spindle"]
         self.program = os.path.realpath(job["program"].encode())
+        home = os.path.dirname(job["home"])  # noqa: PTH120
+        self.reading = reading.Reading(job["program"], home, job["folders"], job["lines"], self.reached)
 
     def connect(self, module: str) -> None:
         """Turn the functions the module leaves empty to this object."""
@@ -106,6 +108,7 @@ class Canon:
         functions["_Z22START_SPEED_FEED_SYNCHidb"] = (self.synchronised, (None, INT, D, B))
         functions["_Z20SET_TOOL_TABLE_ENTRYii7EmcPosedddi"] = (self.tool_stored, (None, INT, INT, Pose, D, D, D, INT))
         functions["fopen64"] = (self.opened, (P, TEXT, TEXT))
+        functions["fgets"] = (self.line_read, (P, P, INT, P))
         functions[PYTHON] = (self.python, (INT, P, TEXT, P, B))
         functions["_Z7COMMENTPKc"] = (self.commented, (None, TEXT))  # the module knows ASCII only
         functions["_Z7MESSAGEPc"] = (self.messaged, (None, TEXT))
@@ -128,7 +131,7 @@ class Canon:
             (None, INT, P, ctypes.c_uint),
         )
         before = self.hooks.turn("librs274", functions)
-        self.python_before = before[PYTHON]
+        self.python_before, self.read_before = before[PYTHON], before["fgets"]
         self.unit_before, self.open_before = before["_Z16USE_LENGTH_UNITS11CANON_UNITS"], before["fopen64"]
         made = {"_ZN6InterpC1Ev": (self.constructed, (None, P))}
         self.construct_before = self.hooks.turn(module, made)["_ZN6InterpC1Ev"]
@@ -154,8 +157,18 @@ class Canon:
             own = not name or os.path.samefile(name, self.program)  # noqa: PTH121
             self.extra("file", "" if own else name.decode("utf-8", "replace"))
 
+    def reached(self) -> tuple[int, bool]:
+        """Return the line that was read last, and whether it is one of the program's own."""
+        if not self.interpreter:
+            return 0, True
+        if not self.alone:
+            self.name(self.interpreter, self.buffer, 512)
+        own = self.alone or not self.buffer.value or os.path.realpath(self.buffer.value) == self.program
+        return self.sequence(self.interpreter), own
+
     def tell(self, kind: str, *numbers: float) -> None:
         self.where()
+        self.reading.acted = self.reading.lines
         self.record(kind, *numbers)
 
     def record(self, kind: str, *numbers: float) -> None:
@@ -233,11 +246,17 @@ class Canon:
 
     def opened(self, name: bytes, mode: bytes) -> int:
         """Note a file that is there, the program's own included."""
+        self.reading.check_file(name, write=not mode.startswith(b"r"))
         result: int = self.open_before(name, mode)
         if result and mode.startswith(b"r"):
             path = os.path.realpath(name)
             self.files[path] = None
             self.alone &= path == self.program or self.begun < 2
+        return result
+
+    def line_read(self, buffer: int, size: int, stream: int) -> int | None:
+        self.reading.count_line()
+        result: int | None = self.read_before(buffer, size, stream)
         return result
 
     def python(self, this: int, code: bytes, result: int, as_file: bool) -> int:
@@ -287,18 +306,21 @@ class Canon:
 
     def straight_traverse(self, *place: float) -> None:
         self.place = place
+        self.reading.acted = self.reading.lines
         self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_feed(self, *place: float) -> None:
         self.place = place
+        self.reading.acted = self.reading.lines
         self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_probe(self, *place: float) -> None:
         self.place = place
+        self.reading.acted = self.reading.lines
         self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
@@ -310,6 +332,7 @@ class Canon:
         plane = {1: 17, 2: 19, 3: 18}[self.plane]
         self.place = (*at, *more)
         centre = (centre1 * MM, centre2 * MM, turns, plane, *(0.0,) * 6)
+        self.reading.acted = self.reading.lines
         self.records.append(RECORD.pack(CENTRE, 4, self.line, *centre))
         self.records.append(RECORD.pack(ARC, 9, self.line, *self.place, 0.0))
         if len(self.records) >= BLOCK:
@@ -416,6 +439,8 @@ def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
     failure = canon.hooks.failure
     if isinstance(failure, RefusedError):
         canon.line, reason = failure.args
+        if canon.reached()[1]:
+            canon.extra("file", "")
         canon.extra("error", reason)
     elif failure is not None:
         raise failure

@@ -37,6 +37,8 @@ _ASCII = bytes(range(128)) + b"?" * 128
 _PIPE = 1 << 20
 #: the interpreter's words for a subprogram that it does not find
 _NOT_THERE = re.compile(r"(?:EOF in file|Unable to open file).*?(o<[^>]*>)(?: from line: \d+)?.*")
+_TOO_DEEP = "Too many subroutine levels"
+_RECURSION = "more than 10 calls inside each other: a subprogram that calls itself has no end; write a loop instead"
 _MISSING = r"\1 is not there: of a subprogram name the folder (--subroutines); a loop or a branch needs its end"
 
 
@@ -100,12 +102,14 @@ class InterpreterRun:
         self._home = ExitStack()
         self.folder = self._home.enter_context(scratch())
         copy = self.folder / "program.ngc"
+        lines = 1
         with path.open("rb") as program, copy.open("wb") as written:
             while part := program.read(_PIPE):
+                lines += part.count(b"\n")
                 written.write(part.translate(_ASCII))
         folders = [self.folder / str(number) for number in range(len(jobs))]
         for folder, job in zip(folders, jobs, strict=True):
-            _lay_out(folder, copy, [path.parent, *subroutines], job)
+            _lay_out(folder, copy, [path.parent, *subroutines], job, lines)
         with (self.folder / "errors").open("wb") as errors:
             self.process = subprocess.Popen(
                 [PYTHON, ISOLATED, CHILD, *folders],
@@ -163,7 +167,7 @@ class InterpreterRun:
             line, kind = int(records["line"][-1]), int(records["kind"][-1])
             done = kind == self.codes["done"]
             if kind == self.codes["error"]:
-                refusal = _NOT_THERE.sub(_MISSING, block.more[-1])
+                refusal = _NOT_THERE.sub(_MISSING, block.more[-1].replace(_TOO_DEEP, _RECURSION))
                 block = CallBlock(records[:-1], block.more)
             if len(block.records):
                 yield block
@@ -202,7 +206,7 @@ def _all(pipe: IO[bytes], size: int) -> bytes:
     return found
 
 
-def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: InterpreterJob) -> None:
+def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: InterpreterJob, lines: int) -> None:
     """Write the files of a run; links keep the lines of the settings short, which are cut at 255 characters."""
     stored = job.stored
     folder.mkdir()
@@ -221,6 +225,8 @@ def _lay_out(folder: Path, program: Path, folders: Sequence[Path], job: Interpre
         start = " G53 G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(AXES, stored.start, strict=False))
     given = {
         "program": str(program),
+        "folders": [str(target.absolute()) for target in folders],
+        "lines": lines,
         "home": str(folder),
         "ini": str(folder / "ini"),
         "parameters": str(folder / "parameters"),

@@ -283,8 +283,9 @@ class Controller:
     Parameters
     ----------
     controller : str
-        Whose habits the program has: linuxcnc (if not given), or fanuc, for Haas and the ISO programs of most machining
-        centres too. It has to be said of a program that begins with a number (O1234).
+        Whose habits the program has: linuxcnc, or fanuc, for Haas and the ISO programs of most machining centres too.
+        If not given, linuxcnc; but a program that is a Fanuc's, or that the two would read in different ways, is
+        refused.
     units : str
         Unit when the program starts; without it the program has to say G20 or G21.
     startup : str

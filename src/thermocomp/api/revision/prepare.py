@@ -1,8 +1,9 @@
 """What is told of a revision becomes a job, or is refused before any work."""
 
+import re
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 from thermocomp.adapters.linuxcnc import rs274
@@ -14,8 +15,9 @@ from thermocomp.core.draft import refuse_existing
 from thermocomp.core.exceptions import InputError
 from thermocomp.files import ncprogram
 from thermocomp.nc.interpreter.block import Setup
-from thermocomp.nc.parser.recognise import program_number
-from thermocomp.nc.parser.tokens import read_lines
+from thermocomp.nc.interpreter.dialect import check_dialect
+from thermocomp.nc.parser.recognise import recognise
+from thermocomp.nc.parser.tokens import program_lines, read_lines
 from thermocomp.nc.rewrite.revise import FIRST, Revision
 from thermocomp.nc.rewrite.travel import Travel
 from thermocomp.nc.thermal.stations import Station
@@ -60,7 +62,7 @@ def prepare_job(
         It cannot be done, which is found out before any work.
     """
     if controller.controller is None:
-        _refuse_number(program)
+        _check_dialect(program, controller)
     ncprogram.open_to_read(program).close()
     starting.check()
     found = drifting.stations()
@@ -113,15 +115,16 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
     return found
 
 
-def _refuse_number(program: Path) -> None:
-    """Raise `InputError` if a program begins as a Fanuc's do, and nobody has said whose it is."""
-    with ncprogram.open_to_read(program) as lines:
-        first = list(islice(lines, FIRST))
-    if number := program_number(first):
-        raise InputError(
-            f"{program}: line {number}: {first[number - 1].strip()[:40]!r} is how a Fanuc's or Haas's programs "
-            "begin: say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc"
-        )
+def _check_dialect(program: Path, controller: Controller) -> None:
+    """Raise `InputError` if nobody has said whose a program is, and it need not be LinuxCNC's."""
+    retract = controller.startup is not None and re.search(r"G9[89]", controller.startup, re.IGNORECASE) is not None
+    with ncprogram.open_to_read(program) as texts:
+        lines = program_lines(texts)
+        try:
+            recognise(first := list(islice(lines, FIRST)))
+            check_dialect(chain(first, lines), whole=controller.integers is not None, retract=retract)
+        except InputError as e:
+            raise InputError(f"{program}: {e}") from e
 
 
 def _refuse_optional(program: Path) -> None:

@@ -30,6 +30,7 @@ class Program:
         self.start = start
         self.stop = stop
         self._labels: dict[int, list[int]] | None = None
+        self._closing: dict[tuple[int, int], int] = {}
 
     def label(self, number: int, line: int, who: str) -> int:
         """Return the index of the line with a line number.
@@ -67,11 +68,14 @@ class Program:
         ProgramError
             There is none.
         """
+        if (begin, loop) in self._closing:
+            return self._closing[begin, loop]
         for i in range(begin + 1, self.stop):
             text = self.texts[i]
             if "END" in text.upper():
                 found = _END.fullmatch(squeeze(read_line(text, i + 1, "fanuc").flow))
                 if found and int(found.group(1)) == loop:
+                    self._closing[begin, loop] = i
                     return i
         raise ProgramError(begin + 1, f"DO{loop} without END{loop} behind it in this program")
 

@@ -17,9 +17,13 @@ from thermocomp.nc.parser.expressions import Key
 from thermocomp.nc.parser.line import Assignment, Line, Word
 from thermocomp.nc.parser.tokens import read_line
 
-#: lines that are written at most, and run at most
-MOST: Final = 1_000_000
-MOST_STEPS: Final = 5_000_000
+#: lines beyond those of the file that are written at most, and run at most: in all, and without one that is written;
+#: a line that is run takes some 10 us, so that all of them are reached within seconds
+MOST: Final = 220_000
+MOST_STEPS: Final = 1_000_000
+MOST_IDLE: Final = 200_000
+#: lines that are run in which the loop is looked for that does not end
+_RECENT: Final = 20_000
 #: calls inside each other
 DEEPEST: Final = 4
 
@@ -75,6 +79,8 @@ class _Frame:
     place: int  #: index of the line that comes next
     called: bool
     loops: list[tuple[int, int, int]] = field(default_factory=list)  #: number, index of DO and of END
+    #: by the line that was gone back to: changes of variables before, and the loops it was in
+    seen: dict[int, tuple[int, list[tuple[int, int, int]]]] = field(default_factory=dict)
 
 
 class _Unroller:
@@ -83,8 +89,10 @@ class _Unroller:
         self._file = File(texts)
         self._setup = setup
         self._inch = bool(setup.inch)
-        self._written = self._steps = 0
+        self._written = self._steps = self._wrote = 0
+        self._passes: dict[int, tuple[int, int]] = {}  # by the line that was gone back to: how often, and when last
         self._acted = False
+        self._read_lines: dict[int, Line | None] = {}
 
     def lines(self) -> Iterator[tuple[str, int]]:
         main = _Frame(self._file.main, Variables(), 0, 0, called=False)
@@ -104,11 +112,11 @@ class _Unroller:
             frame.place += 1
             text = texts[i]
             self._step(i + 1)
-            if not _MAY_ACT.search(text):
+            line = self._read(i)
+            if line is None:
                 began = began or bool(text.strip())
                 yield self._out(text, i + 1)
                 continue
-            line = read_line(text, i + 1, "fanuc")
             if line.demarcation and began and not frame.called:
                 frame.place = i  # the end of the file
                 return _ENDED
@@ -125,6 +133,13 @@ class _Unroller:
         if program.stop < len(texts):
             raise ProgramError(program.stop, "the program has no M30 or M2 before the next O number; add it")
         return _ENDED
+
+    def _read(self, index: int) -> Line | None:
+        """Return a line that may act; None: it is plain."""
+        if index not in self._read_lines:
+            text = self._texts[index]
+            self._read_lines[index] = read_line(text, index + 1, "fanuc") if _MAY_ACT.search(text) else None
+        return self._read_lines[index]
 
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
         """Run one line; return None if the program goes on behind it."""
@@ -225,6 +240,7 @@ class _Unroller:
             if not frame.loops or (frame.loops[-1][0], frame.loops[-1][2]) != (number, index):
                 raise ProgramError(line.number, f"END{number} without its DO{number}, or loops across each other")
             frame.place = frame.loops.pop()[1]
+            self._go_back(frame)
         else:
             raise ProgramError(
                 line.number,
@@ -265,6 +281,20 @@ class _Unroller:
             if found and frame.program.closing(i, int(found.group("loop"))) >= place:
                 raise ProgramError(line, f"{who} leads into a loop (line {i + 1}), which controls refuse")
         frame.place = place
+        if place < line:
+            self._go_back(frame)
+
+    def _go_back(self, frame: _Frame) -> None:
+        """Take in that the program goes on at a line before; refuse a pass that is the same as the one before."""
+        place, state = frame.place, (frame.variables.changes, list(frame.loops))
+        self._passes[place] = self._passes.get(place, (0, 0))[0] + 1, self._steps
+        if frame.seen.get(place) == state:
+            raise ProgramError(
+                place + 1,
+                "the loop that begins here has no end: no variable changes from one pass to the next; write a "
+                "condition that becomes false, or M30 at its end",
+            )
+        frame.seen[place] = state
 
     # -- words -------------------------------------------------------------------------------------------------------
 
@@ -324,11 +354,25 @@ class _Unroller:
 
     def _step(self, line: int) -> None:
         self._steps += 1
-        if self._steps > MOST_STEPS:
-            raise ProgramError(line, f"more than {MOST_STEPS} lines are run: does a loop never end?")
+        if self._steps - self._wrote > MOST_IDLE + len(self._texts):
+            raise self._endless(line, f"{MOST_IDLE:,} lines and written none")
+        if self._steps > MOST_STEPS + len(self._texts):
+            raise self._endless(line, f"more than {MOST_STEPS:,} lines")
 
     def _out(self, text: str, line: int) -> tuple[str, int]:
         self._written += 1
-        if self._acted and self._written > MOST:
-            raise ProgramError(line, f"more than {MOST} lines come out: does a loop never end?")
+        self._wrote = self._steps
+        if self._acted and self._written > MOST + len(self._texts):
+            raise self._endless(line, f"more than {MOST:,} lines that would be written")
         return text, line
+
+    def _endless(self, line: int, what: str) -> ProgramError:
+        """Return the error of a loop without end: of those that run, the outermost makes the fewest passes."""
+        running = [
+            (n, place + 1) for place, (n, last) in self._passes.items() if n > 1 and self._steps - last < _RECENT
+        ]
+        return ProgramError(
+            min(running, default=(0, line))[1],
+            f"the loop that begins here has run {what}: it seems to have no end; write a condition that becomes false, "
+            "or let one program run fewer passes",
+        )

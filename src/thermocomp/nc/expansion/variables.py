@@ -35,6 +35,7 @@ class Variables:
     def __init__(self, values: Mapping[Key, float] | None = None, *, macro: bool = False) -> None:
         self._parameters = Parameters("fanuc", values)
         self.macro = macro
+        self.changes = 0  #: how often a variable has got another value
 
     def called(self, arguments: Mapping[Key, float]) -> "Variables":
         """Return the variables of a macro that is called from here."""
@@ -43,7 +44,9 @@ class Variables:
     def returned(self, inner: "Variables") -> None:
         """Take over the common variables of a macro that has ended."""
         own: dict[Key, float] = {key: self._parameters[key] for key in _LOCAL if key in self._parameters}
-        self._parameters = Parameters("fanuc", {**own, **inner._common()})
+        common = inner._common()
+        self.changes += common != self._common()
+        self._parameters = Parameters("fanuc", {**own, **common})
 
     def _common(self) -> dict[Key, float]:
         return {key: self._parameters[key] for key in _COMMON if key in self._parameters}
@@ -66,7 +69,9 @@ class Variables:
                 )
             if squeezed_is_empty(assignment.value):
                 raise InputError(f"{assignment.target} is made empty (#0), which is not followed; give it a value")
+            same = key in self._parameters and self._parameters[key]
             self._parameters.assign([assignment])
+            self.changes += same is False or self._parameters[key] != same
         except InputError as error:
             raise ProgramError(line, f"a variable: {error}") from None
 

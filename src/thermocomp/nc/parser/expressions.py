@@ -11,6 +11,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Literal
 
 from thermocomp.core.exceptions import InputError
@@ -28,6 +29,11 @@ _OPERATOR = re.compile(r"\*\*|[-+*/]|mod|and|xor|or|eq|ne|gt|ge|lt|le")
 
 #: numbers of a Fanuc nearer than this part of theirs may be the same to it
 _ROUNDED = 1e-8
+
+# most expressions of a loop: one value, or two and what is done to them
+_OPERAND = r"(?:#([1-9][0-9]*)|([0-9]+\.?[0-9]*|\.[0-9]+))"
+_SIMPLE = re.compile(rf"(\[?){_OPERAND}(?:({_OPERATOR.pattern}){_OPERAND})?(\]?)")
+_ALONE = re.compile(r"#([1-9][0-9]*)")
 
 Key = int | str  # number or name of a parameter
 Binary = Callable[[float, float], float]
@@ -205,6 +211,8 @@ class Parameters:
 
     def key(self, target: str) -> Key:
         """Return number or name of the parameter that is written ``#5``, ``##2``, ``#<depth>`` or ``#[#1 + 2]``."""
+        if simple := _ALONE.fullmatch(target):
+            return int(simple[1])
         reader = _Reader(target, self)
         if not reader.takes("#"):
             raise InputError(f"found '{target}' where a parameter, such as #5, should be")
@@ -229,15 +237,36 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
     InputError
         The expression is wrong, has no value (1 / 0), or needs a parameter that is unknown.
     """
-    reader = _Reader(text, parameters, word=word)
+    simple = _read_simple(text, parameters.controller)
     try:
-        value = reader.expression() if parameters.controller == "fanuc" else reader.value()
-        reader.end()
+        if simple is not None:
+            first, action, second = simple
+            value = first if isinstance(first, float) else parameters[first]
+            if action is not None:
+                value = float(action(value, second if isinstance(second, float) else parameters[second]))
+        else:
+            reader = _Reader(text, parameters, word=word)
+            value = reader.expression() if parameters.controller == "fanuc" else reader.value()
+            reader.end()
     except (ArithmeticError, ValueError) as error:  # 1 / 0, sqrt[-1], exp[1000]
         raise InputError(f"'{text.strip()}' has no value: {error}") from error
     if not math.isfinite(value):
         raise InputError(f"'{text.strip()}' has no value: it is too large")
     return value
+
+
+@lru_cache(maxsize=4096)
+def _read_simple(
+    text: str, controller: Literal["linuxcnc", "fanuc"]
+) -> tuple[float | int, Binary | None, float | int] | None:
+    """Return what a simple expression does to what: numbers, or the numbers (int) of parameters; None: it is none."""
+    found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
+    if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
+        return None
+    if found[4] and found[4] not in _OPERATORS[controller]:
+        return None
+    operands = [int(key) if key else float(number or 0.0) for key, number in (found.group(2, 3), found.group(5, 6))]
+    return operands[0], _OPERATORS[controller][found[4]][1] if found[4] else None, operands[1]
 
 
 class _Reader:

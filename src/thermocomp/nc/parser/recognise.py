@@ -89,7 +89,6 @@ _MAGIC = (
     ("\xfe\xff", _UTF_16),
 )
 _COMMENT = re.compile(r"\([^()]*\)?")
-_PROGRAM_NUMBER = re.compile(r"[O:]\s*[0-9]{1,8}", re.IGNORECASE)
 _NAME = re.compile(r"<[^<>]*>")  # o<trans> call, #<rot>
 
 
@@ -118,15 +117,6 @@ def recognise(first_lines: Sequence[str]) -> str:
                     f"it is not supported: {kind.advice}"
                 )
     return "iso"
-
-
-def program_number(first_lines: Sequence[str]) -> int:
-    """Return the line at which a program begins with its number, as a Fanuc's do, such as ``O1234 (PART)``; 0: none."""
-    for number, line in enumerate(first_lines, 1):
-        code = _COMMENT.sub("", line).strip()
-        if code and code != "%":
-            return number if _PROGRAM_NUMBER.fullmatch(code) else 0
-    return 0
 
 
 def _refuse_binary(lines: Sequence[str]) -> None:

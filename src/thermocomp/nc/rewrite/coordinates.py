@@ -271,15 +271,18 @@ class Coordinates(CorrectionMethod):
             self.doubt(axis, carried)
 
     def _hurries(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...]) -> bool:
-        """Return whether a change of the correction would alter the time of a cut by more than is allowed."""
+        """Return whether a change of the correction would alter the time of a cut by more than is allowed.
+
+        Axes of which nobody knows where they are count as well, if the line names them: no hand may have moved them.
+        """
         if len(block.moves) != 1 or block.moves[0].rapid or not block.moves[0].feed:
             return False
         move = block.moves[0]
         moved = frame.shift(goal)
-        gaps = [
-            0.0 if i in holds or self.fixed[i] or self.doubtful[i] else (moved[i] - self.carried[i]) * 1e-3
-            for i in range(3)
-        ]
+        gaps = [0.0 if i in holds else (moved[i] - self.carried[i]) * 1e-3 for i in range(3)]
+        for i, letter in enumerate(AXES):
+            if (self.fixed[i] or self.doubtful[i]) and not (block.modal.absolute and letter in block.words):
+                gaps[i] = 0.0  # it gets no other word
         way = length(move)
         if move.arc is None:
             longer = math.hypot(*(b - a + g for a, b, g in zip(move.start, move.end, gaps, strict=True)))

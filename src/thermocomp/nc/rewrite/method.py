@@ -131,7 +131,7 @@ class CorrectionMethod(ABC):
     def stands(self, block: Block) -> bool:
         """Return whether a block moves no linear axis: it must not do so afterwards either.
 
-        So does a rapid with a rotary axis after a stop, if no hand has moved the axes since.
+        So does a cut, or a rapid with a rotary axis, after a stop, if no hand has moved the axes since.
 
         Raises
         ------
@@ -151,7 +151,7 @@ class CorrectionMethod(ABC):
                 f"turns a rotary axis in feed, and nobody knows whether {unknown[0]} moves, which decides whether F "
                 f"counts degrees: position {' '.join(unknown)} by a rapid before",
             )
-        return not moves and not (unknown and ROTARY.isdisjoint(block.words))
+        return not moves and not (unknown and ROTARY.isdisjoint(block.words) and block.moves[-1].rapid)
 
     def frame(self, block: Block) -> Frame:
         """Return how corrections stand in the words of a block."""

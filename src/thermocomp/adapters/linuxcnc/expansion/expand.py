@@ -13,6 +13,7 @@ from thermocomp.adapters.linuxcnc.expansion.plain import Writer
 from thermocomp.adapters.linuxcnc.expansion.proof import compare, compare_parameters
 from thermocomp.adapters.linuxcnc.expansion.words import Side
 from thermocomp.adapters.linuxcnc.rs274 import Canonical, read
+from thermocomp.adapters.linuxcnc.rs274process import InterpreterJob, InterpreterRun
 from thermocomp.adapters.linuxcnc.stored import Stored, draw_controller
 from thermocomp.core.draft import draft
 from thermocomp.core.exceptions import InputError, ProgramError
@@ -85,6 +86,15 @@ class _Around:
             opened=opened,
         )
 
+    def try_whether_it_ends(self, path: Path, stored: Stored) -> None:
+        """Run a program and look at nothing: a loop without end is refused before anything is made of its moves."""
+        job = InterpreterJob(
+            path, stored, bool(self.inch), self.block_delete, self.subroutines, task=False, seconds=self.seconds
+        )
+        with InterpreterRun(job) as run:
+            for _ in run.blocks():
+                pass
+
     def controller(self, seed: int) -> Stored:
         """Return a controller that has nothing else in common with that of another seed."""
         stored = draw_controller(seed, self.startup or "")
@@ -152,6 +162,7 @@ def expand(
     systems = _start_systems(path, block_delete)
     around = _Around(inch, startup, diameters or {}, block_delete, subroutines, user_codes, seconds, systems)
     acts = 0
+    around.try_whether_it_ends(path, around.controller(_WRITTEN[0]))
     with draft(out, overwrite=False) as part:
         sources: array[int] = array("I")
         with part.open("w", encoding="ascii", newline="\n") as file:

@@ -227,6 +227,8 @@ class _Comparison:
         still = (stands < STILL) & (was.plane == 0) & straight
         # a rapid to where the tool may stand already, or not: the program leaves it open
         still &= shifts.placed | turning | (was.kind != self.sides[0].run.codes["rapid"])
+        # in machine coordinates the axes give back what they carry, also where the tool is there already
+        still &= ~shifts.machine | turning
         # beside a rotary axis anything that moves takes its feed; else it is how numbers are rounded in inches and mm
         least = np.where(turning, STILL, 1e-3 * ROUNDING)
         yield _Check(

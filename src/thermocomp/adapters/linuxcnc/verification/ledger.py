@@ -13,6 +13,8 @@ Booleans = np.ndarray[Any, np.dtype[np.bool_]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 _INVERSE_TIME = 93
+#: of lines: it is not known where the axes stood that they name; they go to machine coordinates
+_UNPLACED, _MACHINE = 1.0, 2.0
 
 
 class Shift(NamedTuple):
@@ -34,6 +36,7 @@ class Shifts(NamedTuple):
     inner: Floats
     inverse: Booleans
     placed: Booleans  #: it is known where the axes stood that it names
+    machine: Booleans  #: it goes to machine coordinates, where the axes carry nothing
     others: tuple[Floats, ...]  #: what may be carried instead before it, and behind it
 
 
@@ -90,7 +93,8 @@ class Ledger:
         self._inverse.take(line, (float(block.modal.feed_mode == _INVERSE_TIME),))
         if revised.knots:
             self.knots[line] = revised.knots
-        self._loose.take(line, (float(not revised.placed),))
+        goes = block.kind in ("machine", "home")
+        self._loose.take(line, (_MACHINE if goes else float(not revised.placed),))
         x, y, z = (o - c for o, c in zip(revised.other or revised.carried, revised.carried, strict=True))
         self._other.take(line, (x, y, z))
 
@@ -98,9 +102,10 @@ class Ledger:
         """Return what lines of the original should be shifted by."""
         after = self._carried.at(lines)
         inverse = self._inverse.at(lines)[:, 0] > 0
-        before, placed = self._carried.at(lines - 1), self._loose.at(lines)[:, 0] == 0
+        before, loose = self._carried.at(lines - 1), self._loose.at(lines)[:, 0]
         others = (before + self._other.at(lines - 1), after + self._other.at(lines)) if self._other.lines else ()
-        return Shifts(before, after, after + self._inner.at(lines), inverse, placed, others)
+        inner = after + self._inner.at(lines)
+        return Shifts(before, after, inner, inverse, loose != _UNPLACED, loose == _MACHINE, others)
 
     def at(self, line: int) -> Shift:
         """Return what a line of the original should be shifted by."""

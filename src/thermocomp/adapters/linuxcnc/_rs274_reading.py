@@ -1,0 +1,90 @@
+"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and no loop for ever.
+
+Part of the script `_rs274_child.py`: standard library only.
+"""
+
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable
+
+#: lines that are read beyond those of the program: without a move, a dwell or the like between them, and in all. A line
+#: takes some 5 us, so that either is reached within seconds
+MOST_IDLE = 300_000
+MOST = 1_200_000
+#: lines that are watched then, to find the loop
+WATCHED = 20_000
+LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
+
+
+class RefusedError(Exception):
+    """The program wants something that is not done for it: the line, and the reason."""
+
+
+class Reading:
+    """Bounds what is read.
+
+    Parameters
+    ----------
+    program : str
+    home : str
+        Folder of the runs: all in it may be read and written.
+    folders : iterable of str
+        Of the program and of its subprograms: what is in them may be read.
+    lines : int
+        Of the program.
+    where : callable
+        Gives the line in execution, and whether it is one of the program itself.
+    """
+
+    def __init__(
+        self, program: str, home: str, folders: Iterable[str], lines: int, where: Callable[[], tuple[int, bool]]
+    ) -> None:
+        self.program = program
+        self.home = os.path.realpath(home)
+        self.folders = [os.path.realpath(folder) for folder in folders]
+        self.where = where
+        self.idle, self.most = lines + MOST_IDLE, lines + MOST
+        self.lines = self.acted = 0  # read, in all and when something was done last
+        self.watched: list[tuple[int, bool]] = []
+
+    def check_file(self, name: bytes, *, write: bool) -> None:
+        """Refuse a file outside the folders, wherever its name, a link or ``..`` leads."""
+        path = os.path.realpath(os.fsdecode(name))
+        folders = [self.home] if write else [self.home, *self.folders]
+        if any(os.path.commonpath((path, folder)) == folder for folder in folders) or not os.path.exists(path):  # noqa: PTH110
+            return
+        what = "would write" if write else "would read"
+        raise RefusedError(
+            self.where()[0],
+            f"it {what} {path}, which is outside the folder of the program and those of --subroutines; copy the file "
+            "into one of them, or name its folder with --subroutines and call it by its name alone",
+        )
+
+    def count_line(self) -> None:
+        """Take in that a line is read; refuse a program whose loop does not end."""
+        self.lines += 1
+        if self.lines < self.acted + self.idle and self.lines < self.most:
+            return
+        self.watched.append(self.where())
+        if len(self.watched) < WATCHED:
+            return
+        idle = self.lines >= self.acted + self.idle
+        count = f"{MOST_IDLE if idle else MOST:,}"
+        what = f"{count} lines without a move, a dwell or a tool change" if idle else f"more than {count} lines"
+        raise RefusedError(
+            self.find_loop(),
+            f"the loop here has run {what}: it seems to have no end; write a condition that becomes false, or let one "
+            "program run fewer passes",
+        )
+
+    def find_loop(self) -> int:
+        """Return the line at which the loop begins that the watched lines are in: the outermost one."""
+        # a line that was read last; the next one is about to be
+        passes = Counter(line + 1 for line, own in self.watched if own)
+        if not passes:
+            return min(line for line, _ in self.watched) + 1
+        with open(self.program, encoding="latin-1") as file:  # noqa: PTH123
+            heads = {n for n, text in enumerate(file, 1) if n in passes and LOOP.search(text)}
+        again = [line for line in heads if passes[line] > 1]
+        return min(again, key=lambda line: (passes[line], line), default=min(passes))

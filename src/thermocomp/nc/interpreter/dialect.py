@@ -1,0 +1,287 @@
+"""Judges from a whole program whether it is LinuxCNC's or a Fanuc's, and asks where its words leave that open.
+
+A *sign* is what one of the two refuses: it is certain. A *hint* is a habit of LinuxCNC's users: text behind ``;``
+(posts for a Fanuc end lines with a bare one), a comment that acts in LinuxCNC or names it, arcs in several lines that
+close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). All
+words that both take and read in different ways (`thermocomp.nc.interpreter.openwords`) are asked for, unless there is a
+sign of LinuxCNC.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final, Literal, NamedTuple
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.codes import G_CODES, M_CODES
+from thermocomp.nc.interpreter.openwords import DRILLS, InForce, LineWords, list_open_words, read_number
+
+Whose = Literal["linuxcnc", "fanuc"]
+
+# most lines of a long program: nothing but moves, in which no more than a length without a point can be open
+_PLAIN = re.compile(
+    r"[ \t]*(?:N[0-9]+[ \t]*)?(?:G0?([0-3])(?![0-9.])[ \t]*)?(?:[XYZIJKABCRFS][-+]?[0-9.]+[ \t]*)*[\r\n]*",
+    re.IGNORECASE,
+).fullmatch
+_BARE = re.compile(r"[XYZIJKABCR][-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).search
+
+# all others, without comments and blanks, in upper case, with {} for brackets
+_COMMENT = re.compile(r"\([^()]*\)?")
+_ACTIVE = re.compile(r"\([ \t]*(?:MSG|DEBUG|PRINT|LOG|LOGOPEN|PROBEOPEN)[ \t]*,|LINUXCNC")
+_MARKS = ("\ufeff", "ï»¿")
+_BRACKET = re.compile(r"\[[^\[\]]*\]")
+_HEAD = re.compile(r"(?P<delete>/[1-9]?)?(?:N[0-9]+(?:\.[0-9]+)?)?(?P<again>/[1-9]?)?")
+_O_WORD = re.compile(
+    r"O(?:[0-9]+|<[^<>]*>|#+[0-9]+|\{\})"
+    r"(?:SUB|ENDSUB|CALL|RETURN|IF|ELSEIF|ELSE|ENDIF|WHILE|ENDWHILE|DO|REPEAT|ENDREPEAT|BREAK|CONTINUE)"
+)
+_NUMBER_ALONE = re.compile(r"[O:][0-9]+")
+_PROGRAM_NUMBER = re.compile(r"[O:][0-9]+|O?<[^<>]*>$")
+_FANUC_FLOW = re.compile(r"IF\{\}(?:GOTO|THEN)|GO(?:TO)?[0-9#{]|WH(?:ILE)?\{\}DO[0-9]|DO[0-9#]|END[0-9]")
+_FANUC_OUTPUT = re.compile(r"DPRNT|BPRNT|POPEN|PCLOS|SETVN")
+_FANUC_CORNER = re.compile(r",[RCA]")
+_ASSIGNED = re.compile(r"#[#0-9]*(?:<[^<>]*>|\{\})?=")
+_OPERATOR = re.compile(r"[0-9.}][-+*/]")  # between operands without a bracket around them
+_WORD = re.compile(
+    r"([A-Z@^])([-+]*(?:[0-9]+\.?[0-9]*|\.[0-9]+)|[-+]*#[#0-9]*(?:\{\}|<[^<>]*>)?|[-+]*[A-Z]*\{\}(?:/\{\})?)"
+)
+_WORDS = re.compile(f"(?:{_WORD.pattern})+")
+
+_FANUC_G: Final = G_CODES["fanuc"].keys() - G_CODES["linuxcnc"].keys()
+_FANUC_M: Final = M_CODES["fanuc"].keys() - M_CODES["linuxcnc"].keys()
+#: no code of a Fanuc or a Haas, whatever its options; others of LinuxCNC are (G7, G28.1, G33, G43.1, M60 ...)
+_LINUXCNC_G: Final = frozenset((5.2, 5.3, 33.1, 38.2, 38.3, 38.4, 38.5, 59.1, 59.2, 59.3, 90.1, 91.1, 92.2, 92.3))
+#: kinds of open words that a hint decides
+_USUAL: Final = ("length", "g43", "exact", "behind")
+#: kinds of open words that are named
+_NAMED: Final = 5
+
+_BEGINS = "how a Fanuc's or Haas's programs begin"
+_EITHER = "or say --controller linuxcnc or --controller fanuc"
+_BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: take it away, or give it a line of its own"
+
+
+class Place(NamedTuple):
+    """Something in a program."""
+
+    line: int
+    text: str  #: as it is written
+    what: str  #: what it is, or how it is read
+
+
+@dataclass
+class Judgement:
+    """What a program shows.
+
+    Parameters
+    ----------
+    linuxcnc, fanuc : Place or None
+        The first sign of each.
+    hint : Place or None
+        Of LinuxCNC.
+    open : dict of str to Place
+        The first word of each kind that is read in two ways: its readings, and what to write instead.
+    count : dict of str to int
+        How many lines have one.
+    """
+
+    linuxcnc: Place | None = None
+    fanuc: Place | None = None
+    hint: Place | None = None
+    open: dict[str, Place] = field(default_factory=dict)
+    count: dict[str, int] = field(default_factory=dict)
+
+
+def check_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = False) -> None:
+    """Raise an error if a program of which nobody has said whose it is need not be LinuxCNC's.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        The whole program.
+    whole : bool
+        It is stated what a length without a decimal point is.
+    retract : bool
+        It is stated whether G98 or G99 is in force at the start.
+
+    Raises
+    ------
+    ProgramError
+        It is a Fanuc's; or both a Fanuc's and LinuxCNC's; or it has words that the two read in different ways: the
+        lines, the words and the readings.
+    """
+    found = judge_dialect(lines, whole=whole, retract=retract)
+    mine, other = found.linuxcnc, found.fanuc
+    if mine and other:
+        raise ProgramError(
+            other.line,
+            f"{other.text!r} is {other.what}, and line {mine.line}: {mine.text!r} is {mine.what}: take away the one "
+            f"that is not meant, {_EITHER}",
+        )
+    if other:
+        raise ProgramError(
+            other.line,
+            f"{other.text!r} is {other.what}: say --controller fanuc (dwells, cycles and lengths are others there), or "
+            "--controller linuxcnc",
+        )
+    if mine or not found.open:
+        return
+    kinds = sorted(found.open, key=lambda kind: found.open[kind].line)
+    told = []
+    for kind in kinds[:_NAMED]:
+        place, more = found.open[kind], found.count[kind] - 1
+        told.append(f"line {place.line}: {place.text} {place.what}" + f" (and {more} more)" * (more > 0))
+    if len(kinds) > _NAMED:
+        told.append(f"and {len(kinds) - _NAMED} other kinds of words")
+    first = found.open[kinds[0]].line
+    raise ProgramError(
+        first,
+        f"{'; '.join(told).removeprefix(f'line {first}: ')}. Nothing in the program is LinuxCNC's or a Fanuc's alone: "
+        f"write it so that both read the same, {_EITHER}",
+    )
+
+
+def judge_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = False) -> Judgement:
+    """Return what a whole program shows of its dialect; see `check_dialect`."""
+    scan = _Scan(InForce(whole, retract))
+    for number, text in enumerate(lines, 1):
+        if not scan.pass_plain(text):
+            scan.take(number, text)
+    found = scan.found
+    if found.hint is not None:
+        for kind in _USUAL:
+            found.open.pop(kind, None)
+    return found
+
+
+class _Scan:
+    """Goes through a program, and keeps what is in force."""
+
+    def __init__(self, force: InForce) -> None:
+        self.found = Judgement()
+        self._force = force
+        self._began = self._ended = False
+        self._line = 0
+        self._text = self._code = ""
+
+    def pass_plain(self, text: str) -> bool:
+        """Return whether a line has nothing to judge, and take in how it moves."""
+        found = _PLAIN(text)
+        if found is None:
+            return False
+        motion = float(found[1]) if found[1] else self._force.motion
+        if motion in DRILLS:
+            return False
+        if not self._force.whole and _BARE(text):
+            if "length" not in self.found.open or motion not in (0.0, 1.0):
+                return False
+            self.found.count["length"] += 1
+        self._force.motion = motion
+        return True
+
+    def take(self, number: int, text: str) -> None:
+        """Take a line in."""
+        self._line, self._text = number, text.strip()[:40]
+        for mark in _MARKS:
+            text = text.removeprefix(mark)
+        text = text.upper()
+        if _ACTIVE.search(text):
+            self._hint("a comment for LinuxCNC")
+        self._code, *rest = _COMMENT.sub("", text).split(";")
+        block = _squeeze(self._code)
+        self._ended = self._ended or (block == "%" and self._began)
+        self._began = self._began or bool(block)
+        self._block(block)
+        for behind in map(_squeeze, rest):
+            if _NUMBER_ALONE.fullmatch(behind):
+                self._sign("fanuc", _BEGINS)
+            elif _WORDS.fullmatch(behind) and not self._ended:
+                self._ask("behind", f"';{behind[:20]}'", _BEHIND)
+            elif behind:
+                self._hint("a comment of LinuxCNC's")
+
+    def _sign(self, whose: Whose, what: str) -> None:
+        if getattr(self.found, whose) is None:
+            setattr(self.found, whose, Place(self._line, self._text, what))
+
+    def _hint(self, what: str) -> None:
+        self.found.hint = self.found.hint or Place(self._line, self._text, what)
+
+    def _ask(self, kind: str, text: str, what: str) -> None:
+        self.found.open.setdefault(kind, Place(self._line, text, what))
+        self.found.count[kind] = self.found.count.get(kind, 0) + 1
+
+    def _block(self, text: str) -> None:
+        head = _HEAD.match(text)
+        assert head is not None  # all of it may be missing
+        body = text[head.end() :]
+        if _O_WORD.match(body):
+            self._sign("linuxcnc", "an O-word, which only LinuxCNC has")
+            return
+        if _PROGRAM_NUMBER.match(body):
+            self._sign("fanuc", _BEGINS)
+            return
+        if len(head["delete"] or "") > 1 or head["again"]:
+            self._sign("fanuc", "a block delete with a number, or behind N, which only a Fanuc or Haas has")
+        if _FANUC_FLOW.match(body) or _FANUC_OUTPUT.match(body):
+            self._sign("fanuc", "of a Fanuc's or Haas's macros")
+            return
+        if "#<" in "".join(self._code.split()):
+            self._sign("linuxcnc", "a named parameter, which only LinuxCNC has")
+        if "@" in body or "^" in body:
+            self._sign("linuxcnc", "a place in polar coordinates of LinuxCNC's (@ ^)")
+        if _FANUC_CORNER.search(body):
+            self._sign("fanuc", "a corner of a Fanuc's or Haas's (,R ,C ,A)")
+        if assigned := _ASSIGNED.search(body):
+            self._assigned(body[assigned.end() :].replace("ATAN{}/{}", "{}"))
+            body = body[: assigned.start()]
+        self._words(_WORD.findall(body))
+
+    def _assigned(self, value: str) -> None:
+        if "=" in value:
+            self._sign("linuxcnc", "several assignments on a line, which only LinuxCNC takes")
+        elif _OPERATOR.search(value):
+            self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
+
+    def _words(self, words: list[tuple[str, str]]) -> None:
+        line = LineWords(
+            self._code,
+            [read_number(value) for letter, value in words if letter == "G"],
+            [read_number(value) for letter, value in words if letter == "M"],
+            {letter: value for letter, value in words if letter not in "GM"},
+        )
+        self._signs(line)
+        self._force.take(line.g)
+        if not self._ended:
+            for kind, text, readings in list_open_words(line, self._force):
+                self._ask(kind, text.replace("{}", "[..]"), readings)
+            if self._force.mixed > 1:
+                self._hint("an arc that closes only if lengths without a point are whole")
+        self._ended = self._ended or not {2.0, 30.0}.isdisjoint(line.m)
+
+    def _signs(self, line: LineWords) -> None:
+        g, m, values = line.g, line.m, line.values
+        theirs = [f"G{n:g}" for n in g if n in _FANUC_G] + [f"M{n:g}" for n in m if n in _FANUC_M]
+        own = [f"G{n:g}" for n in g if n in _LINUXCNC_G] + ["G64 P"] * (64.0 in g and "P" in values)
+        if 4.0 in g and "P" not in values and not values.keys().isdisjoint("XU"):
+            theirs.append("G4 X or U")
+        if not {5.0, 5.1, 8.0}.isdisjoint(g):  # they smooth the path of the one, and are splines of the other
+            if values.keys().isdisjoint("XYIJ") and not values.keys().isdisjoint("PQ"):
+                theirs.append(f"G{g[0]:g} without X and Y")
+            elif 8.0 not in g and not values.keys().isdisjoint("XY"):
+                own.append(f"G{g[0]:g} with X and Y")
+        if theirs:
+            self._sign("fanuc", f"a Fanuc's or Haas's ({theirs[0]})")
+        if own:
+            self._sign("linuxcnc", f"LinuxCNC's ({own[0]})")
+
+
+def _squeeze(text: str) -> str:
+    """Return a block without blanks, and with ``{}`` for its brackets."""
+    text = "".join(text.split())
+    while "[" in text:
+        inner = _BRACKET.sub("{}", text)
+        if inner == text:
+            break
+        text = inner
+    return text

@@ -1,0 +1,215 @@
+"""Words that LinuxCNC and a Fanuc both take and read in different ways, so that time, drift or correction differ."""
+
+import re
+from collections.abc import Container, Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from thermocomp.nc.interpreter.codes import CYCLES
+
+DRILLS: Final = frozenset(float(code[1:]) for code in CYCLES)
+_DWELLS: Final = (74.0, 82.0, 84.0, 86.0, 89.0)
+_TAPS: Final = (74.0, 84.0)
+_PECKS: Final = (73.0, 83.0)
+_OTHER_CYCLES: Final = (76.0, 87.0, 88.0)
+_TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
+_ARCS: Final = (2.0, 3.0)
+_LENGTHS: Final = "XYZABCIJKRQ"
+_ARC_WORDS: Final = "XYZIJKR"
+_LOGIC = re.compile(r"(?<![A-Z])(?:AND|X?OR)(?![A-Z])")
+
+_SHIFT = (
+    "is kept by LinuxCNC in one store with G92 and G52, also behind the end of the program, and apart by a Fanuc, "
+    "which forgets it: shift by G54 to G59"
+)
+_OTHER = "is another cycle in LinuxCNC than in a Fanuc: write its moves out"
+#: codes that are open wherever they are: the kind, and the readings
+_OPEN_CODES: Final = {
+    **dict.fromkeys((52.0, 92.0, 92.1), ("shift", _SHIFT)),
+    **dict.fromkeys(_OTHER_CYCLES, ("other cycle", _OTHER)),
+    61.0: ("exact", "goes through the corners exactly in LinuxCNC, and stops there in a Fanuc: write G64"),
+    61.1: ("exact", "stops in the corners in LinuxCNC, and smooths them in a Fanuc: write G64"),
+}
+_G10 = (
+    "sets other offsets in LinuxCNC (L1, L10, L11: the tool table; L20: by the place of the tool; P0: the system in "
+    "force) than in a Fanuc (L10 to L13: tool offsets; L20: G54.1; P0: the external offset): write G10 L2 P1 to P6, in "
+    "G90"
+)
+_CALL = "is taken by LinuxCNC from files of its own, and by a Fanuc from its memory: write the moves out"
+
+
+@dataclass
+class InForce:
+    """What is in force in a program, as far as it counts here.
+
+    Parameters
+    ----------
+    whole : bool
+        It is stated what a length without a decimal point is.
+    retract : bool
+        It is stated whether G98 or G99 is in force.
+    motion : float
+        Its G code; -1 before the first one.
+    absolute : bool
+    unit : str
+        With a blank before it; empty if it is not known.
+    mixed : int
+        Arcs that have lengths with points and without: they close only if the latter are whole.
+    """
+
+    whole: bool
+    retract: bool
+    motion: float = -1.0
+    absolute: bool = True
+    unit: str = ""
+    mixed: int = 0
+
+    def take(self, codes: Container[float]) -> None:
+        """Take the G codes of a line in."""
+        for code in (*_MOTIONS, 80.0):
+            if code in codes:
+                self.motion = code
+        if 90.0 in codes or 91.0 in codes:
+            self.absolute = 90.0 in codes
+        if 20.0 in codes or 21.0 in codes:
+            self.unit = " in" if 20.0 in codes else " mm"
+        self.retract = self.retract or 98.0 in codes or 99.0 in codes
+
+
+_MOTIONS: Final = (0.0, 1.0, 2.0, 3.0, 33.0, *sorted(DRILLS))
+
+
+class OpenWord(NamedTuple):
+    """A word that is read in two ways."""
+
+    kind: str
+    text: str
+    readings: str  #: and what to write instead
+
+
+@dataclass
+class LineWords:
+    """Words of a line.
+
+    Parameters
+    ----------
+    code : str
+        The line without comments, in upper case.
+    g, m : list of float
+        Numbers of its codes.
+    values : dict of str to str
+        All others, as they are written.
+    """
+
+    code: str
+    g: list[float]
+    m: list[float]
+    values: dict[str, str]
+
+
+def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
+    """Yield the words of a line that are read in two ways.
+
+    Parameters
+    ----------
+    line : LineWords
+    force : InForce
+        With the codes of the line.
+    """
+    codes, values = set(line.g), line.values
+    if 4.0 in codes and _counts(values.get("P")):
+        yield OpenWord("dwell", f"G4 P{values['P']}", _seconds(values["P"]))
+    yield from (OpenWord(_OPEN_CODES[n][0], f"G{n:g}", _OPEN_CODES[n][1]) for n in line.g if n in _OPEN_CODES)
+    yield from (OpenWord("call", f"M{n:g}", _CALL) for n in line.m if n in (98.0, 99.0))
+    if 10.0 in codes and not _sets_origin(values, force):
+        words = "".join(f" {letter}{values[letter]}" for letter in "LP" if letter in values)
+        yield OpenWord("g10", f"G10{words}", _G10)
+    if 53.0 in codes and force.motion in (1.0, *_ARCS):
+        what = "moves by the feed in LinuxCNC under G1, and as a rapid in a Fanuc: write G53 G0"
+        yield OpenWord("g53", "G53", what)
+    if 43.0 in codes and "H" not in values:
+        what = "is the tool in the spindle for LinuxCNC, and the last H for a Fanuc: write H"
+        yield OpenWord("g43", "G43 without H", what)
+    for letter in "UVW":
+        if letter in values and 4.0 not in codes:
+            what = "is an axis of its own in LinuxCNC, and a way of X, Y or Z for a Fanuc: write X, Y and Z"
+            yield OpenWord("way", f"{letter}{values[letter]}", what)
+    if _LOGIC.search(line.code):
+        what = "takes bits in a Fanuc, and true and false in LinuxCNC: do without it"
+        yield OpenWord("logic", "AND, OR or XOR", what)
+    if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(_TAKES_AXES):
+        yield from _open_cycle(codes, values, force)
+    if 4.0 not in codes and not (force.whole or 19.0 in line.m):
+        yield from _open_lengths(codes, values, force)
+
+
+def _sets_origin(values: dict[str, str], force: InForce) -> bool:
+    """Return whether G10 sets the origin of G54 to G59, as it does in both."""
+    return read_number(values.get("L", "")) == 2.0 and 1.0 <= read_number(values.get("P", "")) <= 6.0 and force.absolute
+
+
+def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
+    motion, code = force.motion, f"G{force.motion:g}"
+    if motion in _DWELLS and _counts(values.get("P")):
+        yield OpenWord("cycle dwell", f"{code} P{values['P']}", _seconds(values["P"]))
+    if "L" in values or ("K" in values and motion not in _OTHER_CYCLES):
+        letter = "L" if "L" in values else "K"
+        what = "repeats: in L for LinuxCNC and a Haas, in K for a Fanuc: write the holes out"
+        yield OpenWord("repeats", f"{code} {letter}{values[letter]}", what)
+    if not force.retract:
+        what = "goes back to R in LinuxCNC (G99), and to the level before in a Fanuc (G98): write G98 or G99"
+        yield OpenWord("retract", f"{code} before G98 or G99", what)
+    if motion in _PECKS and motion in codes:
+        what = (
+            "stays 0.254 mm off the ground in LinuxCNC, and as far as a parameter says in a Fanuc: write the pecks out"
+        )
+        yield OpenWord("peck", code, what)
+    if motion in _TAPS and motion in codes:
+        what = "wants a turning spindle in LinuxCNC, and starts it itself in a Fanuc: write G33.1, or M29 for a Fanuc"
+        yield OpenWord("tap", code, what)
+
+
+def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
+    """Yield the first length without a point, and count the arcs that show what such lengths are."""
+    drills = force.motion in DRILLS
+    bare = {letter: value for letter, value in values.items() if value.lstrip("-+").strip("0").isdigit()}
+    if force.motion in _ARCS and not bare.keys().isdisjoint(_ARC_WORDS):
+        force.mixed += any("." in values.get(letter, "") for letter in _ARC_WORDS)
+    for letter in _LENGTHS:
+        counts = (letter == "K" and drills) or (letter == "Q" and not drills) or (letter == "R" and 10.0 in codes)
+        if letter not in bare or counts:
+            continue
+        value = bare[letter]
+        unit, least = (" deg", 1e-3) if letter in "ABC" else (force.unit, 1e-4 if force.unit == " in" else 1e-3)
+        yield OpenWord(
+            "length",
+            f"{letter}{value}",
+            f"is {int(value)}{unit} for LinuxCNC, and {int(value) * least:g}{unit} for a Fanuc that counts least "
+            f"increments: write the point ({letter}{value}.)",
+        )
+        return
+
+
+def read_number(value: str) -> float:
+    """Return the value of a plain number; -1 of all else."""
+    try:
+        return float(value)
+    except ValueError:
+        return -1.0
+
+
+def _counts(value: str | None) -> bool:
+    """Return whether a dwell may be in seconds or milliseconds: with a point all who take it read seconds."""
+    return value is not None and "." not in value and read_number(value) != 0.0
+
+
+def _seconds(value: str) -> str:
+    number = read_number(value)
+    if number < 0.0:
+        return (
+            "is in seconds for LinuxCNC, and in milliseconds for a Fanuc: write a number, with its point if in seconds"
+        )
+    return (
+        f"is {number:g} s for LinuxCNC, and {number / 1000.0:g} s for a Fanuc: write the point if it is in seconds "
+        f"(P{value}.)"
+    )

@@ -1,0 +1,186 @@
+"""Whose program it is: judged from the whole of it, and asked for where a word is read in two ways."""
+
+from pathlib import Path
+
+import pytest
+from nc_interpreter import PROGRAMS, needs_programs
+
+from thermocomp.core.exceptions import ProgramError
+from thermocomp.nc.interpreter.dialect import check_dialect
+from thermocomp.nc.parser.tokens import split_lines
+
+FANUC = sorted((Path(__file__).parent / "fanuc").glob("*.nc"))
+#: what both read in the same way
+BEGIN, END = "G21 G90 G17\nS3000 M3\nG0 X0 Y0 Z5.\nG1 Z-1. F100\n", "X0\nG0 Z5.\nM30\n"
+
+
+def question(text: str, **stated: bool) -> str:
+    """Return what is asked of a program; empty if nothing is."""
+    try:
+        check_dialect(split_lines(text), **stated)
+    except ProgramError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X100. F50",
+        "G4 P0.5\nG4 P2.\nG4 P0",
+        "G98 G81 X1. Y2. Z-1. R1. F50\nX3.\nG80",
+        "G43 H1 Z5.",
+        "G10 L2 P1 X5. Y0",
+        "G53 G0 Z0\nG1",
+        "G2 X10. Y0 I5. J0",
+        "#1=5.\nX#1 Y[#1+2.]",
+        "(O1000, X100, G4 P500)",
+        "G64\nT1 M6",
+        "G28 Z0\nG30 X0",
+        ";\nX1.;",
+    ],
+)
+def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
+    assert question(f"{BEGIN}{text}\n{END}") == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        (
+            "G04P500",
+            "G4 P500 is 500 s for LinuxCNC, and 0.5 s for a Fanuc: write the point if it is in seconds (P500.)",
+        ),
+        ("g4 p [#1*2]", "G4 P[..] is in seconds for LinuxCNC"),
+        (
+            "X 1 0 0",
+            "X100 is 100 mm for LinuxCNC, and 0.1 mm for a Fanuc that counts least increments: write the point",
+        ),
+        ("G20\nY-2", "Y-2 is -2 in for LinuxCNC, and -0.0002 in"),
+        ("A90", "A90 is 90 deg for LinuxCNC, and 0.09 deg"),
+        ("G2 X10. I5", "I5 is 5 mm"),
+        ("G98 G81 X1. Z-5 R1.", "Z-5 is -5 mm"),
+        ("G98 G82 X1. Z-1. R1. P500", "G82 P500 is 500 s for LinuxCNC, and 0.5 s"),
+        ("G81 X1. Z-1. R1.", "G81 before G98 or G99 goes back to R in LinuxCNC (G99)"),
+        ("G98 G81 X1. Z-1. R1. L3", "G81 L3 repeats"),
+        ("G98 G81 X1. Z-1. R1.\nX2. K3", "G81 K3 repeats"),
+        ("G98 G83 X1. Z-1. R1. Q1.", "G83 stays 0.254 mm off the ground"),
+        ("G99 G84 X1. Z-1. R1.", "G84 wants a turning spindle"),
+        ("G76 X1. Z-1. R1.", "G76 is another cycle"),
+        ("G92 X0", "G92 is kept by LinuxCNC in one store"),
+        ("G52 X1.", "G52 is kept by LinuxCNC in one store"),
+        ("G10 L20 P1 X0", "G10 L20 P1 sets other offsets"),
+        ("G10 L2 P0 X1.", "G10 L2 P0 sets other offsets"),
+        ("G91 G10 L2 P1 X1.\nG90", "G10 L2 P1 sets other offsets"),
+        ("G53 Z0", "G53 moves by the feed in LinuxCNC under G1"),
+        ("G43", "G43 without H is the tool in the spindle"),
+        ("G61", "G61 goes through the corners exactly"),
+        ("G61.1", "G61.1 stops in the corners"),
+        ("U5.", "U5. is an axis of its own"),
+        ("M98 P1000", "M98 is taken by LinuxCNC from files of its own"),
+        ("X[#1 AND 3]", "AND, OR or XOR takes bits"),
+        ("X1. ; G4 P1", "';G4P1' is a comment for LinuxCNC, and the next block for a Fanuc"),
+    ],
+)
+def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
+    program = f"{BEGIN}{text}\n{END}"
+    found = question(program)
+    assert asked in found
+    line = 5 + text.count("\n") - (text.endswith("\nG90"))
+    assert found.startswith(f"line {line}: ")
+    assert found.endswith("write it so that both read the same, or say --controller linuxcnc or --controller fanuc")
+    # LinuxCNC's own word anywhere decides it
+    assert question(f"{program}o100 sub\n") == ""
+
+
+def test_what_is_stated_is_not_asked_for() -> None:
+    assert question(f"{BEGIN}X100\n{END}", whole=True) == ""
+    assert question(f"{BEGIN}G81 X1. Z-1. R1.\n{END}", retract=True) == ""
+    assert "G4 P5 is 5 s" in question(f"{BEGIN}X100\nG4 P5\n{END}", whole=True, retract=True)
+
+
+def test_every_kind_of_word_is_named_with_its_first_line() -> None:
+    found = question(f"{BEGIN}X100\nX200\nG4 P5\nG92 X0\n{END}")
+    assert found.startswith("line 5: X100 is 100 mm")
+    assert "(and 1 more); line 7: G4 P5 is 5 s" in found
+    assert "; line 8: G92 is kept" in found
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "o100 sub",
+        "O100 CALL [1] [2]",
+        "o<a b> call",
+        "N5 o[#1] while [#1 LT 2]",
+        "/o1 if [1]",
+        "#<depth>=2",
+        "X[#<_x>+1]",
+        "G64 P0.01",
+        "G33.1 Z-1. K1.",
+        "G38.2 Z-1.",
+        "G91.1",
+        "G59.3",
+        "G5.1 X1. Y1. I1. J1.",
+        "@1. ^30.",
+        "#1=[#2+1] #3=2",
+    ],
+)
+def test_what_only_linuxcnc_takes_decides(text: str) -> None:
+    assert question(f"{BEGIN}{text}\nG4 P500\nX100\n{END}") == ""
+    both = question(f"{BEGIN}{text}\n{END}N1 O2000\n")
+    assert both.startswith("line 9: 'N1 O2000' is how a Fanuc's or Haas's programs begin, and line 5: ")
+    assert "take away the one that is not meant" in both
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "IF[#1GT2]GOTO10",
+        "IF [#1 EQ 1] THEN #2=3",
+        "WHILE [#1 LT 5] DO1",
+        "GOTO 10",
+        "END1",
+        "#1=#2+1",
+        "G65 P1 A1.",
+        "G4 X1.",
+        "G4 U1.",
+        "/2 X1.",
+        "N10 / X1.",
+        "G1 X1. ,R2.",
+        "G68 X0 Y0 R10.",
+        "M29 S100",
+        "G54.1 P1",
+        "G5.1 Q1",
+        "G05 P10000",
+        "POPEN",
+    ],
+)
+def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
+    found = question(f"{BEGIN}{text}\n{END}")
+    assert found.startswith(f"line 5: {text!r} is ")
+    assert "say --controller fanuc (dwells, cycles and lengths are others there), or --controller linuxcnc" in found
+
+
+def test_habits_answer_for_lengths_only() -> None:
+    comment = f"; the plate\n{BEGIN}"
+    assert question(f"{comment}X100\nG43\nG61\n{END}") == ""
+    assert "G4 P500 is 500 s" in question(f"{comment}G4 P500\n{END}")
+    assert "X100 is 100 mm" in question(f"{BEGIN}X100;\nY0;\n{END}")
+    arc = "G2 X10 Y0. I5. J0\n"
+    assert "X10 is 10 mm" in question(f"{BEGIN}{arc}{END}")  # a point may be forgotten once
+    assert question(f"{BEGIN}{arc}G2 X0 Y0 I-5 J0.\n{END}") == ""
+
+
+def test_behind_the_end_nothing_is_asked_for_but_numbers_count() -> None:
+    assert question(f"{BEGIN}{END}G4 P500\n") == ""
+    assert question(f"%\n{BEGIN}%\nX100\n") == ""
+    assert "'o5'" in question(f"{BEGIN}{END}o5\n")
+
+
+@needs_programs
+def test_few_programs_of_linuxcnc_are_asked_for_and_all_of_a_fanuc() -> None:
+    """Those that are asked for are older than LinuxCNC's own words, and have lengths without a point."""
+    assert all(question(path.read_text("latin-1")) for path in FANUC)
+    asked = [path.name for path in sorted(PROGRAMS.rglob("*.ngc")) if question(path.read_text("latin-1"))]
+    assert len(asked) <= 5, asked
