@@ -8,6 +8,7 @@ import time
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TextIO
 
 from thermocomp.adapters.connection import Connection
 from thermocomp.adapters.messages import write_message
@@ -16,6 +17,7 @@ from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status
 from thermocomp.core.reading import Reading
+from thermocomp.core.shown import explain_unfit
 from thermocomp.simulation.experiments import simulate
 from thermocomp.simulation.protocol import Experiment
 
@@ -45,7 +47,7 @@ class Played:
         if self._rows is None:
             try:
                 self._rows = await asyncio.to_thread(self._open)
-            except OSError as e:
+            except (OSError, ThermocompError) as e:
                 self._connection.to("failed", str(e))
                 raise ThermocompError(str(e)) from e
         self._connection.to("connected")
@@ -82,7 +84,7 @@ class ReplaySource(Played):
     path: Path
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
-        return _rows_of(self.path)
+        return read_rows(self.path)
 
 
 @dataclass(kw_only=True)
@@ -155,7 +157,7 @@ class FileSink:
                 name: Correction(c["offset_um"], c["slope_um_per_m"], c["reference_position_mm"])
                 for name, c in table.items()
             }
-        except (OSError, ValueError, KeyError, TypeError, InputError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError):
             return None
 
     def status(self) -> Status:
@@ -167,19 +169,46 @@ class FileSink:
         self._connection.to("closed")
 
 
-def _rows_of(path: Path) -> Iterator[tuple[float, dict[str, float]]]:
-    """Yield time [s] and values of a recording, row by row."""
-    with path.open(encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        table = csv.reader(lines)
-        names = next(table, [])
-        if "time_s" not in names:
-            raise OSError(f"{path}: has no column time_s; a recording to be replayed is one that thermocomp wrote")
-        place = names.index("time_s")
-        for row in table:
-            if (at := _parsed(row, place)) is not None:
-                found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
-                yield at, {name: v for name, v in found.items() if v is not None}
+def read_rows(path: Path) -> Iterator[tuple[float, dict[str, float]]]:
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV, row by row as they are read.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        It cannot be read, has no times, or names that are none; while rows are read: a line is no text.
+    """
+    try:
+        file = path.open(encoding="utf-8", newline="")
+    except OSError as e:
+        raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
+    rows = _rows_of(path, file)
+    next(rows)  # the heading
+    return rows
+
+
+def _rows_of(path: Path, file: TextIO) -> Iterator[tuple[float, dict[str, float]]]:
+    with file:
+        table = csv.reader(line for line in file if not line.startswith("#"))
+        try:
+            names = next(table, [])
+            if "time_s" not in names:
+                raise InputError(f"{path}: has no column time_s; want a recording that thermocomp wrote")
+            if why := next(filter(None, map(explain_unfit, names)), ""):
+                raise InputError(f"{path}: heading: {why}")
+            place = names.index("time_s")
+            yield math.nan, {}
+            for row in table:
+                if (at := _parsed(row, place)) is not None:
+                    found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
+                    yield at, {name: v for name, v in found.items() if v is not None}
+        except (UnicodeDecodeError, csv.Error) as e:
+            raise InputError(f"{path}: behind line {table.line_num}: no text that can be read: {e}") from e
+        except OSError as e:
+            raise InputError(f"{path}: behind line {table.line_num}: {e.strerror or e}") from e
 
 
 def _parsed(row: Sequence[str], place: int) -> float | None:

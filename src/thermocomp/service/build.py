@@ -20,8 +20,6 @@ from thermocomp.service.config import (
     FileOut,
     In,
     LinuxCncOut,
-    MqttIn,
-    MqttProbing,
     Out,
     Probings,
     ReplayIn,
@@ -29,6 +27,7 @@ from thermocomp.service.config import (
     SimulatedIn,
 )
 from thermocomp.service.loop import Service
+from thermocomp.service.network import MqttIn, MqttProbing
 from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
 
