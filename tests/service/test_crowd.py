@@ -106,11 +106,13 @@ def test_half_a_request_is_closed(said: bytes, monkeypatch: pytest.MonkeyPatch) 
         for k, one in enumerate(idle):
             assert ended(one, 10.0), k
         with knocking(port, 1, HALF) as (slow,):  # one that says a little more all the time
-            deadline = time.monotonic() + 10.0
-            with pytest.raises(OSError):  # noqa: PT011 - reset, or a broken pipe
-                while time.monotonic() < deadline:
+            said_more = 0
+            with contextlib.suppress(ConnectionError):
+                while said_more < 50:
                     slow.sendall(b"x")
+                    said_more += 1
                     time.sleep(0.2)
+            assert said_more < 50
 
 
 def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.MonkeyPatch) -> None:

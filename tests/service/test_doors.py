@@ -92,6 +92,16 @@ def test_the_right_token_passes_after_any_number_of_wrong_ones_and_orders() -> N
     run(work)
 
 
+def test_an_order_that_cannot_be_carried_out_yet_is_told() -> None:
+    async def work() -> None:
+        async with asking(make_app(Service(machine(), [Given()], []), TOKEN)) as client:
+            early = await client.post("/api/order", json=HOLD | {"do": "rezero"}, headers=RIGHT)
+            assert (early.status_code, "zero" in early.json()["detail"]) == (409, True)
+            assert (await client.post("/api/order", json=HOLD, headers=RIGHT)).status_code == 200
+
+    run(work)
+
+
 def test_nothing_guessed_is_not_counted() -> None:
     async def work() -> None:
         async with asking(make_app(serving(), TOKEN)) as client:
@@ -214,36 +224,43 @@ def test_a_host_that_cannot_be_is_told(host: str) -> None:
 
 EVIL = """<!doctype html><title>another page</title>
 <script>
+const order = JSON.stringify({ target: "z_um", do: "shadow" });
+const kinds = ["text/plain", "application/json", "application/x-www-form-urlencoded"];
 async function attack(to) {
-  const order = JSON.stringify({ target: "z_um", do: "shadow" }), url = to + "/api/order";
-  const said = [];
-  const attempt = async (name, work) => { try { said.push([name, await work()]); } catch (e) { said.push([name, "failed"]); } };
+  const url = to + "/api/order", said = [], method = "POST";
+  const attempt = async (name, work) => {
+    try { said.push([name, await work()]); } catch (e) { said.push([name, "failed"]); }
+  };
+  const post = async options => (await fetch(url, { method, body: order, ...options })).status;
   for (let k = 0; k < 6; k++) {
     for (const token of ["wrong" + k, "TOKEN"]) {
       const headers = { "Content-Type": "application/json", Authorization: "Bearer " + token };
-      await attempt("fetch json", async () => (await fetch(url, { method: "POST", headers, body: order })).status);
-      await attempt("fetch credentials", async () => (await fetch(url, { method: "POST", headers, body: order, credentials: "include" })).status);
+      await attempt("fetch", () => post({ headers }));
+      await attempt("fetch with credentials", () => post({ headers, credentials: "include" }));
     }
-    for (const type of ["text/plain", "application/json", "application/x-www-form-urlencoded"]) {
-      await attempt("no-cors " + type, async () => (await fetch(url, { method: "POST", mode: "no-cors", headers: { "Content-Type": type }, body: order })).status);
+    for (const type of kinds) {
+      await attempt("no-cors " + type, () => post({ mode: "no-cors", headers: { "Content-Type": type } }));
       await attempt("beacon " + type, () => navigator.sendBeacon(url, new Blob([order], { type })));
     }
-    await attempt("beacon text", () => navigator.sendBeacon(url, order));
+    await attempt("beacon", () => navigator.sendBeacon(url, order));
   }
-  await attempt("read", async () => (await (await fetch(to + "/api/state", { credentials: "include" })).text()).length);
-  await attempt("read opaque", async () => (await (await fetch(to + "/api/state", { mode: "no-cors" })).text()).length);
+  for (const options of [{ credentials: "include" }, { mode: "no-cors" }])
+    await attempt("read", async () => (await (await fetch(to + "/api/state", options)).text()).length);
   await attempt("events", () => new Promise(done => {
     const source = new EventSource(to + "/api/events", { withCredentials: true });
     source.onmessage = m => done(m.data.length); source.onerror = () => done("failed");
   }));
   return said;
 }
-async function post(to) {
+async function submit(to) {
   for (const type of ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"]) {
-    const form = document.createElement("form"), field = document.createElement("input"), frame = document.createElement("iframe");
-    frame.name = "f" + Math.random(); form.target = frame.name; form.method = "post"; form.enctype = type; form.action = to + "/api/order";
-    field.name = '{"target": "z_um", "do": "shadow", "x": "'; field.value = '"}';
-    form.append(field); document.body.append(frame, form); form.submit();
+    const [form, field, frame] = ["form", "input", "iframe"].map(n => document.createElement(n));
+    frame.name = "f" + Math.random();
+    Object.assign(form, { target: frame.name, method: "post", enctype: type, action: to + "/api/order" });
+    Object.assign(field, { name: '{"target": "z_um", "do": "shadow", "x": "', value: '"}' });
+    form.append(field);
+    document.body.append(frame, form);
+    form.submit();
     await new Promise(done => { frame.onload = done; setTimeout(done, 1000); });
   }
 }
@@ -287,7 +304,7 @@ def test_in_a_browser_other_origins_do_nothing_and_hold_works_at_once() -> None:
                 for what, found in said:
                     if what.startswith(("fetch", "read", "events")):
                         assert found in ("failed", 0), what
-                page.evaluate("to => post(to)", f"http://{target}:{port}")
+                page.evaluate("to => submit(to)", f"http://{target}:{port}")
                 assert service.state.orders == {}
                 evil.close()
         shown = browser.new_page()

@@ -5,7 +5,7 @@ import csv
 import json
 import math
 import time
-from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
@@ -36,6 +36,7 @@ class Played:
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
     _rows: Iterator[tuple[float, dict[str, float]]] | None = field(default=None, init=False, repr=False)
     _at: float = field(default=-math.inf, init=False, repr=False)  #: row that was played last [s]
+    _broken: ThermocompError | None = field(default=None, init=False, repr=False)
     _begun: float = field(default=math.nan, init=False, repr=False)  #: clock at which the row of time 0 was due [s]
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
@@ -44,6 +45,8 @@ class Played:
     async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
         """Begin with the first row, or go on after the last that was played."""
         self._connection.to("connecting")
+        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played anew
+            raise self._broken
         if self._rows is None:
             try:
                 self._rows = await asyncio.to_thread(self._open)
@@ -56,12 +59,23 @@ class Played:
         """Return rows when they are due, until the last."""
         if self._rows is None:
             raise ThermocompError("not connected")
-        for at, values in self._rows:
+        while (row := self._next()) is not None:
+            at, values = row
             if math.isnan(self._begun):
                 self._begun = time.monotonic() - at / self.speed
             await asyncio.sleep(max(0.0, self._begun + at / self.speed - time.monotonic()))
             yield Reading(time.time(), values)
         self._connection.to("closed", "played to its end")
+
+    def _next(self) -> tuple[float, dict[str, float]] | None:
+        """Return the next row; None behind the last."""
+        assert self._rows is not None
+        try:
+            return next(self._rows, None)
+        except ThermocompError as e:
+            self._broken = e
+            self._connection.to("failed", str(e))
+            raise
 
     def status(self) -> Status:
         """Return how it is, at once."""
@@ -169,7 +183,7 @@ class FileSink:
         self._connection.to("closed")
 
 
-def read_rows(path: Path) -> Iterator[tuple[float, dict[str, float]]]:
+def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
     """Return time [s] and values by channel of a recording in thermocomp's own CSV, row by row as they are read.
 
     Parameters
@@ -190,7 +204,7 @@ def read_rows(path: Path) -> Iterator[tuple[float, dict[str, float]]]:
     return rows
 
 
-def _rows_of(path: Path, file: TextIO) -> Iterator[tuple[float, dict[str, float]]]:
+def _rows_of(path: Path, file: TextIO) -> Generator[tuple[float, dict[str, float]], None, None]:
     with file:
         table = csv.reader(line for line in file if not line.startswith("#"))
         try:

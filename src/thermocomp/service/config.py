@@ -1,5 +1,6 @@
 """The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ from thermocomp.core.exceptions import InputError, SettingError
 from thermocomp.core.shown import explain_unfit
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.tomlfile import as_json, read_toml
-from thermocomp.service.network import MqttIn, MqttOut, MqttProbing, Names, explain_host_name
+from thermocomp.service.network import MqttIn, MqttOut, MqttProbing, Names, OnBroker, explain_host_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,6 +266,17 @@ class Config:
                 'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
                 "unless it is known whether the controller compensates for temperature by itself"
             )
+        for what, many in (("source", self.sources), ("sink", self.sinks), ("probe", self.probes)):
+            for place, count in Counter(map(_place, many)).items():
+                if count > 1:
+                    yield f"{count} {what}s with the same {place}: leave one of them"
+        for sink in (s for s in self.sinks if isinstance(s, MqttOut)):
+            for source in (*self.sources, *self.probes):
+                if isinstance(source, MqttIn | MqttProbing) and source.hears(sink):
+                    yield (
+                        f"topic = {source.topic!r}: hears the corrections that go to {sink.topic!r}; let them go to a "
+                        "topic that no source and no probe listens to"
+                    )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             yield 'a probe of kind = "simulated" wants a source of kind = "simulated"'
@@ -273,6 +285,14 @@ class Config:
                 f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
                 "a virtual one (virtual = true)"
             )
+
+
+def _place(one: In | Out | Probings) -> str:
+    """Return what two links must not share."""
+    if isinstance(one, OnBroker):
+        return f"topic = {one.topic!r} of {one.host}:{one.port}"
+    found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
+    return next((f"{key} = {name!r}" for key, name in found.items() if name), f"kind = {one.kind!r}")
 
 
 class Settings(NamedTuple):

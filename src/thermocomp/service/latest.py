@@ -25,8 +25,8 @@ class Latest(dict[str, tuple[float, float]]):
         """How many names were not kept; at `COUNTED` it may be more."""
         return len(self._left_out)
 
-    def take(self, values: Mapping[str, float], tick: float, longest: float) -> None:
-        """Take values in.
+    def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
+        """Take values in; return a name that is not kept if none was left out before.
 
         Parameters
         ----------
@@ -36,7 +36,7 @@ class Latest(dict[str, tuple[float, float]]):
         longest : float
             A name that nothing uses makes room for another after so long without a value [s].
         """
-        others = values.keys() - self.used
+        first, others = "", values.keys() - self.used
         if new := others - self.keys():
             room = KEPT - len(self.keys() - self.used)
             if room < len(new):
@@ -46,7 +46,9 @@ class Latest(dict[str, tuple[float, float]]):
                 room += len(old)
             ordered = [name for name in values if name in new]
             new = set(ordered[:room])
+            first = ordered[room] if len(ordered) > room and not self._left_out else ""
             self._left_out.update(map(hash, ordered[room : room + COUNTED - len(self._left_out)]))
         for name, value in values.items():
             if name in self.used or name in self or name in new:
                 self[name] = (value, tick)
+        return first

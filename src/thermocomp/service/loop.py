@@ -89,6 +89,8 @@ class Service:
     async def run(self) -> None:
         """Run until it is cancelled; then save the state and leave the corrections as they are."""
         self._put_aside()
+        if self.recorder is not None:
+            await asyncio.to_thread(self.recorder.journal.flush)
         self.inlets = self._make_inlets()
         for sink in self.sinks:
             await self._adopt(sink)
@@ -115,7 +117,8 @@ class Service:
         if not -most <= now - stamp <= most:
             self.counts["rejected"] += 1
             return
-        self.latest.take(reading.values, tick, most)
+        if left_out := self.latest.take(reading.values, tick, most):
+            self._say("link", f"more names that nothing uses than are kept; {left_out!r} and others are left out")
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         (probings, self.probings), learned = (self.probings, {}), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)

@@ -1,5 +1,6 @@
 """What a configuration says of the network: brokers, topics, hosts."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from ipaddress import ip_address
@@ -36,6 +37,14 @@ class OnBroker:
         if not 0 < self.port <= 65535:
             raise SettingError(f"port = {self.port}: want one from 1 to 65535")
 
+    def hears(self, other: "OnBroker") -> bool:
+        """Return whether what is published to another's topic comes back on this one, as far as names tell."""
+        levels, topic = self.topic.split("/"), other.topic.split("/")
+        levels = levels[2:] if levels[0] == "$share" else levels
+        fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
+        long = len(topic) >= len(levels) - 1 if levels[-1] == "#" else len(topic) == len(levels)
+        return (self.host, self.port) == (other.host, other.port) and fits and long
+
 
 @dataclass(frozen=True, kw_only=True)
 class MqttIn(OnBroker):
@@ -55,6 +64,11 @@ class MqttIn(OnBroker):
     kind: Literal["mqtt"]
     names: Names = field(default_factory=dict)
     virtual: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
+            raise SettingError(f"names: several values for {', '.join(sorted(twice))}: want one for each channel")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException as AnyHTTPException
 
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.shown import shorten
 from thermocomp.runtime.state import Status
 from thermocomp.service.connections import Guarded
@@ -129,7 +130,11 @@ def make_app(service: Service, token: str = "", settled: float = 1.0, hosts: tup
         if wanted.target not in service.compensator.lines:
             known = ", ".join(service.compensator.lines)
             raise HTTPException(404, f"no target is named {shorten(wanted.target, 80)}; there are {known}")
-        if why := give(service, wanted):
+        try:
+            why = give(service, wanted)
+        except InputError as e:  # not now, such as before the first reading
+            why = str(e)
+        if why:
             raise HTTPException(409, why)
         return Json({"done": wanted.do, "target": wanted.target})
 
