@@ -8,7 +8,7 @@ import time
 from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TextIO
+from typing import BinaryIO
 
 from thermocomp.adapters.connection import Connection
 from thermocomp.adapters.messages import write_message
@@ -46,6 +46,7 @@ class Played:
         """Begin with the first row, or go on after the last that was played."""
         self._connection.to("connecting")
         if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played anew
+            self._connection.to("failed", str(self._broken))
             raise self._broken
         if self._rows is None:
             try:
@@ -196,7 +197,7 @@ def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, Non
         It cannot be read, has no times, or names that are none; while rows are read: a line is no text.
     """
     try:
-        file = path.open(encoding="utf-8", newline="")
+        file = path.open("rb")
     except OSError as e:
         raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
     rows = _rows_of(path, file)
@@ -204,25 +205,31 @@ def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, Non
     return rows
 
 
-def _rows_of(path: Path, file: TextIO) -> Generator[tuple[float, dict[str, float]], None, None]:
+def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, float]], None, None]:
+    line = 0
+
+    def lines() -> Iterator[str]:
+        nonlocal line
+        for line, content in enumerate(file, start=1):  # noqa: B007 - told if it cannot be read
+            if not content.startswith(b"#"):
+                yield content.decode("utf-8")
+
     with file:
-        table = csv.reader(line for line in file if not line.startswith("#"))
+        table = csv.reader(lines())
         try:
             names = next(table, [])
             if "time_s" not in names:
                 raise InputError(f"{path}: has no column time_s; want a recording that thermocomp wrote")
             if why := next(filter(None, map(explain_unfit, names)), ""):
-                raise InputError(f"{path}: heading: {why}")
+                raise InputError(f"{path}: line {line}: {why}")
             place = names.index("time_s")
             yield math.nan, {}
             for row in table:
                 if (at := _parsed(row, place)) is not None:
                     found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
                     yield at, {name: v for name, v in found.items() if v is not None}
-        except (UnicodeDecodeError, csv.Error) as e:
-            raise InputError(f"{path}: behind line {table.line_num}: no text that can be read: {e}") from e
-        except OSError as e:
-            raise InputError(f"{path}: behind line {table.line_num}: {e.strerror or e}") from e
+        except (OSError, UnicodeDecodeError, csv.Error) as e:
+            raise InputError(f"{path}: line {line}: cannot be read: {e}") from e
 
 
 def _parsed(row: Sequence[str], place: int) -> float | None:

@@ -6,8 +6,9 @@ Whatever a source or a sink raises, it is this link's trouble alone: the others 
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
-from typing import TypeVar
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
+from typing import Any, TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
@@ -39,6 +40,7 @@ class Link:
         self.end = end
         self.trouble = ""  #: why it was lost, until it is connected again
         self._wait, self._told, self._refused = FIRST, "", (0, -SELDOM)
+        self._losses = deque[str](maxlen=2)  # that are to be told: one may last shorter than between two looks
 
     async def run(self) -> None:
         """Connect and work, for ever, or until a source is played to its end."""
@@ -58,6 +60,9 @@ class Link:
                 self.trouble = "cancelled by itself"
             except Exception as e:  # noqa: BLE001 - whatever it is, the others go on
                 self.trouble = explain(e)
+            if self.trouble != self._told:
+                self._losses.append(self.trouble)
+                self._told = self.trouble
             await self._lose()
             await asyncio.sleep(self._wait)
             self._wait = min(2 * self._wait, LONGEST)
@@ -75,9 +80,11 @@ class Link:
         """Return what is new since the last call: it was lost, it is back, it refused messages."""
         where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
         name = type(self.end).__name__ + (f" {where}" if where else "")
-        if self.trouble != self._told:
-            self._told = self.trouble
-            yield f"{name}: {self.trouble or 'connected again'}"
+        while self._losses:
+            yield f"{name}: {self._losses.popleft()}"
+        if self._told and not self.trouble:
+            self._told = ""
+            yield f"{name}: connected again"
         (told, at), now = self._refused, time.monotonic()
         if (refused := getattr(self.end, "refused", 0)) > told and now - at >= SELDOM:
             self._refused = (refused, now)
@@ -176,8 +183,17 @@ def explain(error: Exception) -> str:
     return escape(error if known else f"unexpected {type(error).__name__}: {error}", 400)
 
 
-async def within(seconds: float, work: Awaitable[None]) -> None:
-    """Do something that may fail or take too long, without waiting for ever."""
-    with contextlib.suppress(Exception):
-        async with asyncio.timeout(seconds):
-            await work
+async def within(seconds: float, work: Coroutine[Any, Any, None]) -> None:
+    """Do something that may fail, be cancelled or take too long, without waiting for ever.
+
+    Parameters
+    ----------
+    seconds : float
+    work : coroutine
+    """
+    task = asyncio.create_task(work)
+    task.add_done_callback(lambda done: done.cancelled() or done.exception())
+    try:
+        await asyncio.wait({task}, timeout=seconds)
+    finally:
+        task.cancel()

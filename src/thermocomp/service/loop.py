@@ -93,7 +93,7 @@ class Service:
             await asyncio.to_thread(self.recorder.journal.flush)
         self.inlets = self._make_inlets()
         for sink in self.sinks:
-            await self._adopt(sink)
+            await within(TIMEOUT, self._adopt(sink))  # if it fails, its link says why
         try:
             async with asyncio.TaskGroup() as group:
                 for one in self.links():
@@ -246,14 +246,10 @@ class Service:
         """Begin at what the controller says is in force: what was saved may be a second older."""
         if not isinstance(sink, Confirming):
             return
-        allowed = dict[str, Correction]()
-        with contextlib.suppress(Exception):  # its link says what it is
-            async with asyncio.timeout(TIMEOUT):
-                await sink.connect(TIMEOUT)
-                found = await sink.confirmed() or {}
-            allowed = {t: c for t, c in found.items() if t in self.state.corrections and self._allowed(t, c)}
-        if allowed:
-            self.state = self.state._replace(corrections=self.state.corrections | allowed)
+        await sink.connect(TIMEOUT)
+        found = await sink.confirmed() or {}
+        allowed = {t: c for t, c in found.items() if t in self.state.corrections and self._allowed(t, c)}
+        self.state = self.state._replace(corrections=self.state.corrections | allowed)
 
     def _allowed(self, target: str, correction: Correction) -> bool:
         ends = self.compensator.lines[target].travel
