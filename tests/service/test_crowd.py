@@ -14,8 +14,8 @@ from test_page import RIGHT, fed
 
 from thermocomp.service import connections, page
 
-#: an answer takes no longer, whoever else is there [s]
-SOON = 1.0
+#: an answer takes no longer, whoever else is there [s]; on an idle computer it takes some hundredths of a second
+SOON = 5.0
 EVENTS = b"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
 HALF = b"POST /api/order HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Le"
 NO_BODY = b"POST /api/order HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 50\r\n\r\n{"
@@ -53,13 +53,13 @@ def ask(port: int) -> None:
     base = f"http://127.0.0.1:{port}"
     for path in ("/", "/api/state", "/api/curves", "/static/live.js"):
         began = time.monotonic()
-        assert httpx.get(base + path, timeout=5.0).status_code == 200
+        assert httpx.get(base + path, timeout=20.0).status_code == 200
         assert time.monotonic() - began < SOON, path
     began = time.monotonic()
-    assert httpx.post(f"{base}/api/order", json=HOLD, headers=RIGHT, timeout=5.0).status_code == 200
+    assert httpx.post(f"{base}/api/order", json=HOLD, headers=RIGHT, timeout=20.0).status_code == 200
     assert time.monotonic() - began < SOON
     began = time.monotonic()
-    with httpx.stream("GET", f"{base}/api/events", timeout=5.0) as stream:
+    with httpx.stream("GET", f"{base}/api/events", timeout=20.0) as stream:
         assert json.loads(next(stream.iter_lines()).removeprefix("data: "))["state"]["counts"]["readings"] > 0
     assert time.monotonic() - began < SOON
 
@@ -123,7 +123,7 @@ def test_who_does_not_read_is_dropped_and_blocks_nobody(monkeypatch: pytest.Monk
         service.rezero("z_um", "x" * 400 + str(k))  # long messages
     with served(service, "127.0.0.1") as port, knocking(port, 20, EVENTS) as deaf:
         base = f"http://127.0.0.1:{port}"
-        with httpx.stream("GET", f"{base}/api/events", timeout=5.0) as listening:
+        with httpx.stream("GET", f"{base}/api/events", timeout=20.0) as listening:
             lines, deadline = listening.iter_lines(), time.monotonic() + 5.0
             while time.monotonic() < deadline:  # who reads goes on
                 assert next(lines) is not None

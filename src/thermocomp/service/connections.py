@@ -19,10 +19,20 @@ class Guarded(H11Protocol):
 
     uvicorn itself bounds only how long it waits between two requests: half a request may wait for ever there, an answer
     that nobody reads too, and at its bound (``limit_concurrency``) idle connections keep everybody else out.
+
+    Parameters
+    ----------
+    config, server_state, app_state, _loop
+        Of uvicorn.
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin; at the bound another one goes, an idle one if there is one."""
+        """Begin; at the bound another one goes, an idle one if there is one.
+
+        Parameters
+        ----------
+        transport : asyncio.BaseTransport
+        """
         super().connection_made(transport)  # type: ignore[arg-type]
         self._since, self._stuck, self._served = time.monotonic(), 0.0, False
         self.app_state: dict[str, Any] = {**self.app_state, "connection": self}
@@ -46,7 +56,13 @@ class Guarded(H11Protocol):
         self.transport.abort()
 
     def look(self, now: float) -> None:
-        """Close if it has been idle, or has not read, for too long; call it about once a second."""
+        """Close if it has been idle, or has not read, for too long; call it about once a second.
+
+        Parameters
+        ----------
+        now : float
+            On the monotone clock [s].
+        """
         self._stuck = (self._stuck or now) if self.unsent else 0.0
         if (self._waits() and now - self._since > PATIENCE) or (self._stuck and now - self._stuck > STUCK):
             self.drop()

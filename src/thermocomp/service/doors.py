@@ -32,10 +32,18 @@ _HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/?#@\\\s]+)(:[0-9]{1,5})?")
 
 
 class Json(JSONResponse):
-    """JSON in plain ASCII: any text can be encoded, whatever it is; a number that JSON has not got is null."""
+    """JSON in plain ASCII: any text can be encoded, whatever it is; a number that JSON has not got is null.
+
+    Parameters
+    ----------
+    content : object
+        Of `write_json`.
+    status_code, headers, media_type, background
+        Of the response.
+    """
 
     def render(self, content: Any) -> bytes:
-        """Return it as bytes."""
+        """Return it as bytes; see `write_json`."""
         return write_json(content)
 
 

@@ -133,7 +133,10 @@ class Service:
 
     def order(self, target: str, status: Status | None) -> None:
         """Take a target out, or let it run again; see `thermocomp.runtime.orders.order`."""
+        before = self.state.orders.get(target)
         self.state = order(self.compensator, self.state, target, status)
+        if before == status:  # it is so: no news
+            return
         word = f"{status.word}: {status.reason}" if status else "runs again"
         self._say("state", f"{target} {word}, as ordered")
         self._dirty = True

@@ -14,8 +14,10 @@ from thermocomp.service.connections import Guarded
 
 #: characters of a token, at least
 SHORTEST = 16
-#: connections that the system keeps for us: so many more files than ``connections.MOST`` can be open for a moment
-BACKLOG = 128
+#: connections taken in at once: so many more files than ``connections.MOST`` may be open for a moment
+AT_ONCE = 128
+#: that the system lets wait for us: one for which there is no room tries again only after a second
+WAITING = 1024
 #: bytes of an answer that the system takes ahead of a client that does not read
 AHEAD = 65_536
 _OTHERWISE = "choose another with --port, or 0 for any"
@@ -25,6 +27,11 @@ class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
         yield  # whoever runs the service listens to them
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        for one in sockets or ():
+            one.listen(WAITING)
 
     async def on_tick(self, counter: int) -> bool:
         if counter % 10 == 0:  # once a second
@@ -99,7 +106,7 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
         app,
         http=Guarded,
         ws="none",
-        backlog=BACKLOG,
+        backlog=AT_ONCE,
         log_level="error",
         lifespan="off",
         access_log=False,
