@@ -118,14 +118,17 @@ HERE = socket.gethostbyname(socket.gethostname())
     ("host", "code"),
     [
         *((h, 200) for h in ("127.0.0.1:8731", "127.0.0.1", "localhost", "LOCALHOST:80", "localhost.", "[::1]:8731")),
-        *((h, 200) for h in ("mill7.shop:8731", "Mill7.Shop", "[::ffff:127.0.0.1]", "127.8.9.1", HERE)),
+        *(
+            (h, 200)
+            for h in ("xn--frse-loa.example", "mill7.shop:8731", "Mill7.Shop", "[::ffff:127.0.0.1]", "127.8.9.1", HERE)
+        ),
         *((h, 400) for h in ("", "evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "mill7.shop.x")),
         *((h, 400) for h in ("203.0.113.7", "[2001:db8::7]:80", "127.1", "2130706433", "0x7f.1", "localhost:80:80")),
         *((h, 400) for h in ("a@localhost", "localhost/x", "localhost#", "[::1", "::1", "[localhost]", "mill7.shop..")),
     ],
 )
 def test_by_which_names_it_may_be_called(host: str, code: int) -> None:
-    app = make_app(serving(), TOKEN, hosts=("Mill7.shop",))
+    app = make_app(serving(), TOKEN, hosts=("Mill7.shop", "Fräse.example."))
 
     async def work() -> None:
         async with asking(app) as client:

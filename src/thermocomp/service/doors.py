@@ -106,7 +106,7 @@ class Door:
 
     def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:
         self._app = app
-        self._names = {"localhost", *(n.lower().rstrip(".") for n in names)}
+        self._names = {"localhost", *map(_as_browsers_write, names)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
@@ -180,6 +180,14 @@ def explain_foreign(request: Request) -> str:
     ):
         return "asked from the page of another site: open this page itself"
     return ""
+
+
+def _as_browsers_write(name: str) -> str:
+    try:
+        name = name.encode("idna").decode("ascii")
+    except UnicodeError:
+        pass
+    return name.lower().removesuffix(".")
 
 
 def _address(text: str) -> IPv4Address | IPv6Address | None:
