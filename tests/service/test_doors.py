@@ -120,7 +120,7 @@ HERE = socket.gethostbyname(socket.gethostname())
         *((h, 200) for h in ("127.0.0.1:8731", "127.0.0.1", "localhost", "LOCALHOST:80", "localhost.", "[::1]:8731")),
         *(
             (h, 200)
-            for h in ("xn--frse-loa.example", "mill7.shop:8731", "Mill7.Shop", "[::ffff:127.0.0.1]", "127.8.9.1", HERE)
+            for h in ("xn--frse-moa.example", "mill7.shop:8731", "Mill7.Shop", "[::ffff:127.0.0.1]", "127.8.9.1", HERE)
         ),
         *((h, 400) for h in ("", "evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "mill7.shop.x")),
         *((h, 400) for h in ("203.0.113.7", "[2001:db8::7]:80", "127.1", "2130706433", "0x7f.1", "localhost:80:80")),

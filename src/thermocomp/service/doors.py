@@ -1,5 +1,6 @@
 """Doors of the page: by which names it may be called, from which pages, and who may give orders."""
 
+import contextlib
 import hmac
 import json
 import re
@@ -183,10 +184,8 @@ def explain_foreign(request: Request) -> str:
 
 
 def _as_browsers_write(name: str) -> str:
-    try:
+    with contextlib.suppress(UnicodeError):
         name = name.encode("idna").decode("ascii")
-    except UnicodeError:
-        pass
     return name.lower().removesuffix(".")
 
 
