@@ -22,6 +22,7 @@ from thermocomp.adapters.mqtt import MqttSource
 from thermocomp.adapters.plain import ReplaySource
 from thermocomp.adapters.probes import MqttProbe
 from thermocomp.core.exceptions import InputError, ThermocompError
+from thermocomp.core.ports import Probe, Source
 from thermocomp.service import web
 from thermocomp.service.config import read_config
 from thermocomp.service.loop import Service
@@ -87,9 +88,10 @@ def floor(folder: Path) -> Iterator[Floor]:
     broker = Mosquitto(folder)
     broker.start()
     found = Floor(broker)
+    ends: list[Source | Probe] = [*found.service.sources, *found.service.probes]
     found.thread.start()
     try:
-        found.until(lambda: all(one.status().state == "connected" for one in found.service.links()))
+        found.until(lambda: all(one.status().state == "connected" for one in ends))
         time.sleep(0.3)  # it has subscribed
         yield found
     finally:
