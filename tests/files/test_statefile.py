@@ -100,10 +100,11 @@ def test_a_file_of_before_probings_were_told_apart(machine: Compensator, samples
     state = run(machine, samples, 110)
     assert set(state.probed) == {"z_um"}
     assert state.learned["z_um"].most < math.inf
-    entry = {"written": NOW.isoformat(), "models": statefile.fingerprint(machine), "state": encode(state)}
-    del entry["state"]["probed"]  # type: ignore[attr-defined]
+    stored = encode(state)
+    del stored["probed"]
     for name in ("refused_since", "most", "usual"):
-        del entry["state"]["learned"]["z_um"][name]  # type: ignore[index]
+        del stored["learned"]["z_um"][name]
+    entry = {"written": NOW.isoformat(), "models": statefile.fingerprint(machine), "state": stored}
     found = statefile.loads(jsonfile.pack(statefile.KIND, [entry]), machine).state
     assert found.probed == {}
     assert same(found._replace(probed=state.probed, learned=state.learned), state)

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.service.config import MqttIn, Page, read_config
+from thermocomp.service.config import Page, read_config
+from thermocomp.service.network import MqttIn
 
 GOOD = """
 models = ["model.json"]

@@ -19,7 +19,7 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.service import page, web
 from thermocomp.service.clock import Clock
 from thermocomp.service.loop import Service
-from thermocomp.service.page import MOST_WRONG, make_app
+from thermocomp.service.page import make_app
 
 TOKEN = "0123456789abcdef"
 RIGHT = {"Authorization": f"Bearer {TOKEN}"}
@@ -75,11 +75,8 @@ def test_orders_want_the_token() -> None:
             assert (await client.post("/api/order", json=order)).status_code == 401
             for other in (TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "é" * 16):
                 headers: dict[bytes, bytes] = {b"Authorization": f"Bearer {other}".encode()}
-                assert (await client.post("/api/order", json=order, headers=headers)).status_code in (401, 429)
+                assert (await client.post("/api/order", json=order, headers=headers)).status_code == 401
             assert service.state.orders == {}
-            assert MOST_WRONG == 5
-            assert (await client.post("/api/order", json=order, headers=RIGHT)).status_code == 429
-        async with asking(make_app(service, TOKEN)) as client:
             assert (await client.post("/api/order", json=order, headers=RIGHT)).status_code == 200
             assert service.state.orders["z_um"].word == "holding"
             fed(service, 25.0)
@@ -109,15 +106,11 @@ def test_orders_want_the_token() -> None:
     run(work)
 
 
-def test_orders_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(page, "MOST_ORDERS", 3)
+def test_an_order_is_small_and_states_its_length() -> None:
     service = Service(machine(), [Given()], [])
-    order = {"target": "z_um", "do": "hold"}
 
     async def work() -> None:
         async with asking(make_app(service, TOKEN)) as client:
-            found = [(await client.post("/api/order", json=order, headers=RIGHT)).status_code for _ in range(5)]
-            assert found == [200, 200, 200, 429, 429]
             large = await client.post("/api/order", content=b"x" * 3000, headers=RIGHT)
             assert large.status_code == 413
 
@@ -125,17 +118,6 @@ def test_orders_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
                 yield b"x"
 
             assert (await client.post("/api/order", content=pieces(), headers=RIGHT)).status_code == 413  # type: ignore[arg-type]
-
-    run(work)
-
-
-def test_another_name_for_this_computer_is_refused() -> None:
-    app = make_app(Service(machine(), [Given()], []), TOKEN, hosts=("mill7.shop",))
-
-    async def work() -> None:
-        for host, code in (("localhost", 200), ("mill7.shop", 200), ("evil.example", 400)):
-            async with asking(app, host) as client:
-                assert (await client.get("/api/state")).status_code == code
 
     run(work)
 
@@ -289,11 +271,17 @@ def test_an_event_stream_is_json_and_bounded(monkeypatch: pytest.MonkeyPatch) ->
         listening = web.listen("127.0.0.1", 0)
         task = asyncio.create_task(web.serve(make_app(service), listening))
         url = "http://{}:{}/api/events".format(*listening.getsockname())
-        async with httpx.AsyncClient() as client, client.stream("GET", url) as one, client.stream("GET", url) as two:
-            for stream in (one, two):
+        async with (
+            httpx.AsyncClient() as client,
+            client.stream("GET", url) as one,
+            client.stream("GET", url) as two,
+            client.stream("GET", url) as three,
+        ):
+            for stream in (two, three):
                 line = await anext(stream.aiter_lines())
                 assert json.loads(line.removeprefix("data: "))["state"]["rejected"] == "no reading yet"
-            assert (await client.get(url)).status_code == 503
+            with pytest.raises(httpx.TransportError):  # the oldest made room
+                await one.aread()
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 

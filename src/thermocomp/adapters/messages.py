@@ -8,6 +8,7 @@ from typing import Any
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
 from thermocomp.core.reading import Measurement, Reading
+from thermocomp.core.shown import escape, explain_unfit
 
 #: bytes of a message, and values in it, at most
 MOST_BYTES, MOST_VALUES = 65_536, 1_000
@@ -15,6 +16,7 @@ MOST_BYTES, MOST_VALUES = 65_536, 1_000
 _NUMBERS = {"measured_um": None, "repeatability_um": 0.5, "position_mm": 0.0}
 #: no tool point is further off [um]
 _FAR = 1e5
+_LINES = str.maketrans("\t\r\n", "   ")
 _KNOWN = {"time", "id", "target", "under_correction", *_NUMBERS}
 #: characters of an id
 _LONG = 200
@@ -36,14 +38,15 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     Raises
     ------
     ReadingError
-        It is too large, no JSON, or no table.
+        It is too large, no JSON, no table, or has text that is no text: invalid UTF-8, half a surrogate pair, control
+        characters, names that are too long.
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
         raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,}")
     stamp = content.pop("time", None)
     if stamp is not None and _number(stamp) is None:
-        raise ReadingError(f"a message whose time is {str(stamp)[:40]!r}: want seconds since 1970")
+        raise ReadingError(f"a message whose time is {escape(stamp, 40)!r}: want seconds since 1970")
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
     return Reading(arrived if stamp is None else float(stamp), values)
 
@@ -74,13 +77,15 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     wrong += ["id"] * (type(own) not in (str, int) or len(str(own)) > _LONG or ("id" in content and own == ""))
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
-        raise ReadingError(f"a measurement whose {', '.join(wrong)[:80]} cannot be used; want {example}")
+        raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; want {example}")
+    if why := explain_unfit(str(target)):
+        raise ReadingError(f"a measurement whose target cannot be a name: {why}")
     if abs(found["measured_um"] or 0.0) > _FAR or not 0.0 <= (found["repeatability_um"] or 0.0) <= _FAR:
         raise ReadingError(f"a measurement beyond {_FAR:g} um, or a repeatability below 0: nothing a probe can say")
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
     keys = keys or [f"content {json.dumps(content, sort_keys=True)}"]
-    return Measurement(at, str(target)[:200], measured, bool(left), spread, position, tuple(keys))
+    return Measurement(at, str(target), measured, bool(left), spread, position, tuple(keys))
 
 
 def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:
@@ -96,12 +101,21 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     if len(payload) > MOST_BYTES:
         raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,}")
     try:
-        content = json.loads(payload)
+        # json would guess other encodings, and let half a surrogate pair pass
+        content = json.loads(payload.decode("utf-8") if isinstance(payload, bytes) else payload)
     except (ValueError, RecursionError) as e:
-        raise ReadingError(f"a message that is no JSON: {str(e)[:80]}") from e
+        raise ReadingError(f"a message that is no JSON: {escape(e, 80)}") from e
     if not isinstance(content, dict):
-        raise ReadingError(f"a message that is no table of values: {str(content)[:40]}; want {example}")
+        raise ReadingError(f"a message that is no table of values: {escape(content, 40)}; want {example}")
+    for name, value in content.items():
+        if why := explain_unfit(name) or (isinstance(value, str) and not _is_text(value) and explain_unfit(value)):
+            raise ReadingError(f"a message with text that cannot be used: {why}")
     return content
+
+
+def _is_text(value: str) -> bool:
+    """Return whether a value, which may have lines, has nothing else that cannot be printed."""
+    return value.translate(_LINES).isprintable()
 
 
 def _number(value: Any) -> float | None:

@@ -14,6 +14,7 @@ from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError, ThermocompError
 from thermocomp.core.ports import Status
 from thermocomp.core.reading import Reading
+from thermocomp.core.shown import escape
 
 
 @dataclass(kw_only=True)
@@ -37,11 +38,11 @@ class Broker:
         """Connect within so long [s], or raise `ThermocompError` with the reason."""
         await self.close()
         self._connection.to("connecting")
-        client = aiomqtt.Client(self.host, self.port, timeout=timeout)
         try:
+            client = aiomqtt.Client(self.host, self.port, timeout=timeout)
             async with asyncio.timeout(timeout):
                 await client.__aenter__()
-        except (aiomqtt.MqttError, OSError, TimeoutError) as e:
+        except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             reason = f"MQTT broker {self.host}:{self.port}: {str(e) or 'no answer'}"
             self._connection.to("failed", reason)
             raise ThermocompError(reason) from e
@@ -61,7 +62,7 @@ class Broker:
         self._connection.to("closed")
 
     def _fail(self, error: Exception) -> ThermocompError:
-        reason = f"MQTT broker {self.host}:{self.port}: {str(error) or 'lost'}"
+        reason = f"MQTT broker {self.host}:{self.port}, topic {self.topic}: {str(error) or 'lost'}"
         self._connection.to("failed", reason)
         return ThermocompError(reason)
 
@@ -98,11 +99,11 @@ class MqttSource(Broker):
                     payload = message.payload if isinstance(message.payload, bytes | str) else b""
                     reading = read_message(payload, -1.0 if message.retain else time.time(), self.names)
                 except ReadingError as e:
-                    self.refused, self.last_refusal = self.refused + 1, str(e)
+                    self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
                     continue
                 if reading.time >= 0.0:
                     yield reading
-        except (aiomqtt.MqttError, OSError) as e:
+        except (aiomqtt.MqttError, OSError, ValueError) as e:
             raise self._fail(e) from e
 
 
@@ -114,5 +115,5 @@ class MqttSink(Broker):
         """Publish corrections, or raise `ThermocompError` with the reason."""
         try:
             await self._connected().publish(self.topic, write_message(corrections, time.time()), qos=0, timeout=5.0)
-        except (aiomqtt.MqttError, OSError, TimeoutError) as e:
+        except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             raise self._fail(e) from e

@@ -5,9 +5,10 @@ import csv
 import json
 import math
 import time
-from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from thermocomp.adapters.connection import Connection
 from thermocomp.adapters.messages import write_message
@@ -16,6 +17,7 @@ from thermocomp.core.draft import write_text
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.core.ports import Status
 from thermocomp.core.reading import Reading
+from thermocomp.core.shown import explain_unfit
 from thermocomp.simulation.experiments import simulate
 from thermocomp.simulation.protocol import Experiment
 
@@ -34,6 +36,7 @@ class Played:
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
     _rows: Iterator[tuple[float, dict[str, float]]] | None = field(default=None, init=False, repr=False)
     _at: float = field(default=-math.inf, init=False, repr=False)  #: row that was played last [s]
+    _broken: ThermocompError | None = field(default=None, init=False, repr=False)
     _begun: float = field(default=math.nan, init=False, repr=False)  #: clock at which the row of time 0 was due [s]
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
@@ -42,10 +45,13 @@ class Played:
     async def connect(self, timeout: float) -> None:  # noqa: ARG002 - of the port
         """Begin with the first row, or go on after the last that was played."""
         self._connection.to("connecting")
+        if self._broken is not None:  # what cannot be read once cannot be read later, and it is not played anew
+            self._connection.to("failed", str(self._broken))
+            raise self._broken
         if self._rows is None:
             try:
                 self._rows = await asyncio.to_thread(self._open)
-            except OSError as e:
+            except (OSError, ThermocompError) as e:
                 self._connection.to("failed", str(e))
                 raise ThermocompError(str(e)) from e
         self._connection.to("connected")
@@ -54,12 +60,23 @@ class Played:
         """Return rows when they are due, until the last."""
         if self._rows is None:
             raise ThermocompError("not connected")
-        for at, values in self._rows:
+        while (row := self._next()) is not None:
+            at, values = row
             if math.isnan(self._begun):
                 self._begun = time.monotonic() - at / self.speed
             await asyncio.sleep(max(0.0, self._begun + at / self.speed - time.monotonic()))
             yield Reading(time.time(), values)
         self._connection.to("closed", "played to its end")
+
+    def _next(self) -> tuple[float, dict[str, float]] | None:
+        """Return the next row; None behind the last."""
+        assert self._rows is not None
+        try:
+            return next(self._rows, None)
+        except ThermocompError as e:
+            self._broken = e
+            self._connection.to("failed", str(e))
+            raise
 
     def status(self) -> Status:
         """Return how it is, at once."""
@@ -82,7 +99,7 @@ class ReplaySource(Played):
     path: Path
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
-        return _rows_of(self.path)
+        return read_rows(self.path)
 
 
 @dataclass(kw_only=True)
@@ -155,7 +172,7 @@ class FileSink:
                 name: Correction(c["offset_um"], c["slope_um_per_m"], c["reference_position_mm"])
                 for name, c in table.items()
             }
-        except (OSError, ValueError, KeyError, TypeError, InputError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError):
             return None
 
     def status(self) -> Status:
@@ -167,19 +184,52 @@ class FileSink:
         self._connection.to("closed")
 
 
-def _rows_of(path: Path) -> Iterator[tuple[float, dict[str, float]]]:
-    """Yield time [s] and values of a recording, row by row."""
-    with path.open(encoding="utf-8", newline="") as file:
-        lines = (line for line in file if not line.startswith("#"))
-        table = csv.reader(lines)
-        names = next(table, [])
-        if "time_s" not in names:
-            raise OSError(f"{path}: has no column time_s; a recording to be replayed is one that thermocomp wrote")
-        place = names.index("time_s")
-        for row in table:
-            if (at := _parsed(row, place)) is not None:
-                found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
-                yield at, {name: v for name, v in found.items() if v is not None}
+def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV, row by row as they are read.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        It cannot be read, has no times, or names that are none; while rows are read: a line is no text.
+    """
+    try:
+        file = path.open("rb")
+    except OSError as e:
+        raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
+    rows = _rows_of(path, file)
+    next(rows)  # the heading
+    return rows
+
+
+def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, float]], None, None]:
+    line = 0
+
+    def lines() -> Iterator[str]:
+        nonlocal line
+        for line, content in enumerate(file, start=1):  # noqa: B007 - told if it cannot be read
+            if not content.startswith(b"#"):
+                yield content.decode("utf-8")
+
+    with file:
+        table = csv.reader(lines())
+        try:
+            names = next(table, [])
+            if "time_s" not in names:
+                raise InputError(f"{path}: has no column time_s; want a recording that thermocomp wrote")
+            if why := next(filter(None, map(explain_unfit, names)), ""):
+                raise InputError(f"{path}: line {line}: {why}")
+            place = names.index("time_s")
+            yield math.nan, {}
+            for row in table:
+                if (at := _parsed(row, place)) is not None:
+                    found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
+                    yield at, {name: v for name, v in found.items() if v is not None}
+        except (OSError, UnicodeDecodeError, csv.Error) as e:
+            raise InputError(f"{path}: line {line}: cannot be read: {e}") from e
 
 
 def _parsed(row: Sequence[str], place: int) -> float | None:

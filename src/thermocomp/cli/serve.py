@@ -78,11 +78,14 @@ def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
     from thermocomp.service import web
     from thermocomp.service.build import build
     from thermocomp.service.config import Page
+    from thermocomp.service.findings import find_faults, find_faults_now
     from thermocomp.service.page import make_app
 
     page = settings.config.page
     if port is not None:
         page = replace(page or Page(), port=port)
+    if check and (found := [*find_faults(settings), *find_faults_now(settings, page)]):
+        raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {f}" for f in found)]))
     service = build(settings)
     for target in service.compensator.lines:
         order = service.state.orders.get(target)
@@ -98,7 +101,7 @@ def _serve(settings: "Settings", port: int | None, *, check: bool) -> int:
         host, number = listening.getsockname()[:2]
         where = f"[{host}]" if ":" in host else host
         console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
-        work.append(web.serve(make_app(service, token, page.settled, (page.host,)), listening))
+        work.append(web.serve(make_app(service, token, page.settled, (page.host, *page.hosts)), listening))
     asyncio.run(_run(service, settings.config.at_stop == "fade", [service.run(), *work]))
     return 0
 

@@ -23,3 +23,42 @@ def shorten(text: object, longest: int) -> str:
     """
     line = str(text)
     return replace_unprintable(line if len(line) <= longest else f"{line[: longest - 3]}...")
+
+
+def escape(text: object, longest: int) -> str:
+    r"""Return a text with escapes for all that cannot be printed, such as ``\x07`` or ``\ud800``; lines stay.
+
+    Parameters
+    ----------
+    text : object
+    longest : int
+        Characters of the text that are shown; dots stand for the others.
+
+    Returns
+    -------
+    str
+    """
+    line = str(text)
+    line = line if len(line) <= longest else f"{line[: longest - 3]}..."
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in line)
+
+
+def explain_unfit(text: str, longest: int = 200) -> str:
+    """Say why a text of others cannot be a name; the empty string if it can.
+
+    Parameters
+    ----------
+    text : str
+    longest : int
+        Characters that it may have.
+
+    Returns
+    -------
+    str
+        What is wrong, with the text escaped.
+    """
+    if len(text) > longest:
+        return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,}"
+    if not text.isprintable():
+        return f"{text[:40]!a} has characters that cannot be printed"
+    return ""

@@ -1,7 +1,6 @@
 """The service that a configuration describes."""
 
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.resources import as_file, files
 from pathlib import Path
 
@@ -20,15 +19,14 @@ from thermocomp.service.config import (
     FileOut,
     In,
     LinuxCncOut,
-    MqttIn,
-    MqttProbing,
     Out,
     Probings,
     ReplayIn,
     Settings,
-    SimulatedIn,
 )
+from thermocomp.service.findings import find_faults
 from thermocomp.service.loop import Service
+from thermocomp.service.network import MqttIn, MqttProbing
 from thermocomp.service.recorder import Recorder
 from thermocomp.simulation.protocol import Experiment
 
@@ -46,7 +44,7 @@ def build(settings: Settings) -> Service:
         A file or a folder is not there, a model file or an experiment cannot be used, or none of the models may run.
     """
     config, folder = settings
-    if missing := list(_missing(settings)):
+    if missing := list(find_faults(settings)):
         raise InputError("\n".join(["what the configuration names cannot be used:", *(f"  {m}" for m in missing)]))
     if (own := config.machine) is not None:
         machine = read_machine(folder / own.file)
@@ -72,6 +70,7 @@ def build(settings: Settings) -> Service:
         service.recorder = Recorder(
             folder / kept.file, compensator, config.own_compensation, service.clock, room, kept.channels
         )
+        service.latest.used.update(kept.channels)
     if config.shadow:
         for target in compensator.lines.keys() - compensator.shadow.keys():
             service.watch_only(target)
@@ -94,27 +93,6 @@ def find_experiment(name: str, folder: Path) -> Experiment:
         raise InputError(f"experiment {name!r}: want a path that ends in .toml, or one of {', '.join(known)}")
     with as_file(home / f"{name}.toml") as path:
         return read_protocol(path)
-
-
-def _missing(settings: Settings) -> Iterator[str]:
-    """Say which files cannot be read, and which folders nothing can be written in."""
-    config, folder = settings
-    read = [*config.models, *([config.machine.file] if config.machine else [])]
-    read += [s.file for s in config.sources if isinstance(s, ReplayIn)]
-    read += [s.experiment for s in config.sources if isinstance(s, SimulatedIn) and s.experiment.endswith(".toml")]
-    read += [config.page.token_file] if config.page and config.page.token_file else []
-    for path in (folder / name for name in read):
-        if not path.is_file():
-            yield f"{path}: no such file"
-    written = [config.state, config.journal.file if config.journal else ""]
-    written += [s.file for s in config.sinks if isinstance(s, FileOut)]
-    for path in (folder / name for name in written if name):
-        if path.is_dir():
-            yield f"{path}: is a folder; name a file"
-        elif not path.parent.is_dir():
-            yield f"{path}: there is no folder {path.parent}"
-        elif not os.access(path.parent, os.W_OK):
-            yield f"{path}: nothing can be written in {path.parent}"
 
 
 def _source(one: In, folder: Path, speed: float) -> Source:

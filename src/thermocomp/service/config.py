@@ -1,65 +1,21 @@
 """The configuration of the service: a TOML file, read strictly, all that is wrong with it at once."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError, with_config
 from pydantic_core import ErrorDetails
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.shown import explain_unfit
 from thermocomp.core.units import HOUSE_UNITS
 from thermocomp.files.tomlfile import as_json, read_toml
-
-Names = dict[str, str]
-
-
-@dataclass(frozen=True, kw_only=True)
-class OnBroker:
-    """What is said on an MQTT topic.
-
-    Parameters
-    ----------
-    topic : str
-    host, port : str, int
-        Of the broker.
-    """
-
-    published: ClassVar[bool] = False
-    topic: str
-    host: str = "127.0.0.1"
-    port: int = 1883
-
-    def __post_init__(self) -> None:
-        if not self.topic.strip():
-            raise SettingError(f"topic = {self.topic!r}: name one, such as 'machine/7/temperatures'")
-        if self.published and set(self.topic) & set("+#"):
-            raise SettingError(f"topic = {self.topic!r}: one that is published to has no wildcards (+, #)")
-        if not 0 < self.port <= 65535:
-            raise SettingError(f"port = {self.port}: want one from 1 to 65535")
-
-
-@dataclass(frozen=True, kw_only=True)
-class MqttIn(OnBroker):
-    """Readings from an MQTT topic.
-
-    Parameters
-    ----------
-    topic, host, port
-        Of `OnBroker`.
-    kind : {'mqtt'}
-    names : dict of str to str
-        Channel by the name in the message, for those that are called otherwise there.
-    virtual : bool
-        It is a virtual machine that talks there, and may run faster than the world (`Config.speed`).
-    """
-
-    kind: Literal["mqtt"]
-    names: Names = field(default_factory=dict)
-    virtual: bool = False
+from thermocomp.service.network import MqttIn, MqttOut, MqttProbing, Names, OnBroker, explain_host_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +35,10 @@ class SimulatedIn:
     experiment: str = "demo"
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise SettingError(f"seed = {self.seed}: want 0 or more")
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayIn:
@@ -93,20 +53,6 @@ class ReplayIn:
 
     kind: Literal["replay"]
     file: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class MqttProbing(OnBroker):
-    """Measurements of the tool point from an MQTT topic.
-
-    Parameters
-    ----------
-    topic, host, port
-        Of `OnBroker`.
-    kind : {'mqtt'}
-    """
-
-    kind: Literal["mqtt"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,21 +75,6 @@ class SimulatedProbing:
     def __post_init__(self) -> None:
         if not self.every > 0 or not self.repeatability >= 0:
             raise SettingError(f"every = {self.every:g}, repeatability = {self.repeatability:g}: want more than 0 s")
-
-
-@dataclass(frozen=True, kw_only=True)
-class MqttOut(OnBroker):
-    """Corrections to an MQTT topic.
-
-    Parameters
-    ----------
-    topic, host, port
-        Of `OnBroker`.
-    kind : {'mqtt'}
-    """
-
-    published: ClassVar[bool] = True
-    kind: Literal["mqtt"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,6 +123,8 @@ class Page:
     ----------
     host, port : str, int
         Where it is served; loopback unless it is stated otherwise.
+    hosts : tuple of str
+        Names by which it may be called beside `host`, ``localhost`` and the addresses of this computer.
     token_file : str
         File with the token that buttons want; without one the page only shows.
     settled : float
@@ -200,10 +133,15 @@ class Page:
 
     host: str = "127.0.0.1"
     port: int = 8731
+    hosts: tuple[str, ...] = ()
     token_file: str = ""
     settled: float = 1.0
 
     def __post_init__(self) -> None:
+        bare = self.host[1:-1] if self.host.startswith("[") and self.host.endswith("]") else self.host
+        for key, host in (("host", bare), *(("hosts", host) for host in self.hosts)):
+            if why := explain_host_name(host):
+                raise SettingError(f"{key} = {host[:200]!r}: {why}")
         if not self.settled > 0.0:
             raise SettingError(f"settled = {self.settled:g}: want more than 0 um in ten minutes")
         if not 0 <= self.port <= 65535:
@@ -328,6 +266,17 @@ class Config:
                 'own_compensation = "unknown": write "off" or "on"; what is measured at the machine means nothing '
                 "unless it is known whether the controller compensates for temperature by itself"
             )
+        for what, many in (("source", self.sources), ("sink", self.sinks), ("probe", self.probes)):
+            for place, count in Counter(map(_place, many)).items():
+                if count > 1:
+                    yield f"{count} {what}s with the same {place}: leave one of them"
+        for sink in (s for s in self.sinks if isinstance(s, MqttOut)):
+            for source in (*self.sources, *self.probes):
+                if isinstance(source, MqttIn | MqttProbing) and source.hears(sink):
+                    yield (
+                        f"topic = {source.topic!r}: hears the corrections that go to {sink.topic!r}; let them go to a "
+                        "topic that no source and no probe listens to"
+                    )
         machine = any(isinstance(s, SimulatedIn) for s in self.sources)
         if not machine and any(isinstance(p, SimulatedProbing) for p in self.probes):
             yield 'a probe of kind = "simulated" wants a source of kind = "simulated"'
@@ -336,6 +285,14 @@ class Config:
                 f"speed = {self.speed:g}: a machine that MQTT tells of runs at the speed of the world, 1, unless it is "
                 "a virtual one (virtual = true)"
             )
+
+
+def _place(one: In | Out | Probings) -> str:
+    """Return what two links must not share."""
+    if isinstance(one, OnBroker):
+        return f"topic = {one.topic!r} of {one.host}:{one.port}"
+    found = {"file": getattr(one, "file", ""), "socket": getattr(one, "socket", "")}
+    return next((f"{key} = {name!r}" for key, name in found.items() if name), f"kind = {one.kind!r}")
 
 
 class Settings(NamedTuple):
@@ -372,6 +329,8 @@ def read_config(path: str | Path) -> Settings:
         There is no such file, it is no TOML, or something in it is wrong: all of it is listed, each with its place.
     """
     content = read_toml(path, "configuration of the service")
+    if unfit := list(_unfit(content)):
+        raise InputError("\n".join([f"{path}: {len(unfit)} to mend:", *(f"  {line}" for line in unfit)]))
     try:
         config = _ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
@@ -379,6 +338,18 @@ def read_config(path: str | Path) -> Settings:
         lines = [line for error in [*errors, *_behind(content, errors)] for line in _tell(dict(error)).splitlines()]
         raise InputError("\n".join([f"{path}: {len(lines)} to mend:", *(f"  {line}" for line in lines)])) from e
     return Settings(config, Path(path).resolve().parent)
+
+
+def _unfit(value: Any, place: str = "") -> Iterator[str]:
+    """Say which keys and texts cannot be printed, or are longer than any topic."""
+    if isinstance(value, str) and (why := explain_unfit(value, 65_535)):
+        yield f"{place}: {why}"
+    pairs = value.items() if isinstance(value, dict) else enumerate(value, 1) if isinstance(value, list) else ()
+    for key, inner in pairs:
+        if why := explain_unfit(str(key)):
+            yield f"{place or 'file'}: {why}"
+        else:
+            yield from _unfit(inner, f"{place}.{key}" if place else str(key))
 
 
 def _behind(content: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[ErrorDetails]:

@@ -1,14 +1,20 @@
-"""Links of the service: each source and each sink in a task of its own, connected anew when it is lost."""
+"""Links of the service: each source and each sink in a task of its own, connected anew when it is lost.
+
+Whatever a source or a sink raises, it is this link's trouble alone: the others and the service go on.
+"""
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from typing import TypeVar
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Mapping
+from typing import Any, TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, Probe, Sink, Source
+from thermocomp.core.ports import Confirming, Probe, Sink, Source, Status
 from thermocomp.core.reading import Measurement, Reading
+from thermocomp.core.shown import escape
 
 _Said = TypeVar("_Said", Reading, Measurement)
 
@@ -18,12 +24,81 @@ TIMEOUT = 5.0
 FIRST, LONGEST = 0.5, 30.0
 #: a sink is asked what is in force at least so often [s]
 OFTEN = 2.0
+#: between two events about messages that a link refused [s]
+SELDOM = 60.0
 
 
-async def read_from(
-    source: Source | Probe, said: Callable[[], AsyncIterator[_Said]], take: Callable[[_Said], None]
-) -> None:
-    """Take what a source says for ever; one that is played to its end stays closed.
+class Link:
+    """One source, probe or sink, and how it is connected.
+
+    Parameters
+    ----------
+    end : Source, Probe or Sink
+    """
+
+    def __init__(self, end: Source | Probe | Sink) -> None:
+        self.end = end
+        self.trouble = ""  #: why it was lost, until it is connected again
+        self._wait, self._told, self._refused = FIRST, "", (0, -SELDOM)
+        self._losses = deque[str](maxlen=2)  # that are to be told: one may last shorter than between two looks
+
+    async def run(self) -> None:
+        """Connect and work, for ever, or until a source is played to its end."""
+        task = asyncio.current_task()
+        while True:
+            try:
+                async with asyncio.timeout(2 * TIMEOUT):
+                    await self.end.connect(TIMEOUT)
+                self.trouble = ""
+                await self._work()
+                if self.end.status().state == "closed":
+                    return
+                self.trouble = "ended"
+            except asyncio.CancelledError:
+                if task is None or task.cancelling():
+                    raise
+                self.trouble = "cancelled by itself"
+            except Exception as e:  # noqa: BLE001 - whatever it is, the others go on
+                self.trouble = explain(e)
+            if self.trouble != self._told:
+                self._losses.append(self.trouble)
+                self._told = self.trouble
+            await self._lose()
+            await asyncio.sleep(self._wait)
+            self._wait = min(2 * self._wait, LONGEST)
+
+    def status(self) -> Status:
+        """Return how it is; what it was lost by stays until it is connected again."""
+        if self.trouble:
+            return Status("failed", self.trouble)
+        try:
+            return self.end.status()
+        except Exception as e:  # noqa: BLE001 - to be shown
+            return Status("failed", explain(e))
+
+    def news(self) -> Iterator[str]:
+        """Return what is new since the last call: it was lost, it is back, it refused messages."""
+        where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
+        name = type(self.end).__name__ + (f" {where}" if where else "")
+        while self._losses:
+            yield f"{name}: {self._losses.popleft()}"
+        if self._told and not self.trouble:
+            self._told = ""
+            yield f"{name}: connected again"
+        (told, at), now = self._refused, time.monotonic()
+        if (refused := getattr(self.end, "refused", 0)) > told and now - at >= SELDOM:
+            self._refused = (refused, now)
+            yield f"{name}: {refused} messages refused; the last: {getattr(self.end, 'last_refusal', '')}"
+
+    async def _work(self) -> None:
+        raise NotImplementedError
+
+    async def _lose(self) -> None:
+        """Do what has to be done when it is lost."""
+
+
+class Inlet(Link):
+    """A source or a probe.
 
     Parameters
     ----------
@@ -33,26 +108,24 @@ async def read_from(
     take : callable
         Called with each of them.
     """
-    wait = FIRST
-    while True:
-        try:
-            await source.connect(TIMEOUT)
+
+    def __init__(
+        self, source: Source | Probe, said: Callable[[], AsyncIterator[_Said]], take: Callable[[_Said], None]
+    ) -> None:
+        super().__init__(source)
+
+        async def work() -> None:
             async for one in said():
                 take(one)
-                wait = FIRST
-            if source.status().state == "closed":
-                return
-        except (ThermocompError, OSError):
-            pass  # its status says why
-        finally:
-            with contextlib.suppress(ThermocompError, OSError):
-                if source.status().state != "closed":
-                    await source.close()
-        await asyncio.sleep(wait)
-        wait = min(2 * wait, LONGEST)
+                self._wait = FIRST
+
+        self._work = work  # type: ignore[method-assign]
+
+    async def _lose(self) -> None:
+        await within(TIMEOUT, self.end.close())
 
 
-class Outlet:
+class Outlet(Link):
     """A sink that gets the newest corrections, as fast as it takes them.
 
     Parameters
@@ -63,6 +136,7 @@ class Outlet:
     """
 
     def __init__(self, sink: Sink, heard: Callable[[Sink, Mapping[str, Correction]], None] | None = None) -> None:
+        super().__init__(sink)
         self.sink = sink
         self.heard = heard
         self._newest: dict[str, Correction] = {}
@@ -73,44 +147,53 @@ class Outlet:
         self._newest = dict(corrections)
         self._news.set()
 
-    async def run(self) -> None:
-        """Apply what is put, for ever."""
-        wait = FIRST
-        while True:
-            try:
-                await self.sink.connect(TIMEOUT)
-                while True:
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(OFTEN):
-                            await self._news.wait()
-                    newest = self._newest if self._news.is_set() else {}
-                    self._news.clear()
-                    async with asyncio.timeout(TIMEOUT):
-                        if newest:  # before the first reading there is nothing to say
-                            await self.sink.apply(newest)
-                        await self._confirm()
-                    wait = FIRST
-            except (ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
-                self._news.set()  # what was lost is applied after the next connection
-            await asyncio.sleep(wait)
-            wait = min(2 * wait, LONGEST)
-
-    async def _confirm(self) -> None:
-        if self.heard is not None and isinstance(self.sink, Confirming):
-            in_force = await self.sink.confirmed()
-            self.heard(self.sink, in_force or {})
-
     async def flush(self) -> None:
         """Apply what was put last, if the sink is there; what is in force stays if nothing was."""
-        if not self._newest:
-            return
-        with contextlib.suppress(ThermocompError, OSError, TimeoutError, ValueError, RuntimeError):
+        if self._newest:
+            await within(TIMEOUT, self.sink.apply(self._newest))
+
+    async def _work(self) -> None:
+        while True:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(OFTEN):
+                    await self._news.wait()
+            newest = self._newest if self._news.is_set() else {}
+            self._news.clear()
             async with asyncio.timeout(TIMEOUT):
-                await self.sink.apply(self._newest)
+                if newest:  # before the first reading there is nothing to say
+                    await self.sink.apply(newest)
+                if self.heard is not None and isinstance(self.sink, Confirming):
+                    self.heard(self.sink, await self.sink.confirmed() or {})
+            self._wait = FIRST
+
+    async def _lose(self) -> None:
+        self._news.set()  # what was lost is applied after the next connection
 
 
-async def within(seconds: float, work: Awaitable[None]) -> None:
-    """Do something that may fail or take too long, without waiting for ever."""
-    with contextlib.suppress(ThermocompError, OSError, TimeoutError):
-        async with asyncio.timeout(seconds):
-            await work
+def explain(error: Exception) -> str:
+    """Say in words why a link does not work.
+
+    Parameters
+    ----------
+    error : Exception
+    """
+    if isinstance(error, TimeoutError) and not str(error):
+        return "no answer in time"
+    known = isinstance(error, ThermocompError | OSError) and str(error)
+    return escape(error if known else f"unexpected {type(error).__name__}: {error}", 400)
+
+
+async def within(seconds: float, work: Coroutine[Any, Any, None]) -> None:
+    """Do something that may fail, be cancelled or take too long, without waiting for ever.
+
+    Parameters
+    ----------
+    seconds : float
+    work : coroutine
+    """
+    task = asyncio.create_task(work)
+    task.add_done_callback(lambda done: done.cancelled() or done.exception())
+    try:
+        await asyncio.wait({task}, timeout=seconds)
+    finally:
+        task.cancel()

@@ -6,7 +6,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -21,34 +21,16 @@ from thermocomp.runtime.identity import KNOWN, is_known
 from thermocomp.runtime.orders import order, rezero, withdraw
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume, silence
 from thermocomp.service.clock import Clock
-from thermocomp.service.links import TIMEOUT, Outlet, read_from, within
+from thermocomp.service.events import Events
+from thermocomp.service.latest import Latest
+from thermocomp.service.links import TIMEOUT, Inlet, Link, Outlet, within
 from thermocomp.service.probe import KEPT, Checked, check
 from thermocomp.service.recorder import CONFIRM_WITHIN, Recorder
 
-#: events that are kept to be shown
-EVENTS = 200
 #: points of each curve that are kept to be shown, and time between two [s of the machine]
 POINTS, EVERY = 720, 30.0
 #: why a target is in shadow that the configuration put there
 CONFIGURED = "by configuration"
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened.
-
-    Parameters
-    ----------
-    time : float
-        Of the machine, seconds since 1970.
-    kind : str
-        ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
-    text : str
-    """
-
-    time: float
-    kind: str
-    text: str
 
 
 @dataclass
@@ -77,9 +59,9 @@ class Service:
     recorder: Recorder | None = None
     state: CompensatorState = field(init=False)
     said: Compensated | None = field(default=None, init=False)
-    events: deque[Event] = field(init=False)
+    events: Events = field(default_factory=Events, init=False)
     curves: deque[dict[str, float]] = field(init=False)  #: what is drawn: a row of numbers, ``time`` first
-    latest: dict[str, tuple[float, float]] = field(default_factory=dict, init=False)  #: value and when, by channel
+    latest: Latest = field(init=False)  #: value and when, by channel
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
     probings: dict[str, Probing] = field(default_factory=dict, init=False)  #: that wait for the next reading
     checked: deque[Checked] = field(init=False)  #: what probings said
@@ -89,15 +71,18 @@ class Service:
     confirmed: dict[str, tuple[Correction, float]] = field(default_factory=dict, init=False)  #: in force, and when
 
     def __post_init__(self) -> None:
-        self.events, self.curves, self.checked = deque(maxlen=EVENTS), deque(maxlen=POINTS), deque(maxlen=KEPT)
+        self.curves, self.checked = deque(maxlen=POINTS), deque(maxlen=KEPT)
+        models = self.compensator.models
+        self.latest = Latest(i.name for m in models for i in (*m.inputs, *(m.watch.inputs if m.watch else ())))
         # what a controller says is in force goes before what a file says
         controllers: list[Sink] = [s for s in self.sinks if isinstance(s, Suspending)]
         self._sure = controllers or list(self.sinks)
         self.outlets = [Outlet(sink, self._hear if sink in self._sure else None) for sink in self.sinks]
+        self.inlets = self._make_inlets()
         self._refused: Path | None = None
         self.state = self._begin()
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
-        self._told, self._alarms = dict[int, int](), dict[str, str]()
+        self._alarms = dict[str, str]()
         self._heard = self.clock.tick()
 
     # -- what happens --------------------------------------------------------------------------------------------------
@@ -105,23 +90,21 @@ class Service:
     async def run(self) -> None:
         """Run until it is cancelled; then save the state and leave the corrections as they are."""
         self._put_aside()
+        if self.recorder is not None:
+            await asyncio.to_thread(self.recorder.journal.flush)
+        self.inlets = self._make_inlets()
         for sink in self.sinks:
-            await self._adopt(sink)
+            await within(TIMEOUT, self._adopt(sink))  # if it fails, its link says why
         try:
             async with asyncio.TaskGroup() as group:
-                for source in self.sources:
-                    group.create_task(read_from(source, source.readings, self.take))
-                for probe in self.probes:
-                    group.create_task(read_from(probe, probe.measurements, self.measure))
-                for outlet in self.outlets:
-                    group.create_task(outlet.run())
+                for one in self.links():
+                    group.create_task(one.run())
                 group.create_task(self._watch())
         finally:
             for outlet in self.outlets:
                 await outlet.flush()
-            links: list[Source | Probe | Sink] = [*self.sources, *self.probes, *self.sinks]
-            for link in links:
-                await within(2.0, link.close())
+            for one in self.links():
+                await within(2.0, one.end.close())
             self._save()
             if self.recorder is not None:
                 self.recorder.journal.close()
@@ -135,10 +118,8 @@ class Service:
         if not -most <= now - stamp <= most:
             self.counts["rejected"] += 1
             return
-        for name, value in reading.values.items():
-            self.latest[name] = (value, tick)
-        if len(self.latest) > 10_000:  # names that nobody knows, without end
-            self.latest = {n: v for n, v in self.latest.items() if tick - v[1] <= most}
+        if left_out := self.latest.take(reading.values, tick, most):
+            self._say("link", f"more names that nothing uses than are kept; {left_out!r} and others are left out")
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         (probings, self.probings), learned = (self.probings, {}), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
@@ -153,7 +134,10 @@ class Service:
 
     def order(self, target: str, status: Status | None) -> None:
         """Take a target out, or let it run again; see `thermocomp.runtime.orders.order`."""
+        before = self.state.orders.get(target)
         self.state = order(self.compensator, self.state, target, status)
+        if before == status:  # it is so: no news
+            return
         word = f"{status.word}: {status.reason}" if status else "runs again"
         self._say("state", f"{target} {word}, as ordered")
         self._dirty = True
@@ -233,7 +217,15 @@ class Service:
         for outlet in self.outlets:
             await outlet.flush()
 
+    def links(self) -> list[Link]:
+        """Return the links of sources, probes and sinks, in this order."""
+        return [*self.inlets, *self.outlets]
+
     # -- inside --------------------------------------------------------------------------------------------------------
+
+    def _make_inlets(self) -> list[Inlet]:
+        sources = [Inlet(source, source.readings, self.take) for source in self.sources]
+        return sources + [Inlet(probe, probe.measurements, self.measure) for probe in self.probes]
 
     def _begin(self) -> CompensatorState:
         cold = self.compensator.start()
@@ -269,14 +261,10 @@ class Service:
         """Begin at what the controller says is in force: what was saved may be a second older."""
         if not isinstance(sink, Confirming):
             return
-        found: Mapping[str, Correction] | None = None
-        with contextlib.suppress(ThermocompError, OSError, TimeoutError):
-            async with asyncio.timeout(TIMEOUT):
-                await sink.connect(TIMEOUT)
-                found = await sink.confirmed()
-        allowed = {t: c for t, c in (found or {}).items() if t in self.state.corrections and self._allowed(t, c)}
-        if allowed:
-            self.state = self.state._replace(corrections=self.state.corrections | allowed)
+        await sink.connect(TIMEOUT)
+        found = await sink.confirmed() or {}
+        allowed = {t: c for t, c in found.items() if t in self.state.corrections and self._allowed(t, c)}
+        self.state = self.state._replace(corrections=self.state.corrections | allowed)
 
     def _allowed(self, target: str, correction: Correction) -> bool:
         ends = self.compensator.lines[target].travel
@@ -288,7 +276,9 @@ class Service:
             await asyncio.sleep(min(1.0, max(0.1, 1.0 / self.clock.speed)))
             tick = self.clock.tick()
             silent = tick - self._heard
-            self._tell_refusals()
+            for one in self.links():
+                for text in one.news():
+                    self._say("link", text)
             if self._ending:
                 continue
             if silent > max(2.0, 2.0 * self.clock.speed):
@@ -305,14 +295,6 @@ class Service:
                 if (trouble := self.recorder.journal.status().reason) != self._trouble:
                     self._trouble = trouble
                     self._say("service", f"journal: {trouble or 'all is written again'}")
-
-    def _tell_refusals(self) -> None:
-        """Say what connections could not read, once a look."""
-        for k, link in enumerate((*self.sources, *self.probes)):
-            refused = getattr(link, "refused", 0)
-            if refused > self._told.get(k, 0):
-                self._say("link", f"{refused} messages refused; the last: {getattr(link, 'last_refusal', '')}")
-                self._told[k] = refused
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
@@ -381,9 +363,9 @@ class Service:
         return found | {f"{target} correction": c.offset for target, c in said.corrections.items()}
 
     def _say(self, kind: str, text: str) -> None:
-        self.events.append(Event(self.clock.now(), kind, text))
-        if self.recorder is not None and kind != "state":
-            self.recorder.alarm(self.clock.now(), kind, text)
+        event = self.events.tell(self.clock.now(), kind, text)
+        if event is not None and self.recorder is not None and kind != "state":
+            self.recorder.alarm(*astuple(event))
 
     def _save(self) -> None:
         if self.state_path is None:

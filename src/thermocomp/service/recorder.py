@@ -61,7 +61,7 @@ class Recorder:
         channels |= {i.name: Channel(i.name, i.quantity, i.unit) for i in inputs}
         targets = tuple(Target(name) for name in compensator.lines)
         start = Start(clock.now(), targets, tuple(channels.values()), own, CONFIRM_WITHIN * clock.speed)
-        self.journal = Journal.open(path, limits, start)
+        self.journal = Journal(path, limits, start)  # nothing is written before the service runs
         self._before: Compensated | None = None
         self._references: dict[str, Reference] = {}
 

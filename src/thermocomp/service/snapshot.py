@@ -3,7 +3,9 @@
 import math
 from typing import Any
 
+from thermocomp.core.ports import Probe
 from thermocomp.runtime.lines import DeviationLine
+from thermocomp.service.links import Link, Outlet
 from thermocomp.service.loop import Service
 from thermocomp.service.settling import minutes_until
 
@@ -34,7 +36,8 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
             for name, (value, at) in sorted(service.latest.items())
         ],
         "missing": sorted(failed.keys() - service.latest.keys()),
-        "links": [_link(kind, one) for kind, many in _links(service) for one in many],
+        "left_out": service.latest.left_out,
+        "links": [_link(one) for one in service.links()],
         "counts": dict(service.counts),
         "rejected": said.rejected if said else "no reading yet",
         "residuals": [checked._asdict() for checked in service.checked],
@@ -83,10 +86,7 @@ def _words(minutes: float) -> str:
     return "settled" if minutes == 0.0 else f"{max(1.0, minutes):.0f} min"
 
 
-def _links(service: Service) -> list[tuple[str, list[Any]]]:
-    return [("source", list(service.sources)), ("probe", list(service.probes)), ("sink", list(service.sinks))]
-
-
-def _link(kind: str, one: Any) -> dict[str, Any]:
+def _link(one: Link) -> dict[str, Any]:
+    kind = "sink" if isinstance(one, Outlet) else "probe" if isinstance(one.end, Probe) else "source"
     status = one.status()
-    return {"kind": kind, "name": type(one).__name__, "state": status.state, "reason": status.reason}
+    return {"kind": kind, "name": type(one.end).__name__, "state": status.state, "reason": status.reason}

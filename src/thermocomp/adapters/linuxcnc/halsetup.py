@@ -17,7 +17,7 @@ HAL_NAME, COMPONENT_NAME, SOCKET_NAME = "thermocomp.hal", "thermocomp_hal.py", "
 #: share of the axis' speed and acceleration that a correction on the drive side may take
 SHARE = 0.1
 #: bytes of a path that a socket can have
-_LONGEST = 107
+LONGEST = 107
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> Prepared:
     _check_free(ini, files, axes, settings.pattern)
     folder = folder.resolve()
     socket = folder / SOCKET_NAME
-    if len(str(socket).encode()) > _LONGEST or any(c.isspace() or c in "\"'#[]$()" for c in str(socket)):
+    if len(str(socket).encode()) > LONGEST or any(c.isspace() or c in "\"'#[]$()" for c in str(socket)):
         raise InputError(f"{folder}: HAL and a socket want a short path without spaces: choose another folder with -o")
     todo: list[str] = []
     joints = round(ini.number("KINS", "JOINTS"))

@@ -13,6 +13,7 @@ from thermocomp.adapters.connection import Connection
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import SettingError, ThermocompError
 from thermocomp.core.ports import Status
+from thermocomp.core.shown import escape
 
 #: between two signs of life, at most [s], and as a share of the time after which the component drops who is silent
 BEAT, SHARE = 0.5, 0.25
@@ -182,21 +183,29 @@ class LinuxCncSink:
                 await writer.drain()
                 answer = json.loads(await reader.readline() or b'{"error": "lost"}')
             if answer.get("beat") != self._beat:
-                raise ValueError(answer.get("error", "not the answer"))
-            self._why, self.ticks = str(answer["suspended"]), int(answer["ticks"])
+                raise ValueError(_text(answer.get("error", "not the answer")))
+            self._why, self.ticks = _text(answer["suspended"]), int(answer["ticks"])
             self._still = bool(answer["still"])
             self._timeout = float(answer["timeout"])
-            self._reports = {letter: _read(one) for letter, one in answer["axes"].items()}
+            axes = answer["axes"]
+            self._reports = {letter: _read(axes[letter]) for letter in "XYZUVW" if letter in axes}
             heard = True
-        except (OSError, TimeoutError, ValueError, KeyError, AttributeError, TypeError) as e:
+        except (OSError, TimeoutError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as e:
             raise self._fail(str(e) or "no answer") from e
+        except (RecursionError, ThermocompError) as e:
+            raise self._fail(f"not the answer: {e}") from e
         finally:  # also if it is cancelled: the answer would be taken for that of the next question
             if not heard:
                 await self._hang_up()
 
 
 def _read(one: Mapping[str, Any]) -> AxisReport:
-    demand, in_force, alarm = float(one["demand"]), float(one["in_force"]), str(one["alarm"])
+    demand, in_force, alarm = float(one["demand"]), float(one["in_force"]), _text(one["alarm"])
     aside = in_force - demand if abs(in_force - demand) > ASIDE or alarm else 0.0
     correction = Correction(float(one["offset"]) + aside, float(one["slope"]), float(one["reference"]))
     return AxisReport(correction, in_force, float(one["position"]), alarm)
+
+
+def _text(found: object) -> str:
+    """Return a text of the component, fit to be shown."""
+    return escape(found, 200)

@@ -104,6 +104,7 @@ function show(state) {
   }
   table("#sensors", state.sensors.map(s => [s.name, s.value.toFixed(2), [s.state, s.state === "good" ? "active" : "failed"]])
     .concat(state.missing.map(n => [n, "–", ["missing", "failed"]])));
+  put(at(document, "#others"), state.left_out ? `and ${state.left_out}${state.left_out < 10000 ? "" : " or"} more names that no model uses` : "");
   table("#links", state.links.map(l => [l.name, [l.state, l.state], l.reason]));
   put(at(document, "#counts"), `${state.counts.readings} readings, ${state.counts.rejected} of them rejected${state.rejected ? ": " + state.rejected : ""}`);
   table("#events", state.events.slice(0, 100).map(e => [clock(e.time), e.kind, e.text]));
@@ -114,13 +115,15 @@ document.addEventListener("click", async event => {
   const button = event.target.closest("button[data-do]");
   if (!button) return;
   const card = button.closest("article"), answer = at(card, ".answer");
-  const response = await fetch("/api/order", {
-    method: "POST",
-    headers: { "Content-Type": "application/json", Authorization: "Bearer " + at(document, "#token").value },
-    body: JSON.stringify({ target: card.dataset.target, do: button.dataset.do }),
-  });
-  const content = await response.json();
-  put(answer, response.ok ? "done: " + content.done : String(content.detail));
+  try {
+    const response = await fetch("/api/order", {
+      method: "POST",
+      headers: { "Content-Type": "application/json", Authorization: "Bearer " + at(document, "#token").value },
+      body: JSON.stringify({ target: card.dataset.target, do: button.dataset.do }),
+    });
+    const content = await response.json();
+    put(answer, response.ok ? "done: " + content.done : String(content.detail));
+  } catch (error) { put(answer, "the service does not answer: " + error.message); }
 });
 
 function restyle() { for (const c of charts.values()) c.plot.destroy(); charts.clear(); }

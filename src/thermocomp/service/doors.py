@@ -1,0 +1,215 @@
+"""Doors of the page: by which names it may be called, from which pages, and who may give orders."""
+
+import contextlib
+import hmac
+import json
+import re
+import socket
+import time
+from collections import deque
+from collections.abc import Collection
+from ipaddress import IPv4Address, IPv6Address, ip_address
+from typing import Any
+
+from fastapi import HTTPException, Request
+from fastapi.responses import JSONResponse
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from thermocomp.core.shown import shorten
+
+#: wrong tokens within a minute that are answered as such
+MOST_WRONG = 5
+#: bytes of an order, at most
+MOST_BYTES = 2_000
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
+    "frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
+_HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[^\[\]:/?#@\\\s]+)(:[0-9]{1,5})?")
+
+
+class Json(JSONResponse):
+    """JSON in plain ASCII: any text can be encoded, whatever it is; a number that JSON has not got is null.
+
+    Parameters
+    ----------
+    content : object
+        Of `write_json`.
+    status_code, headers, media_type, background
+        Of the response.
+    """
+
+    def render(self, content: Any) -> bytes:
+        """Return it as bytes; see `write_json`."""
+        return write_json(content)
+
+
+def write_json(content: Any) -> bytes:
+    """Return JSON in plain ASCII, without numbers that JSON has not got.
+
+    Parameters
+    ----------
+    content : object
+        Tables, lists, text, numbers, None.
+    """
+    return json.dumps(_clean(content), allow_nan=False).encode("ascii")
+
+
+class Doorkeeper:
+    """Authorises orders by a token; wrong ones are slowed down, the right one never is.
+
+    Parameters
+    ----------
+    token : str
+        Empty: no orders are taken.
+    """
+
+    def __init__(self, token: str) -> None:
+        self._token = token.encode()
+        self._wrong = deque[float](maxlen=MOST_WRONG)
+
+    def check(self, given: str) -> None:
+        """Let an order pass, or raise.
+
+        Every token is compared: if wrong ones could close the door, whoever reaches the page could keep the operator
+        from holding the machine's correction. A token of 16 characters or more is not found by guessing.
+
+        Raises
+        ------
+        HTTPException
+            403 there is no token, 401 the token is wrong, 429 it is, as others were lately.
+        """
+        if not self._token:
+            raise HTTPException(403, "no token is configured: this page only shows ([page] token_file)")
+        if hmac.compare_digest(given.encode(), self._token):
+            return
+        now = time.monotonic()
+        if len(self._wrong) == self._wrong.maxlen and now - self._wrong[0] < 60.0:
+            raise HTTPException(429, "too many wrong tokens: wait a minute", {"Retry-After": "60"})
+        if given:  # nothing was guessed
+            self._wrong.append(now)
+        raise HTTPException(401, "the token is wrong", {"WWW-Authenticate": "Bearer"})
+
+
+class Door:
+    """Refuses requests under other names, from other pages, and large ones; an ASGI middleware.
+
+    Parameters
+    ----------
+    app : ASGI application
+    names : collection of str
+        Host names that the page is called by, beside ``localhost`` and the addresses of this computer.
+    """
+
+    def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:
+        self._app = app
+        self._names = {"localhost", *map(_as_browsers_write, names)}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+
+        async def answer(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(_HEADERS)
+            await send(message)
+
+        app = self._app
+        if scope["type"] == "http" and (refused := self._refuse(Request(scope))):
+            status, why = refused
+            app = Json({"detail": why}, status)
+        await app(scope, receive, answer)
+
+    def _refuse(self, request: Request) -> tuple[int, str] | None:
+        headers, server = request.headers, request.scope.get("server")
+        if why := explain_host(headers.get("host", ""), self._names, server[0] if server else ""):
+            return 400, why
+        # what only shows may be linked to; what answers or changes something is for this page alone
+        shows = request.method in ("GET", "HEAD") and not request.url.path.startswith("/api/")
+        if not shows and (why := explain_foreign(request)):
+            return 403, why
+        length = headers.get("content-length", "0")
+        if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > MOST_BYTES:
+            return 413, f"at most {MOST_BYTES} bytes"
+        if "transfer-encoding" in headers:
+            return 413, f"at most {MOST_BYTES} bytes, with their length stated (Content-Length)"
+        return None
+
+
+def explain_host(header: str, names: Collection[str], server: str) -> str:
+    """Say why a request may not be answered under a name; the empty string if it may.
+
+    A page of another site whose name leads to this computer (DNS rebinding) carries that name. An address cannot be
+    made to lead elsewhere.
+
+    Parameters
+    ----------
+    header : str
+        Host, as it was asked for: a name or an address, with or without a port.
+    names : collection of str
+        That are allowed, in small letters.
+    server : str
+        Address that the connection came in at.
+    """
+    found = _HOST.fullmatch(header)
+    name = found[1].lower().removesuffix(".") if found else ""
+    if name in names:
+        return ""
+    address = _address(name)
+    if address is not None and (address == _address(server) or address.is_loopback or _is_here(address)):
+        return ""
+    return f"this page is not called {shorten(header, 80)!r}: add the name to hosts in [page] if it should be"
+
+
+def explain_foreign(request: Request) -> str:
+    """Say why a request comes from a page of another origin; the empty string if it comes from this page or no page.
+
+    Browsers state the origin of the page with whatever may change something; programs state none.
+
+    Parameters
+    ----------
+    request : Request
+    """
+    own = f"{request.url.scheme}://{request.headers.get('host', '')}".lower()
+    site = request.headers.get("sec-fetch-site", "none").lower()
+    if any(origin.lower() != own for origin in request.headers.getlist("origin")) or site not in (
+        "same-origin",
+        "none",
+    ):
+        return "asked from the page of another site: open this page itself"
+    return ""
+
+
+def _as_browsers_write(name: str) -> str:
+    with contextlib.suppress(UnicodeError):
+        name = name.encode("idna").decode("ascii")
+    return name.lower().removesuffix(".")
+
+
+def _address(text: str) -> IPv4Address | IPv6Address | None:
+    try:
+        found = ip_address(text.strip("[]").partition("%")[0])
+    except ValueError:
+        return None
+    return (found.ipv4_mapped or found) if isinstance(found, IPv6Address) else found
+
+
+def _is_here(address: IPv4Address | IPv6Address) -> bool:
+    """Return whether an address is one of this computer's: only those can be listened at."""
+    try:
+        with socket.socket(socket.AF_INET if address.version == 4 else socket.AF_INET6, socket.SOCK_STREAM) as probe:
+            probe.bind((str(address), 0))
+    except OSError:
+        return False
+    return True
+
+
+def _clean(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _clean(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_clean(v) for v in value]
+    return None if isinstance(value, float) and not abs(value) < float("inf") else value

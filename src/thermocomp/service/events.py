@@ -1,0 +1,60 @@
+"""What happened, to be shown: the newest events; others cannot drown them."""
+
+import time
+from collections import deque
+from dataclasses import dataclass
+
+from thermocomp.core.shown import escape
+
+#: events that are kept to be shown, and characters of one
+EVENTS, LONGEST = 200, 1_000
+#: kinds of which others can cause any number, and how many of one kind are shown within a minute
+LIMITED, MOST = ("link", "probing"), 30
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened.
+
+    Parameters
+    ----------
+    time : float
+        Of the machine, seconds since 1970.
+    kind : str
+        ``reference``, ``state``, ``sensor``, ``probing``, ``link`` or ``service``.
+    text : str
+    """
+
+    time: float
+    kind: str
+    text: str
+
+
+class Events(deque[Event]):
+    """The newest events, oldest first."""
+
+    def __init__(self) -> None:
+        super().__init__(maxlen=EVENTS)
+        self._lately = {kind: deque[float](maxlen=MOST) for kind in LIMITED}
+        self._left_out = dict.fromkeys(LIMITED, 0)
+
+    def tell(self, time_of_it: float, kind: str, text: str) -> Event | None:
+        """Add an event and return it; None if there were too many of its kind: the next one says how many.
+
+        Parameters
+        ----------
+        time_of_it : float
+            Of the machine, seconds since 1970.
+        kind, text : str
+            Of `Event`; what cannot be printed is shown escaped.
+        """
+        if (lately := self._lately.get(kind)) is not None:
+            now = time.monotonic()
+            if len(lately) == MOST and now - lately[0] < 60.0:
+                self._left_out[kind] += 1
+                return None
+            lately.append(now)
+            if left := self._left_out[kind]:
+                text, self._left_out[kind] = f"{text} (before it {left:,} more of this kind)", 0
+        self.append(Event(time_of_it, kind, escape(text, LONGEST)))
+        return self[-1]

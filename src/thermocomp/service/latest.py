@@ -1,0 +1,54 @@
+"""The latest value of each channel: of names that nothing uses only so many are kept, whatever comes in."""
+
+from collections.abc import Iterable, Mapping
+
+#: names that nothing uses and that are kept to be shown; further ones are counted, up to so many
+KEPT, COUNTED = 64, 10_000
+
+
+class Latest(dict[str, tuple[float, float]]):
+    """Value, and when it came, by name of the channel.
+
+    Parameters
+    ----------
+    used : iterable of str
+        Names that are always kept.
+    """
+
+    def __init__(self, used: Iterable[str]) -> None:
+        super().__init__()
+        self.used = set(used)
+        self._left_out = set[int]()  # hashes of names: a name may be long
+
+    @property
+    def left_out(self) -> int:
+        """How many names were not kept; at `COUNTED` it may be more."""
+        return len(self._left_out)
+
+    def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
+        """Take values in; return a name that is not kept if none was left out before.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+        tick : float
+            Now [s].
+        longest : float
+            A name that nothing uses makes room for another after so long without a value [s].
+        """
+        first, others = "", values.keys() - self.used
+        if new := others - self.keys():
+            room = KEPT - len(self.keys() - self.used)
+            if room < len(new):
+                old = [n for n, (_, at) in self.items() if n not in self.used and tick - at > longest]
+                for name in old:
+                    del self[name]
+                room += len(old)
+            ordered = [name for name in values if name in new]
+            new = set(ordered[:room])
+            first = ordered[room] if len(ordered) > room and not self._left_out else ""
+            self._left_out.update(map(hash, ordered[room : room + COUNTED - len(self._left_out)]))
+        for name, value in values.items():
+            if name in self.used or name in self or name in new:
+                self[name] = (value, tick)
+        return first

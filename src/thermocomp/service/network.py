@@ -1,0 +1,166 @@
+"""What a configuration says of the network: brokers, topics, hosts."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from ipaddress import ip_address
+from typing import ClassVar, Literal
+
+from thermocomp.core.exceptions import SettingError
+
+Names = dict[str, str]
+#: bytes of a topic, as MQTT counts them; characters of a host name, and of what stands between two dots
+_TOPIC, _HOST, _LABEL = 65_535, 253, 63
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnBroker:
+    """What is said on an MQTT topic.
+
+    Parameters
+    ----------
+    topic : str
+    host, port : str, int
+        Of the broker.
+    """
+
+    published: ClassVar[bool] = False
+    topic: str
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+    def __post_init__(self) -> None:
+        if why := explain_topic(self.topic, published=self.published):
+            raise SettingError(f"topic = {self.topic[:200]!r}: {why}")
+        if why := explain_host_name(self.host):
+            raise SettingError(f"host = {self.host[:200]!r}: {why}")
+        if not 0 < self.port <= 65535:
+            raise SettingError(f"port = {self.port}: want one from 1 to 65535")
+
+    def hears(self, other: "OnBroker") -> bool:
+        """Return whether what is published to another's topic comes back on this one, as far as names tell."""
+        levels, topic = self.topic.split("/"), other.topic.split("/")
+        levels = levels[2:] if levels[0] == "$share" else levels
+        fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
+        long = len(topic) >= len(levels) - 1 if levels[-1] == "#" else len(topic) == len(levels)
+        return (self.host, self.port) == (other.host, other.port) and fits and long
+
+
+@dataclass(frozen=True, kw_only=True)
+class MqttIn(OnBroker):
+    """Readings from an MQTT topic.
+
+    Parameters
+    ----------
+    topic, host, port
+        Of `OnBroker`.
+    kind : {'mqtt'}
+    names : dict of str to str
+        Channel by the name in the message, for those that are called otherwise there.
+    virtual : bool
+        It is a virtual machine that talks there, and may run faster than the world (`Config.speed`).
+    """
+
+    kind: Literal["mqtt"]
+    names: Names = field(default_factory=dict)
+    virtual: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
+            raise SettingError(f"names: several values for {', '.join(sorted(twice))}: want one for each channel")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MqttProbing(OnBroker):
+    """Measurements of the tool point from an MQTT topic.
+
+    Parameters
+    ----------
+    topic, host, port
+        Of `OnBroker`.
+    kind : {'mqtt'}
+    """
+
+    kind: Literal["mqtt"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MqttOut(OnBroker):
+    """Corrections to an MQTT topic.
+
+    Parameters
+    ----------
+    topic, host, port
+        Of `OnBroker`.
+    kind : {'mqtt'}
+    """
+
+    published: ClassVar[bool] = True
+    kind: Literal["mqtt"]
+
+
+def explain_topic(topic: str, *, published: bool) -> str:
+    """Say why a topic cannot be one; the empty string if it can.
+
+    Parameters
+    ----------
+    topic : str
+    published : bool
+        It is published to, so that wildcards stand for nothing.
+    """
+    return next(_faults_of_topic(topic, published=published), "")
+
+
+def explain_host_name(host: str) -> str:
+    """Say why a host cannot be one; the empty string if it can be: an address or a name.
+
+    Parameters
+    ----------
+    host : str
+    """
+    try:
+        ip_address(host)
+    except ValueError:
+        return next(_faults_of_name(host), "")
+    return ""
+
+
+def _faults_of_topic(topic: str, *, published: bool) -> Iterator[str]:
+    levels = topic.split("/")
+    if not topic.strip():
+        yield "name one, such as 'machine/7/temperatures'"
+    if len(topic.encode()) > _TOPIC:
+        yield f"longer than {_TOPIC:,} bytes"
+    if published and set(topic) & set("+#"):
+        yield "one that is published to has no wildcards (+, #)"
+    if published and topic.startswith("$"):
+        yield "topics that begin with $ are the broker's own"
+    if levels[0] == "$share":
+        if len(levels) < 3 or not levels[1] or set(levels[1]) & set("+#") or not any(levels[2:]):
+            yield "want '$share/GROUP/TOPIC', the group without wildcards"
+        levels = levels[2:]
+    for level in levels:
+        if len(level) > 1 and set(level) & set("+#"):
+            yield f"a wildcard stands for a whole level: {level!r} has more; want such as 'machine/+/spindle'"
+    if "#" in levels[:-1]:
+        yield "the wildcard # stands for all that follows: want it at the end, such as 'machine/#'"
+
+
+def _faults_of_name(host: str) -> Iterator[str]:
+    if not host.strip():
+        yield "name one, such as '127.0.0.1'"
+    if "/" in host:
+        yield "want the host alone, such as 'mill7' or '192.0.2.7'"
+    if ":" in host:
+        yield "want the host alone, and port = ... for its port"
+    if host.replace(".", "").isdigit():
+        yield "want an address of four numbers from 0 to 255"
+    try:
+        labels = host.removesuffix(".").encode("idna").decode("ascii").split(".")
+    except UnicodeError:
+        labels = [""]
+    if len(".".join(labels)) > _HOST or not all(0 < len(label) <= _LABEL for label in labels):
+        yield "want names between dots, of 1 to 63 characters each"
+    if not all(c.isalnum() or c in "-_" for label in labels for c in label):
+        yield "a host name has letters, digits, '-' and '.' alone"
