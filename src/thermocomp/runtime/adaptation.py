@@ -51,9 +51,8 @@ class Probing(NamedTuple):
     deviation: float  #: [um]
     repeatability: float = 0.5  #: of the probe, standard deviation [um]
     position: float = 0.0  #: where on the axis [mm]
-    keys: tuple[
-        str, ...
-    ] = ()  #: what tells it from others: an id, its time; a probing with one of them again is the same
+    #: what tells it from others, such as an id or its time: a probing with one of them again is the same
+    keys: tuple[str, ...] = ()
 
     @property
     def identity(self) -> tuple[str, ...]:
