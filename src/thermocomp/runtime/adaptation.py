@@ -21,8 +21,9 @@ FloatArray = NDArray[np.float64]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
 #: what no offset and no structure explains, as a share of the error on cycles that were left out
 UNEXPLAINED = 0.2
-#: a probing this many standard deviations from what is expected counts less, the further it is from it
-SUSPECT = 2.5
+#: a probing this many standard deviations from what is expected counts less, the further it is from it: its noise is
+#: taken for larger by this power
+SUSPECT, STEEP = 2.5, 4
 #: a probing further than this many standard deviations from what is expected is refused
 IMPLAUSIBLE = 4.0
 #: errors of most cycles and days are smaller than their root mean square over all: down to this share of it
@@ -201,8 +202,8 @@ def take(
             if not plausible:
                 covariance[-1, -1] += surprise**2
                 spread = max(spread, abs(surprise) / UNLIKE)
-        elif plausible:  # as of a probe so bad that it is within what is expected
-            noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
+        elif plausible:  # as of a bad probe
+            noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** STEEP - 1.0), (error, since)
         else:
             limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
             why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
