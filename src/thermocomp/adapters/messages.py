@@ -80,11 +80,11 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
         raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; want {example}")
     if why := explain_unfit(str(target)):
         raise ReadingError(f"a measurement whose target cannot be a name: {why}")
-    if abs(found["measured_um"] or 0.0) > _FAR or not 0.0 <= (found["repeatability_um"] or 0.0) <= _FAR:
-        raise ReadingError(f"a measurement beyond {_FAR:g} um, or a repeatability below 0: nothing a probe can say")
+    if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
+        raise ReadingError(f"a measurement beyond {_FAR:g} um or mm, or a repeatability below 0: no probe can say that")
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
-    keys = keys or [f"content {json.dumps(content, sort_keys=True)}"]
+    keys = keys or [f"content {measured} um at {position} mm, give or take {spread} um, {left}"]
     return Measurement(at, str(target), measured, bool(left), spread, position, tuple(keys))
 
 

@@ -1,7 +1,7 @@
 """In which order day, month and year stand: where dates alone do not tell, a recording that goes on does."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,11 +45,10 @@ def find_order(readings: Mapping[str, IntArray]) -> Choice:
     1. in which time rises; else
     2. in which a row follows on the one before across a change of the date: at most half an hour or two usual steps
        later, and six hours, where every other order puts about a month or more between them; else
-    3. in which at least four dates follow each other, one to four days apart, where every other order puts about a
-       month or more between each and the next. Where these would be the first days of months, and a date has several
-       rows, both are possible.
+    3. in which rows of one a day, four or more, follow each other one to four days apart, where every other order puts
+       about a month or more between each and the next.
 
-    Tests on two or three days with a pause between them may be a month apart as well: nothing tells.
+    Tests of several rows on days with a pause between them may be a month apart as well: nothing tells.
     """
     begun, *others = readings.values()
     if all(np.array_equal(begun, t) for t in others):
@@ -89,12 +88,8 @@ def find_longest_step(t: IntArray) -> float:
 
 
 def _are_days_in_a_row(t: IntArray, other: IntArray) -> bool:
-    """Return whether dates follow each other by days, and by months in another order."""
+    """Return whether rows of one a day follow each other by days, and by months in another order."""
     day, far = t // _DAY, other // _DAY
-    changes = np.flatnonzero(np.diff(day))
-    passed, apart = np.diff(day)[changes], np.diff(far)[changes]
-    if len(changes) < _CHANGES or not ((passed >= 1) & (passed <= _PAUSE)).all() or not (apart >= _MONTH).all():
-        return False
-    months: NDArray[Any] = far.astype("M8[D]").astype("M8[M]")
-    firsts = bool((far.astype("M8[D]") == months.astype("M8[D]")).all())
-    return not (firsts and len(t) > len(changes) + 1)
+    passed, apart = np.diff(day), np.diff(far)
+    near = ((passed >= 1) & (passed <= _PAUSE)).all()
+    return bool(len(passed) >= _CHANGES and near and (apart >= _MONTH).all())

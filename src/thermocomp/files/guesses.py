@@ -172,7 +172,7 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
             values = _numbers(table, [k]).get(k)
             if values is None or understand_or_none(heading) is not None or _role(heading, values)[0]:
                 continue
-            if units := find_likely_units(values):
+            if len(units := find_likely_units(values)) == 1:  # of several nobody may guess
                 return {"column": heading, "unit": units[0]}
         else:
             cells = table.load([], [k])[0][k].dropna().astype(str)

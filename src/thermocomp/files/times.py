@@ -248,7 +248,7 @@ def _read_numbers(
     ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
     if raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]
-    raise RecordingError(
+    raise TwoReadingsError(
         f"{source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: seconds, "
         f'minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] '
         f'column = "{heading}" and unit = "s"',
@@ -334,7 +334,7 @@ def _refuse_set_forward(
         before, after = (pd.Timestamp(start) + pd.Timedelta(seconds=time[k]) for k in (row - 1, row))
         spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
         if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
-            raise RecordingError(
+            raise TwoReadingsError(
                 f"{source}: {table.place(int(row))}, column {heading!r}: an hour is missing between {before} and "
                 f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
                 f"{_ZONE}",

@@ -194,20 +194,20 @@ def take(
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
     surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
-    if abs(surprise) > SUSPECT * typical:
-        plausible = abs(surprise) <= IMPLAUSIBLE * typical
-        alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
-        since = before.refused_since if alike else time
-        if alike and time - since >= APART:
-            if not plausible:
-                covariance[-1, -1] += surprise**2
-                spread = max(spread, abs(surprise) / UNLIKE)
-        elif plausible:  # as of a bad probe
-            noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** STEEP - 1.0), (error, since)
-        else:
-            limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
-            why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
-            return before._replace(refused=error, refused_since=since), why
+    alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
+    since = before.refused_since if alike else time
+    if alike and time - since < APART:  # in the same chip
+        return before, f"as suspect as the one before: measure again {APART / 60:.0f} min or more after that"
+    plausible = abs(surprise) <= IMPLAUSIBLE * typical
+    if alike and not plausible:  # confirmed
+        covariance[-1, -1] += surprise**2
+        spread = max(spread, abs(surprise) / UNLIKE)
+    elif not alike and not plausible:
+        limit = f"{IMPLAUSIBLE * typical:.1f} um are plausible"
+        why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
+        return before._replace(refused=error, refused_since=since), why
+    elif not alike and abs(surprise) > SUSPECT * typical:  # as of a bad probe
+        noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** STEEP - 1.0), (error, since)
     usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
     usual = max(usual, LEAST_USUAL**2)
     gain = covariance @ weights

@@ -149,6 +149,8 @@ class Service:
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
         """Let a target count anew from now; see `thermocomp.runtime.orders.rezero`."""
         self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
+        for counted_before in (self.before, self.probings):  # from the zero before
+            counted_before.pop(target, None)
         self._say("reference", f"{target} counts anew: {why}")
         self._dirty = True
 
@@ -176,14 +178,16 @@ class Service:
             return f"no target is named {target}"
         if abs(old) > self.compensator.limits.reading_age:
             return f"it is {old:.0f} s old" if old > 0 else f"its time is {-old:.0f} s ahead of the clock"
+        counted = self.state.references.get(target)
+        if counted is not None and self.clock.of(found.time) < counted.time:
+            return "it was made before the zero that is counted from now"
         waiting = self.probings.get(target)
         if is_known(self.state, target, probing) or (waiting and set(waiting.identity) & set(probing.identity)):
             return KNOWN
         if waiting:
             return "another one waits for the next reading"
-        if found.left and in_force is None:
-            return "what is in force at the controller is not known"
-        return ""
+        unknown = found.left and in_force is None
+        return "what is in force at the controller is not known" if unknown else ""
 
     def in_force(self, target: str) -> Correction | None:
         """Return the correction in force: as confirmed lately, or as asked for if no sink confirms; None: not known."""
@@ -376,5 +380,6 @@ class Service:
             statefile.write(self.state, self.compensator, self.state_path, datetime.now(UTC) - old)
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
+            if self.not_saved != str(e):
+                self._say("service", f"the state is not saved: {e}")
             self.not_saved = str(e)
-            self._say("service", f"the state is not saved: {e}")

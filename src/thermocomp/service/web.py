@@ -14,8 +14,8 @@ from thermocomp.service.connections import Guarded
 
 #: characters of a token, at least
 SHORTEST = 16
-#: connections taken in at once: so many more files than ``connections.MOST`` may be open for a moment
-AT_ONCE = 128
+#: connections taken in at once: few, so that one is read before ``connections.MOST`` newer ones push it out
+AT_ONCE = 16
 #: that the system lets wait for us: one for which there is no room tries again only after a second
 WAITING = 1024
 #: bytes of an answer that the system takes ahead of a client that does not read
