@@ -130,6 +130,20 @@ def test_of_those_that_are_suspect_the_further_counts_less() -> None:
     assert found.shift(2 * HOUR, NOTHING) == pytest.approx(8.0, rel=0.05)
 
 
+def test_in_the_same_chip_ten_are_one() -> None:
+    """Each with an id of its own, a few seconds apart: suspect, not refused."""
+    found, why = adaptation.take(adaptation.begin(2.0, 0), NOTHING, 60.0, 7.0, 0.0)
+    assert not why
+    once = found.shift(60.0, NOTHING)
+    for k in range(1, 10):
+        found, why = adaptation.take(found, NOTHING, 60.0 + 5.0 * k, 7.0 + 0.1 * k, 0.0)
+        assert "as suspect as the one before" in why
+    assert found.shift(60.0, NOTHING) == once < 5.0
+    found, why = adaptation.take(found, NOTHING, 60.0 + APART, 7.0, 0.0)
+    assert not why
+    assert found.shift(60.0 + APART, NOTHING) == pytest.approx(7.0, rel=0.05)
+
+
 def test_on_a_day_of_small_errors_less_is_plausible() -> None:
     def limit(errors: list[float]) -> float:
         found, time = adaptation.begin(2.0, 0), 0.0

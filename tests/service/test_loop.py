@@ -427,8 +427,6 @@ def test_a_real_broker_that_repeats_a_probing(
     source, probe = Given(), MqttProbe(topic="m/7/probe", port=broker.port)
     service = Service(machine(), [source], [], state_path=tmp_path / "state.json", probes=[probe])
     message = {"target": "z_um", "measured_um": measured, "under_correction": True, **more}
-    if "time" in more:
-        message["time"] = time.time()
 
     async def send(times: int) -> None:
         async with aiomqtt.Client("127.0.0.1", broker.port) as client:
@@ -443,6 +441,8 @@ def test_a_real_broker_that_repeats_a_probing(
         await asyncio.sleep(0.3)
         say(source, 20.0)
         await until(lambda: service.counts["readings"] == 1)
+        if "time" in more:
+            message["time"] = time.time()
         await send(2)
         await events(service, 1)
         say(source, 20.0)
@@ -467,6 +467,32 @@ def test_a_real_broker_that_repeats_a_probing(
     for own in (service, later):
         assert own.state.corrections["z_um"].offset == 0.0
         assert sum("delivered before" in e.text for e in own.events) >= (4 if own is service else 1)
+
+
+def test_a_new_zero_forgets_what_counted_from_the_one_before() -> None:
+    service = Service(machine(), [Given()], [])
+    feed = [20.0, 21.0]
+    for value in feed:
+        service.take(Reading(time.time(), {"t": value}))
+    early = time.time()
+    service.measure(Measurement(early, "z_um", 3.0, left=False, keys=("id 1",)))
+    service.take(Reading(time.time(), {"t": 21.0}))
+    assert service.state.learned["z_um"].mean[-1] > 0.5
+    service.measure(Measurement(time.time(), "z_um", 3.1, left=False, keys=("id 2",)))  # waits
+    service.rezero("z_um", "homing")
+    service.measure(Measurement(early, "z_um", 3.2, left=False, keys=("id 3",)))
+    assert "made before the zero" in service.events[-1].text
+    service.take(Reading(time.time(), {"t": 21.0}))
+    assert not service.state.learned
+    assert service.roll_back("z_um")  # of the zero before
+    assert not service.state.learned
+
+
+def test_a_folder_that_is_gone_is_told_once(tmp_path: Path) -> None:
+    service = Service(machine(), [Given()], [], state_path=tmp_path / "gone" / "state.json")
+    for _ in range(5):
+        service._save()
+    assert sum("not saved" in e.text for e in service.events) == 1
 
 
 def test_two_probings_before_a_reading_and_one_of_tomorrow() -> None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ controller must not compensate for temperature itself at the same time.
 """
 
 
-#: last digits of single precision by which a difference of two readings is off
+#: last digits by which a difference of two readings is off
 _DIGITS = 2.0
 #: largest share of a correction by which single precision may be off; beyond it is refused
 _COARSE = 1.0
@@ -102,7 +103,9 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(name, tables, readings, answers, find_tolerance(tables), single),
+        f"{name}_test.c": write_test(
+            name, tables, readings, answers, _double(compensator, tables, readings, answers), single
+        ),
         f"{name}.md": _README.format(
             facts="  \n".join(said),
             name=name,
@@ -114,6 +117,12 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         ),
     }
     return {file: text.encode() for file, text in texts.items()}
+
+
+def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
+    """Return how far double precision may be off: large coefficients make more of the last digit of a reading."""
+    rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
+    return max(find_tolerance(tables), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
@@ -128,21 +137,25 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
         return 0.0
 
     def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
-        rows = readings._replace(values=_shifted(readings.values, way))
+        rows = readings._replace(values=_shifted(round_single(readings.values), way, np.float32))
         said = replay(coarse, tables, rows, rounded=rounded)
         if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
             return math.inf
-        pairs = (answers.correction, said.correction), (answers.slope, said.slope)
-        return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
+        return _apart(answers, said)
 
     found = max(1e-5, 10.0 * moved(0, round_single), 2.0 * moved(1), 2.0 * moved(-1))
     return found if found <= _COARSE else 0.0
 
 
-def _shifted(values: FloatArray, way: int) -> FloatArray:
-    """Return readings in single precision, moved by its last digit: one up, the next down, the same always alike."""
-    near = round_single(values)
+def _apart(one: Answers, other: Answers) -> float:
+    """Return the largest difference of corrections, as a share of one, or in um of one below 1 um."""
+    pairs = (one.correction, other.correction), (one.slope, other.slope)
+    return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
+
+
+def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.float64) -> FloatArray:
+    """Return readings moved by their last digits in a precision: one up, the next down, the same always alike."""
     with np.errstate(invalid="ignore"):
-        last = np.where(np.isfinite(near), np.spacing(near.astype(np.float32)).astype(np.float64), 0.0)
-        odd = np.where(last != 0.0, near / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
-    return near + way * _DIGITS * np.where(odd, last, -last)
+        last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
+        odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
+    return values + way * _DIGITS * np.where(odd, last, -last)
