@@ -22,6 +22,8 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.terms import Variable
 from thermocomp.core.watch import Watch
 from thermocomp.exporters import cpackage, onnxpackage, stpackage
 from thermocomp.exporters.block.tables import gather
@@ -129,6 +131,24 @@ def test_points_of_a_curve_that_single_precision_does_not_tell_apart(tmp_path: P
     x = [-2.0, 1.0]
     x += [float(np.nextafter(x[-1], 2.0)), 1.0 + 1e-9, 3.0]
     model = Additive(**HEAD, variables=(SINGLES[0],), curves=(Curve(tuple(x), (0.0, 3.0, 3.0, 3.0, 9.0)),))
+    texts = cpackage.write_package(Compensator.of([replace(model, honest_error=ACCEPTED)]), "x", FACTS)
+    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
+        assert " 0 wrong" in prove(tmp_path, texts, switch)
+
+
+@needs_compiler
+@pytest.mark.parametrize("factor", [100.0, 1e4])
+def test_large_coefficients_make_more_of_the_last_digit(tmp_path: Path, factor: float) -> None:
+    """Temperatures that hardly move: thousands of micrometres per kelvin, which cancel."""
+    names = [f"t{k}_C" for k in range(3)]
+    model = Polynomial(
+        target="z_um",
+        unit="um",
+        inputs=tuple(Input(n, "temperature", "degC", 20.0, True, -10.0 / factor, 10.0 / factor) for n in names),
+        variables=tuple(Variable.single(n, k) for k, n in enumerate(names)),
+        terms=((0,), (1,), (2,)),
+        coefficients=(3.0 * factor, 2.0 * factor, -4.0 * factor),
+    )
     texts = cpackage.write_package(Compensator.of([replace(model, honest_error=ACCEPTED)]), "x", FACTS)
     for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
         assert " 0 wrong" in prove(tmp_path, texts, switch)

@@ -21,9 +21,8 @@ FloatArray = NDArray[np.float64]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
 #: what no offset and no structure explains, as a share of the error on cycles that were left out
 UNEXPLAINED = 0.2
-#: a probing this many standard deviations from what is expected counts less, the further it is from it: its noise is
-#: taken for larger by this power
-SUSPECT, STEEP = 2.5, 4
+#: a probing this many standard deviations from what is expected counts less, the further it is from it
+SUSPECT = 2.5
 #: a probing further than this many standard deviations from what is expected is refused
 IMPLAUSIBLE = 4.0
 #: errors of most cycles and days are smaller than their root mean square over all: down to this share of it
@@ -207,7 +206,7 @@ def take(
         why = f"{surprise:+.1f} um from what is expected, where {limit}: measure again after {APART / 60:.0f} min"
         return before._replace(refused=error, refused_since=since), why
     elif not alike and abs(surprise) > SUSPECT * typical:  # as of a bad probe
-        noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** STEEP - 1.0), (error, since)
+        noise, doubt = own + (known + own) * ((surprise / SUSPECT / typical) ** 2 - 1.0), (error, since)
     usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
     usual = max(usual, LEAST_USUAL**2)
     gain = covariance @ weights
