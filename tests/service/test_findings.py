@@ -187,6 +187,19 @@ def test_what_is_there_and_what_is_not(old: str, new: str, says: str, tmp_path: 
     assert any(says in line for line in found), found
 
 
+@pytest.mark.parametrize("name", ["live.000001.db", "live.000017.db-wal", "live.db.lock", "state.json.lock"])
+def test_what_the_service_itself_writes_is_no_sink(name: str, tmp_path: Path) -> None:
+    found = list(find_faults(read_config(lay(tmp_path, GOOD.replace("out.json", name)))))
+    assert any("would be written over" in fault for fault in found)
+
+
+def test_a_lock_that_cannot_be_opened(tmp_path: Path) -> None:
+    (tmp_path / "state.json.lock").mkdir()
+    long = "s" * 252
+    for text, says in ((GOOD, "state.json.lock: is a folder"), (GOOD.replace("state.json", long), "at most 255")):
+        assert any(says in fault for fault in find_faults(read_config(lay(tmp_path, text))))
+
+
 def test_an_axis_that_the_set_up_does_not_correct(tmp_path: Path) -> None:
     text = GOOD.replace('kind = "file"\nfile = "out.json"', 'kind = "linuxcnc"\nsocket = "s"\naxes = {z_um = "Z"}')
     path = lay(tmp_path, text)

@@ -13,6 +13,9 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.service import web
 from thermocomp.service.config import FileOut, LinuxCncOut, Page, ReplayIn, Settings, SimulatedIn
 
+#: bytes of a file's name on a disk
+_LONG = 255
+
 
 def find_faults(settings: Settings) -> Iterator[str]:
     """Say which files cannot be read, and which cannot be written.
@@ -29,9 +32,16 @@ def find_faults(settings: Settings) -> Iterator[str]:
     for name in (*read, *replayed):
         if why := _unreadable(folder / name, recording=name in replayed):
             yield f"{folder / name}: {why}"
-    written = [name for name in (config.state, config.journal.file if config.journal else "") if name]
-    written += [s.file for s in config.sinks if isinstance(s, FileOut)]
+    kept = [name for name in (config.state, config.journal.file if config.journal else "") if name]
+    locks, sent = [f"{name}.lock" for name in kept], [s.file for s in config.sinks if isinstance(s, FileOut)]
+    written = [*kept, *locks, *sent]
     names = Counter((folder / name).resolve() for name in (*read, *replayed, *written))
+    if config.journal:
+        journal = folder / config.journal.file
+        parts = re.compile(rf"{re.escape(journal.stem)}\.\d+{re.escape(journal.suffix)}(-wal|-shm)?")
+        for path in (folder / name for name in sent):
+            if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
+                yield f"{path}: may be a part of the journal {journal}, and would be written over; name another file"
     for name in dict.fromkeys(written):
         if why := _unwritable(folder / name):
             yield f"{folder / name}: {why}"
@@ -105,6 +115,8 @@ def _unreadable(path: Path, *, recording: bool) -> str:
 
 
 def _unwritable(path: Path) -> str:
+    if len(os.fsencode(path.name)) > _LONG:
+        return f"a name of {len(os.fsencode(path.name))} bytes; at most {_LONG}"
     if path.exists() and not path.is_file():
         return f"is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
     if not path.parent.is_dir():
