@@ -90,7 +90,7 @@ def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
     assert found.startswith(f"line {line}: ")
     assert found.endswith("write it so that both read the same, or say --controller linuxcnc or --controller fanuc")
     # LinuxCNC's own word anywhere decides it
-    assert question(f"{program}o100 sub\n") == ""
+    assert question(f"o100 sub\no100 endsub\n{program}") == ""
 
 
 def test_what_is_stated_is_not_asked_for() -> None:
@@ -176,6 +176,14 @@ def test_behind_the_end_nothing_is_asked_for_but_numbers_count() -> None:
     assert question(f"{BEGIN}{END}G4 P500\n") == ""
     assert question(f"%\n{BEGIN}%\nX100\n") == ""
     assert "'o5'" in question(f"{BEGIN}{END}o5\n")
+    assert "G4 P500 is 500 s" in question(f"{BEGIN}/M30\nG4 P500\n{END}")
+
+
+@pytest.mark.parametrize("end", [END, "%\n", "N90 M02\n"])
+@pytest.mark.parametrize("sign", ["G64 P0.01", "o100 sub", "#<depth>=2", "G33.1 Z-1. K1.", "; a comment", "(MSG, done)"])
+def test_behind_the_end_nothing_shows_linuxcnc(end: str, sign: str) -> None:
+    assert "X100 is 100 mm" in question(f"{BEGIN}X100\n{end}{sign}\n")
+    assert question(f"{BEGIN}X100\n{sign}\n{end}") == ""
 
 
 @needs_programs

@@ -2,7 +2,8 @@
 
 A *sign* is what one of the two refuses: it is certain. A *hint* is a habit of LinuxCNC's users: text behind ``;``
 (posts for a Fanuc end lines with a bare one), a comment that acts in LinuxCNC or names it, arcs in several lines that
-close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). All
+close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). Either
+counts before the program ends: behind M2, M30 or a closing ``%`` LinuxCNC reads nothing, and a Fanuc other programs. All
 words that both take and read in different ways (`thermocomp.nc.interpreter.openwords`) are asked for, unless there is a
 sign of LinuxCNC.
 """
@@ -201,11 +202,12 @@ class _Scan:
                 self._hint("a comment of LinuxCNC's")
 
     def _sign(self, whose: Whose, what: str) -> None:
-        if getattr(self.found, whose) is None:
+        if getattr(self.found, whose) is None and (whose == "fanuc" or not self._ended):
             setattr(self.found, whose, Place(self._line, self._text, what))
 
     def _hint(self, what: str) -> None:
-        self.found.hint = self.found.hint or Place(self._line, self._text, what)
+        if not self._ended:
+            self.found.hint = self.found.hint or Place(self._line, self._text, what)
 
     def _ask(self, kind: str, text: str, what: str) -> None:
         self.found.open.setdefault(kind, Place(self._line, text, what))
@@ -235,7 +237,7 @@ class _Scan:
         if assigned := _ASSIGNED.search(body):
             self._assigned(body[assigned.end() :].replace("ATAN{}/{}", "{}"))
             body = body[: assigned.start()]
-        self._words(_WORD.findall(body))
+        self._words(_WORD.findall(body), runs=not (head["delete"] or head["again"]))
 
     def _assigned(self, value: str) -> None:
         if "=" in value:
@@ -243,7 +245,7 @@ class _Scan:
         elif _OPERATOR.search(value):
             self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
 
-    def _words(self, words: list[tuple[str, str]]) -> None:
+    def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
         line = LineWords(
             self._code,
             [read_number(value) for letter, value in words if letter == "G"],
@@ -257,7 +259,8 @@ class _Scan:
                 self._ask(kind, text.replace("{}", "[..]"), readings)
             if self._force.mixed > 1:
                 self._hint("an arc that closes only if lengths without a point are whole")
-        self._ended = self._ended or not {2.0, 30.0}.isdisjoint(line.m)
+        # an end behind "/" may be skipped
+        self._ended = self._ended or (runs and not {2.0, 30.0}.isdisjoint(line.m))
 
     def _signs(self, line: LineWords) -> None:
         g, m, values = line.g, line.m, line.values
