@@ -350,10 +350,10 @@ def test_random_programs_expand_and_stay_as_they_are_when_expanded_again(plain: 
     assert plain("\n".join(first[1:]) + "\n") == first
 
 
-def test_a_loop_that_moves_for_ever_is_refused(plain: Plain, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_loop_that_writes_too_many_lines_is_refused(plain: Plain, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(expanding, "MOST", 5000)
     with pytest.raises(ProgramError, match=r"line [2-5]: more than 5,000 plain lines come out: does a loop never end"):
-        plain("G21\no1 while [1]\nG0 X1\nX0\no1 endwhile\nM2\n")
+        plain("G21\no1 repeat [4000]\nG0 X1\nX0\no1 endrepeat\nM2\n")
 
 
 def test_the_radii_of_a_subprogram_are_refused(tmp_path: Path) -> None:

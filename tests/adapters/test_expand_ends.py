@@ -1,5 +1,6 @@
 """What the interpreter may read for an expansion: no loop for ever, and no file outside the given folders."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -58,6 +59,54 @@ def test_a_loop_without_end_that_does_something_is_refused(refusal: Refusal, inn
 def test_a_subprogram_that_calls_itself_is_refused(refusal: Refusal) -> None:
     error = refusal(f"o<r> sub\no<r> call\no<r> endsub\n{HEAD}o<r> call\nM30\n")
     assert "a subprogram that calls itself has no end" in error.reason
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G81 X1. Z-1. R1. L999999999 F100.",
+        "G99 G83 X1. Z-1000. R1. Q0.0001 F100.",
+        "G91 G82 X1. Z-1. R0 P0.01 L40000000 F100.",
+    ],
+)
+def test_a_line_without_end_is_refused(refusal: Refusal, text: str) -> None:
+    error = refusal(f"{HEAD}G0 Z5\n{text}\nG80\nM30\n")
+    assert (error.line, "this line makes more than 100,000 moves" in error.reason) == (5, True)
+
+
+def test_a_line_of_a_subprogram_without_end_is_refused(refusal: Refusal, tmp_path: Path) -> None:
+    (tmp_path / "programs").mkdir()
+    sub = SUB.replace("G1 X5 F100", "G81 X1 Z-1 R1 L9999999 F100")
+    (tmp_path / "programs" / "sub.ngc").write_text(sub, encoding="ascii")
+    error = refusal(f"{HEAD}G0 Z5\no<sub> call\nM30\n")
+    assert "this line makes more than 100,000 moves" in error.reason
+
+
+def test_many_long_lines_are_refused(refusal: Refusal) -> None:
+    error = refusal(f"{HEAD}o1 repeat [100000]\nG0 Z5\nG81 X1 Z-1 R1 L30000 F100\no1 endrepeat\nM30\n")
+    assert (error.line, "moves have been made up to here" in error.reason) == (6, True)
+
+
+def test_many_repeats_are_run(tmp_path: Path) -> None:
+    path = tmp_path / "holes.ngc"
+    path.write_text(f"{HEAD}G0 Z5\nG91 G81 X1 Z-1 R-1 L9000 F100\nG80\nM30\n", encoding="ascii")
+    assert sum(call.kind == "feed" for call in rs274.read(path)) == 9000
+
+
+def test_a_pipe_in_the_folder_is_not_waited_for(refusal: Refusal, tmp_path: Path) -> None:
+    (tmp_path / "programs").mkdir()
+    os.mkfifo(tmp_path / "programs" / "sub.ngc")
+    error = refusal(f"{HEAD}o<sub> call\nM30\n")
+    assert (error.line, "sub.ngc is a pipe or a device" in error.reason) == (4, True)
+
+
+@pytest.mark.parametrize("end", ["M99", "N9 m 099 (again)", "#1=99\nM#1", "o1 if [1]\nM99\no1 endif\nM30"])
+def test_a_main_program_that_repeats_itself_is_refused(refusal: Refusal, end: str) -> None:
+    error = refusal(
+        f"{HEAD}G1 X5 F100\n{end}\n",
+    )
+    assert error.line == 5 + (end[0] in "#o")
+    assert "M99 in a main program repeats it without end: end it with M2 or M30" in error.reason
 
 
 @pytest.mark.long

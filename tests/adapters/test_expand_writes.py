@@ -22,7 +22,7 @@ def test_a_name_stays_in_its_comment(name: str, tmp_path: Path) -> None:
 
 def test_what_is_written_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program, out = tmp_path / "p.ngc", tmp_path / "out.ngc"
-    program.write_text("G21\n", encoding="ascii")
+    program.write_text("G21\nM2\n", encoding="ascii")
 
     def lines(broken: bool) -> Iterator[tuple[str, int]]:
         yield "G21", 1

@@ -131,3 +131,9 @@ def test_impossible_cycles() -> None:
         list(
             CannedCycle("G83", 17, True, True, False, (0.0, 0.0, 5.0), {}, {"R": 1.0, "Z": 0.0, "Q": 1e-9}, 5.0).steps()
         )
+
+
+@pytest.mark.parametrize("text", ["G81 X1 Z-1 R1 L999999999", "G83 X1 Z-10 R1 Q0.01 L9999"])
+def test_repeats_have_a_bound(text: str) -> None:
+    with pytest.raises(ProgramError, match=r"line 2: G8[13]: \d+ repeats make more than 100000 strokes"):
+        run(f"G21 G90 G94 G99 G0 X0 Y0 Z5 F100\n{text}\n")

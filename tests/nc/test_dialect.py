@@ -1,6 +1,7 @@
 """Whose program it is: judged from the whole of it, and asked for where a word is read in two ways."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from nc_interpreter import PROGRAMS, needs_programs
@@ -14,7 +15,7 @@ FANUC = sorted((Path(__file__).parent / "fanuc").glob("*.nc"))
 BEGIN, END = "G21 G90 G17\nS3000 M3\nG0 X0 Y0 Z5.\nG1 Z-1. F100\n", "X0\nG0 Z5.\nM30\n"
 
 
-def question(text: str, **stated: bool) -> str:
+def question(text: str, **stated: Any) -> str:
     """Return what is asked of a program; empty if nothing is."""
     try:
         check_dialect(split_lines(text), **stated)
@@ -38,6 +39,16 @@ def question(text: str, **stated: bool) -> str:
         "G64\nT1 M6",
         "G28 Z0\nG30 X0",
         ";\nX1.;",
+        "F200",
+        "G98\nG99\nG81 X1. Z-1. R1.\nG80",
+        "G98",
+        "T1001 M6",
+        "T0202\nM6",
+        "T12",
+        "G18\nG90 X1. Y0 Z2.\nG90 G0 X1. Z2.\nG17",
+        "G90 X1. Z2.",
+        "#1=#100\nX[#1+#999]",
+        "G95 F0.2",
     ],
 )
 def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
@@ -79,6 +90,24 @@ def test_what_both_read_alike_is_not_asked_for(text: str) -> None:
         ("U5.", "U5. is an axis of its own"),
         ("M98 P1000", "M98 is taken by LinuxCNC from files of its own"),
         ("X[#1 AND 3]", "AND, OR or XOR takes bits"),
+        ("G10 L2 P1 X1. R5.", "G10 L2 P1 sets other offsets"),
+        ("G#1 P500", "G#1 is a code that only the run tells"),
+        ("G [4] P500", "G[..] is a code that only the run tells"),
+        ("M#2", "M#2 is a code"),
+        ("G4 P1. X5.", "X5. beside G4 moves in LinuxCNC"),
+        ("G4 P0 A5.", "A5. beside G4 moves"),
+        ("G99", "G99 without cycles is feed per turn"),
+        ("T0202", "T0202 without M6 changes the tool"),
+        ("G18 G90 X4. Z-3. F0.2", "G90 with X and Z is a turning cycle"),
+        ("G96 S200\nG94 X4. Z-3. F0.2", "G94 with X and Z is a turning cycle"),
+        ("G95 F1", "F1 is 1 mm per turn for LinuxCNC, and may be in least increments"),
+        ("G20\nF10", "F10 is 10 in per minute for LinuxCNC"),
+        ("X[FIX[#1/2]]", "FIX, FUP, MOD or ROUND rounds other numbers"),
+        ("X[#1 MOD 3]", "FIX, FUP, MOD or ROUND"),
+        ("X#5221", "#5221 from #1000 on has other meanings"),
+        ("# 3001 = 0", "#3001 from #1000 on"),
+        ("X#[#1+5000]", "#[..] from #1000 on"),
+        ("X##1", "##1 from #1000 on"),
         ("X1. ; G4 P1", "';G4P1' is a comment for LinuxCNC, and the next block for a Fanuc"),
     ],
 )
@@ -90,13 +119,26 @@ def test_a_word_with_two_readings_is_asked_for(text: str, asked: str) -> None:
     assert found.startswith(f"line {line}: ")
     assert found.endswith("write it so that both read the same, or say --controller linuxcnc or --controller fanuc")
     # LinuxCNC's own word anywhere decides it
-    assert question(f"{program}o100 sub\n") == ""
+    assert question(f"o100 sub\no100 endsub\n{program}") == ""
 
 
 def test_what_is_stated_is_not_asked_for() -> None:
     assert question(f"{BEGIN}X100\n{END}", whole=True) == ""
-    assert question(f"{BEGIN}G81 X1. Z-1. R1.\n{END}", retract=True) == ""
-    assert "G4 P5 is 5 s" in question(f"{BEGIN}X100\nG4 P5\n{END}", whole=True, retract=True)
+    assert question(f"{BEGIN}G81 X1. Z-1. R1.\n{END}", startup="G98") == ""
+    assert "G4 P5 is 5 s" in question(f"{BEGIN}X100\nG4 P5\n{END}", whole=True, startup="G98")
+
+
+def test_codes_that_are_stated_count() -> None:
+    program = "G1 X1.5 F10\nM30\n"
+    assert question(program) == question(program, startup="G21 G94") == ""
+    assert "F10 is 10 in per minute" in question(program, startup="g20")
+    assert "F10 is 10 mm per turn" in question(program, startup="G95")
+
+
+def test_a_program_without_y_may_be_a_lathes() -> None:
+    lathe = "G21 (MY PART)\nG0 X50. Z2.\nG90 X48. Z-30. F0.2\nM30\n"
+    assert "line 3: G90 with X and Z is a turning cycle" in question(lathe)
+    assert question(lathe.replace("G0 X50.", "G0 X50. Y1.")) == ""
 
 
 def test_every_kind_of_word_is_named_with_its_first_line() -> None:
@@ -124,6 +166,7 @@ def test_every_kind_of_word_is_named_with_its_first_line() -> None:
         "G5.1 X1. Y1. I1. J1.",
         "@1. ^30.",
         "#1=[#2+1] #3=2",
+        "G96 D2000 S100",
     ],
 )
 def test_what_only_linuxcnc_takes_decides(text: str) -> None:
@@ -164,7 +207,7 @@ def test_what_only_a_fanuc_takes_is_named(text: str) -> None:
 
 def test_habits_answer_for_lengths_only() -> None:
     comment = f"; the plate\n{BEGIN}"
-    assert question(f"{comment}X100\nG43\nG61\n{END}") == ""
+    assert question(f"{comment}X100\nG43\nG61\nG20\nF10\n{END}") == ""
     assert "G4 P500 is 500 s" in question(f"{comment}G4 P500\n{END}")
     assert "X100 is 100 mm" in question(f"{BEGIN}X100;\nY0;\n{END}")
     arc = "G2 X10 Y0. I5. J0\n"
@@ -176,6 +219,16 @@ def test_behind_the_end_nothing_is_asked_for_but_numbers_count() -> None:
     assert question(f"{BEGIN}{END}G4 P500\n") == ""
     assert question(f"%\n{BEGIN}%\nX100\n") == ""
     assert "'o5'" in question(f"{BEGIN}{END}o5\n")
+    assert "G4 P500 is 500 s" in question(f"{BEGIN}/M30\nG4 P500\n{END}")
+
+
+@pytest.mark.parametrize("end", [END, "%\n", "N90 M02\n"])
+@pytest.mark.parametrize(
+    "sign", ["G64 P0.01", "o100 sub", "#<depth>=2", "G33.1 Z-1. K1.", "; a comment", "(MSG, done)"]
+)
+def test_behind_the_end_nothing_shows_linuxcnc(end: str, sign: str) -> None:
+    assert "X100 is 100 mm" in question(f"{BEGIN}X100\n{end}{sign}\n")
+    assert question(f"{BEGIN}X100\n{sign}\n{end}") == ""
 
 
 @needs_programs

@@ -168,8 +168,24 @@ class Canon:
 
     def tell(self, kind: str, *numbers: float) -> None:
         self.where()
-        self.reading.acted = self.reading.lines
+        self.act()
         self.record(kind, *numbers)
+
+    def act(self) -> None:
+        """Count a move, a dwell or the like."""
+        if (reason := self.reading.count_call()) is None:
+            return
+        # a line runs to its end whatever a call answers, which may take for ever: nothing but the process can end it
+        self.where()
+        self.refuse(self.line, reason)
+        self.flush()
+        os._exit(0)
+
+    def refuse(self, line: int, reason: str) -> None:
+        self.line = line
+        if self.reached()[1]:
+            self.extra("file", "")
+        self.extra("error", reason)
 
     def record(self, kind: str, *numbers: float) -> None:
         self.records.append(RECORD.pack(CODES[kind], len(numbers), self.line, *numbers, *(0.0,) * (10 - len(numbers))))
@@ -306,21 +322,21 @@ class Canon:
 
     def straight_traverse(self, *place: float) -> None:
         self.place = place
-        self.reading.acted = self.reading.lines
+        self.act()
         self.records.append(RECORD.pack(RAPID, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_feed(self, *place: float) -> None:
         self.place = place
-        self.reading.acted = self.reading.lines
+        self.act()
         self.records.append(RECORD.pack(FEED, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
 
     def straight_probe(self, *place: float) -> None:
         self.place = place
-        self.reading.acted = self.reading.lines
+        self.act()
         self.records.append(RECORD.pack(PROBE, 9, self.line, *place, 0.0))
         if len(self.records) >= BLOCK:
             self.flush()
@@ -332,7 +348,7 @@ class Canon:
         plane = {1: 17, 2: 19, 3: 18}[self.plane]
         self.place = (*at, *more)
         centre = (centre1 * MM, centre2 * MM, turns, plane, *(0.0,) * 6)
-        self.reading.acted = self.reading.lines
+        self.act()
         self.records.append(RECORD.pack(CENTRE, 4, self.line, *centre))
         self.records.append(RECORD.pack(ARC, 9, self.line, *self.place, 0.0))
         if len(self.records) >= BLOCK:
@@ -438,10 +454,7 @@ def run(job: dict[str, Any], canon: Canon, gcode: Any) -> None:
         result = gcode.parse(job["program"], canon, job["units"], job["start"])[0]
     failure = canon.hooks.failure
     if isinstance(failure, RefusedError):
-        canon.line, reason = failure.args
-        if canon.reached()[1]:
-            canon.extra("file", "")
-        canon.extra("error", reason)
+        canon.refuse(*failure.args)
     elif failure is not None:
         raise failure
     elif result > gcode.MIN_ERROR:

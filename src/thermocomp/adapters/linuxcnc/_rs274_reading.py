@@ -1,4 +1,4 @@
-"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and no loop for ever.
+"""What LinuxCNC's interpreter reads: no file outside the folders of the job, and nothing without end.
 
 Part of the script `_rs274_child.py`: standard library only.
 """
@@ -12,6 +12,10 @@ from collections.abc import Callable, Iterable
 #: takes some 5 us, so that either is reached within seconds
 MOST_IDLE = 300_000
 MOST = 1_200_000
+#: moves, dwells and the like of one line, as of a cycle with many repeats or pecks; and of all, beyond `CALLS` per line
+MOST_OF_LINE = 100_000
+MOST_CALLS = 5_000_000
+CALLS = 20
 #: lines that are watched then, to find the loop
 WATCHED = 20_000
 LOOP = re.compile(r"(?i)^[\s/N0-9.]*O.*[\]>0-9\s](WHILE|DO|REPEAT)\b")
@@ -46,11 +50,17 @@ class Reading:
         self.where = where
         self.idle, self.most = lines + MOST_IDLE, lines + MOST
         self.lines = self.acted = 0  # read, in all and when something was done last
+        self.calls = self.before = 0  # in all, and before the line
+        self.most_calls = CALLS * lines + MOST_CALLS
         self.watched: list[tuple[int, bool]] = []
 
     def check_file(self, name: bytes, *, write: bool) -> None:
-        """Refuse a file outside the folders, wherever its name, a link or ``..`` leads."""
+        """Refuse a pipe, a device, and a file outside the folders, wherever its name, a link or ``..`` leads."""
         path = os.path.realpath(os.fsdecode(name))
+        if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):  # noqa: PTH110, PTH112, PTH113
+            raise RefusedError(
+                self.where()[0], f"{path} is a pipe or a device, which may have no end: put a file of that name there"
+            )
         folders = [self.home] if write else [self.home, *self.folders]
         if any(os.path.commonpath((path, folder)) == folder for folder in folders) or not os.path.exists(path):  # noqa: PTH110
             return
@@ -77,6 +87,17 @@ class Reading:
             f"the loop here has run {what}: it seems to have no end; write a condition that becomes false, or let one "
             "program run fewer passes",
         )
+
+    def count_call(self) -> str | None:
+        """Take in that a line does something; return why it does too much."""
+        if self.acted != self.lines:
+            self.acted, self.before = self.lines, self.calls
+        self.calls += 1
+        if self.calls - self.before > MOST_OF_LINE:
+            return f"this line makes more than {MOST_OF_LINE:,} moves: write fewer repeats (L) or larger pecks (Q)"
+        if self.calls > self.most_calls:
+            return f"more than {self.most_calls:,} moves have been made up to here: let one program do less"
+        return None
 
     def find_loop(self) -> int:
         """Return the line at which the loop begins that the watched lines are in: the outermost one."""

@@ -1,6 +1,5 @@
 """What is told of a revision becomes a job, or is refused before any work."""
 
-import re
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime
 from itertools import chain, islice
@@ -117,12 +116,12 @@ def _files(stations: Sequence[Station], hashes: Mapping[str, str]) -> list[str]:
 
 def _check_dialect(program: Path, controller: Controller) -> None:
     """Raise `InputError` if nobody has said whose a program is, and it need not be LinuxCNC's."""
-    retract = controller.startup is not None and re.search(r"G9[89]", controller.startup, re.IGNORECASE) is not None
+    startup = f"{controller.startup or ''} {'G20' if controller.units == 'inch' else ''}"
     with ncprogram.open_to_read(program) as texts:
         lines = program_lines(texts)
         try:
             recognise(first := list(islice(lines, FIRST)))
-            check_dialect(chain(first, lines), whole=controller.integers is not None, retract=retract)
+            check_dialect(chain(first, lines), whole=controller.integers is not None, startup=startup)
         except InputError as e:
             raise InputError(f"{program}: {e}") from e
 

@@ -2,8 +2,9 @@
 
 A *sign* is what one of the two refuses: it is certain. A *hint* is a habit of LinuxCNC's users: text behind ``;``
 (posts for a Fanuc end lines with a bare one), a comment that acts in LinuxCNC or names it, arcs in several lines that
-close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). All
-words that both take and read in different ways (`thermocomp.nc.interpreter.openwords`) are asked for, unless there is a
+close only if lengths without a point are whole ones. It decides on such lengths and a few words more (`_USUAL`). Both
+count before the program ends: behind M2, M30 or a closing ``%`` LinuxCNC reads nothing, but a Fanuc may. All words that
+both take and read in different ways (`thermocomp.nc.interpreter.openwords`) are asked for, unless there is a
 sign of LinuxCNC.
 """
 
@@ -14,7 +15,7 @@ from typing import Final, Literal, NamedTuple
 
 from thermocomp.core.exceptions import ProgramError
 from thermocomp.nc.interpreter.codes import G_CODES, M_CODES
-from thermocomp.nc.interpreter.openwords import DRILLS, InForce, LineWords, list_open_words, read_number
+from thermocomp.nc.interpreter.openwords import DOUBTS, DRILLS, InForce, LineWords, list_open_words, read_number
 
 Whose = Literal["linuxcnc", "fanuc"]
 
@@ -23,6 +24,7 @@ _PLAIN = re.compile(
     r"[ \t]*(?:N[0-9]+[ \t]*)?(?:G0?([0-3])(?![0-9.])[ \t]*)?(?:[XYZIJKABCRFS][-+]?[0-9.]+[ \t]*)*[\r\n]*",
     re.IGNORECASE,
 ).fullmatch
+_BARE_FEED = re.compile(r"F[-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).search
 _BARE = re.compile(r"[XYZIJKABCR][-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).search
 
 # all others, without comments and blanks, in upper case, with {} for brackets
@@ -52,7 +54,7 @@ _FANUC_M: Final = M_CODES["fanuc"].keys() - M_CODES["linuxcnc"].keys()
 #: no code of a Fanuc or a Haas, whatever its options; others of LinuxCNC are (G7, G28.1, G33, G43.1, M60 ...)
 _LINUXCNC_G: Final = frozenset((5.2, 5.3, 33.1, 38.2, 38.3, 38.4, 38.5, 59.1, 59.2, 59.3, 90.1, 91.1, 92.2, 92.3))
 #: kinds of open words that a hint decides
-_USUAL: Final = ("length", "g43", "exact", "behind")
+_USUAL: Final = ("length", "feed", "g43", "exact", "behind")
 #: kinds of open words that are named
 _NAMED: Final = 5
 
@@ -92,7 +94,7 @@ class Judgement:
     count: dict[str, int] = field(default_factory=dict)
 
 
-def check_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = False) -> None:
+def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> None:
     """Raise an error if a program of which nobody has said whose it is need not be LinuxCNC's.
 
     Parameters
@@ -101,8 +103,8 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = 
         The whole program.
     whole : bool
         It is stated what a length without a decimal point is.
-    retract : bool
-        It is stated whether G98 or G99 is in force at the start.
+    startup : str
+        Codes that are stated to be in force at the start.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = 
         It is a Fanuc's; or both a Fanuc's and LinuxCNC's; or it has words that the two read in different ways: the
         lines, the words and the readings.
     """
-    found = judge_dialect(lines, whole=whole, retract=retract)
+    found = judge_dialect(lines, whole=whole, startup=startup)
     mine, other = found.linuxcnc, found.fanuc
     if mine and other:
         raise ProgramError(
@@ -141,13 +143,18 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = 
     )
 
 
-def judge_dialect(lines: Iterable[str], *, whole: bool = False, retract: bool = False) -> Judgement:
+def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "") -> Judgement:
     """Return what a whole program shows of its dialect; see `check_dialect`."""
-    scan = _Scan(InForce(whole, retract))
+    scan = _Scan(InForce(whole))
+    words = _WORD.findall(_squeeze(startup.upper()))
+    scan.force.take(LineWords("", [read_number(value) for letter, value in words if letter == "G"], [], "", {}))
     for number, text in enumerate(lines, 1):
         if not scan.pass_plain(text):
             scan.take(number, text)
     found = scan.found
+    for kind, shown in DOUBTS.items():
+        if getattr(scan.force, shown):
+            found.open.pop(kind, None)
     if found.hint is not None:
         for kind in _USUAL:
             found.open.pop(kind, None)
@@ -159,7 +166,7 @@ class _Scan:
 
     def __init__(self, force: InForce) -> None:
         self.found = Judgement()
-        self._force = force
+        self.force = force
         self._began = self._ended = False
         self._line = 0
         self._text = self._code = ""
@@ -169,14 +176,15 @@ class _Scan:
         found = _PLAIN(text)
         if found is None:
             return False
-        motion = float(found[1]) if found[1] else self._force.motion
-        if motion in DRILLS:
+        motion = float(found[1]) if found[1] else self.force.motion
+        if motion in DRILLS or (self.force.feed and _BARE_FEED(text)):
             return False
-        if not self._force.whole and _BARE(text):
+        if not self.force.whole and _BARE(text):
             if "length" not in self.found.open or motion not in (0.0, 1.0):
                 return False
             self.found.count["length"] += 1
-        self._force.motion = motion
+        self.force.motion = motion
+        self.force.milled = self.force.milled or "Y" in text or "y" in text
         return True
 
     def take(self, number: int, text: str) -> None:
@@ -201,11 +209,12 @@ class _Scan:
                 self._hint("a comment of LinuxCNC's")
 
     def _sign(self, whose: Whose, what: str) -> None:
-        if getattr(self.found, whose) is None:
+        if getattr(self.found, whose) is None and (whose == "fanuc" or not self._ended):
             setattr(self.found, whose, Place(self._line, self._text, what))
 
     def _hint(self, what: str) -> None:
-        self.found.hint = self.found.hint or Place(self._line, self._text, what)
+        if not self._ended:
+            self.found.hint = self.found.hint or Place(self._line, self._text, what)
 
     def _ask(self, kind: str, text: str, what: str) -> None:
         self.found.open.setdefault(kind, Place(self._line, text, what))
@@ -235,7 +244,7 @@ class _Scan:
         if assigned := _ASSIGNED.search(body):
             self._assigned(body[assigned.end() :].replace("ATAN{}/{}", "{}"))
             body = body[: assigned.start()]
-        self._words(_WORD.findall(body))
+        self._words(_WORD.findall(body), runs=not (head["delete"] or head["again"]))
 
     def _assigned(self, value: str) -> None:
         if "=" in value:
@@ -243,26 +252,29 @@ class _Scan:
         elif _OPERATOR.search(value):
             self._sign("fanuc", "an expression without brackets, which only a Fanuc or Haas takes")
 
-    def _words(self, words: list[tuple[str, str]]) -> None:
+    def _words(self, words: list[tuple[str, str]], *, runs: bool) -> None:
         line = LineWords(
             self._code,
             [read_number(value) for letter, value in words if letter == "G"],
             [read_number(value) for letter, value in words if letter == "M"],
+            next((letter + value for letter, value in words if letter in "GM" and not _is_plain(value)), ""),
             {letter: value for letter, value in words if letter not in "GM"},
         )
         self._signs(line)
-        self._force.take(line.g)
+        self.force.take(line)
         if not self._ended:
-            for kind, text, readings in list_open_words(line, self._force):
+            for kind, text, readings in list_open_words(line, self.force):
                 self._ask(kind, text.replace("{}", "[..]"), readings)
-            if self._force.mixed > 1:
+            if self.force.mixed > 1:
                 self._hint("an arc that closes only if lengths without a point are whole")
-        self._ended = self._ended or not {2.0, 30.0}.isdisjoint(line.m)
+        # an end behind "/" may be skipped
+        self._ended = self._ended or (runs and not {2.0, 30.0}.isdisjoint(line.m))
 
     def _signs(self, line: LineWords) -> None:
         g, m, values = line.g, line.m, line.values
         theirs = [f"G{n:g}" for n in g if n in _FANUC_G] + [f"M{n:g}" for n in m if n in _FANUC_M]
         own = [f"G{n:g}" for n in g if n in _LINUXCNC_G] + ["G64 P"] * (64.0 in g and "P" in values)
+        own += ["G96 D"] * (96.0 in g and "D" in values)
         if 4.0 in g and "P" not in values and not values.keys().isdisjoint("XU"):
             theirs.append("G4 X or U")
         if not {5.0, 5.1, 8.0}.isdisjoint(g):  # they smooth the path of the one, and are splines of the other
@@ -274,6 +286,10 @@ class _Scan:
             self._sign("fanuc", f"a Fanuc's or Haas's ({theirs[0]})")
         if own:
             self._sign("linuxcnc", f"LinuxCNC's ({own[0]})")
+
+
+def _is_plain(value: str) -> bool:
+    return "#" not in value and "{" not in value
 
 
 def _squeeze(text: str) -> str:

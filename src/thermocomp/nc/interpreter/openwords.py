@@ -1,7 +1,7 @@
 """Words that LinuxCNC and a Fanuc both take and read in different ways, so that time, drift or correction differ."""
 
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -13,10 +13,15 @@ _TAPS: Final = (74.0, 84.0)
 _PECKS: Final = (73.0, 83.0)
 _OTHER_CYCLES: Final = (76.0, 87.0, 88.0)
 _TAKES_AXES: Final = frozenset((4.0, 10.0, 28.0, 30.0, 52.0, 53.0, 92.0))
+_TURNS: Final = (7.0, 8.0, 18.0, 33.0, 76.0, 96.0)
 _ARCS: Final = (2.0, 3.0)
 _LENGTHS: Final = "XYZABCIJKRQ"
 _ARC_WORDS: Final = "XYZIJKR"
+_AXES: Final = "XYZABCUVW"
 _LOGIC = re.compile(r"(?<![A-Z])(?:AND|X?OR)(?![A-Z])")
+_ROUNDING = re.compile(r"(?<![A-Z])(?:FIX|FUP|MOD|ROUND)(?![A-Z])")
+_BARE = re.compile(r"[-+]?0*[1-9][0-9]*").fullmatch
+_VARIABLE = re.compile(r"#(?:0*[1-9][0-9]{3,}|#[#0-9]*|\[)")
 
 _SHIFT = (
     "is kept by LinuxCNC in one store with G92 and G52, also behind the end of the program, and apart by a Fanuc, "
@@ -33,7 +38,7 @@ _OPEN_CODES: Final = {
 _G10 = (
     "sets other offsets in LinuxCNC (L1, L10, L11: the tool table; L20: by the place of the tool; P0: the system in "
     "force) than in a Fanuc (L10 to L13: tool offsets; L20: G54.1; P0: the external offset): write G10 L2 P1 to P6, in "
-    "G90"
+    "G90 and without R"
 )
 _CALL = "is taken by LinuxCNC from files of its own, and by a Fanuc from its memory: write the moves out"
 
@@ -53,19 +58,39 @@ class InForce:
     absolute : bool
     unit : str
         With a blank before it; empty if it is not known.
+    per_turn : bool
+        The feed counts per turn (G95).
     mixed : int
         Arcs that have lengths with points and without: they close only if the latter are whole.
+    drilled, changed, milled, lathe : bool
+        There has been a cycle for holes, an M6, a word of Y, a code of lathes.
     """
 
     whole: bool
-    retract: bool
+    retract: bool = False
     motion: float = -1.0
     absolute: bool = True
     unit: str = ""
+    per_turn: bool = False
     mixed: int = 0
+    drilled: bool = False
+    changed: bool = False
+    milled: bool = False
+    lathe: bool = False
 
-    def take(self, codes: Container[float]) -> None:
-        """Take the G codes of a line in."""
+    @property
+    def mill(self) -> bool:
+        """Whether it is no lathe."""
+        return self.milled and not self.lathe
+
+    @property
+    def feed(self) -> bool:
+        """Whether a feed without a point is read in two ways."""
+        return not self.whole and (self.per_turn or self.unit == " in")
+
+    def take(self, line: "LineWords") -> None:
+        """Take the codes of a line in."""
+        codes = set(line.g)
         for code in (*_MOTIONS, 80.0):
             if code in codes:
                 self.motion = code
@@ -73,6 +98,12 @@ class InForce:
             self.absolute = 90.0 in codes
         if 20.0 in codes or 21.0 in codes:
             self.unit = " in" if 20.0 in codes else " mm"
+        if not codes.isdisjoint((93.0, 94.0, 95.0)):
+            self.per_turn = 95.0 in codes
+        self.drilled = self.drilled or not codes.isdisjoint(DRILLS)
+        self.changed = self.changed or 6.0 in line.m
+        self.milled = self.milled or "Y" in line.values
+        self.lathe = self.lathe or not codes.isdisjoint(_TURNS)
         self.retract = self.retract or 98.0 in codes or 99.0 in codes
 
 
@@ -96,7 +127,9 @@ class LineWords:
     code : str
         The line without comments, in upper case.
     g, m : list of float
-        Numbers of its codes.
+        Numbers of its codes; -1 of those that are computed.
+    computed : str
+        The first of these; empty if there is none.
     values : dict of str to str
         All others, as they are written.
     """
@@ -104,6 +137,7 @@ class LineWords:
     code: str
     g: list[float]
     m: list[float]
+    computed: str
     values: dict[str, str]
 
 
@@ -117,8 +151,8 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
         With the codes of the line.
     """
     codes, values = set(line.g), line.values
-    if 4.0 in codes and _counts(values.get("P")):
-        yield OpenWord("dwell", f"G4 P{values['P']}", _seconds(values["P"]))
+    if 4.0 in codes:
+        yield from _open_dwell(values)
     yield from (OpenWord(_OPEN_CODES[n][0], f"G{n:g}", _OPEN_CODES[n][1]) for n in line.g if n in _OPEN_CODES)
     yield from (OpenWord("call", f"M{n:g}", _CALL) for n in line.m if n in (98.0, 99.0))
     if 10.0 in codes and not _sets_origin(values, force):
@@ -134,18 +168,78 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
         if letter in values and 4.0 not in codes:
             what = "is an axis of its own in LinuxCNC, and a way of X, Y or Z for a Fanuc: write X, Y and Z"
             yield OpenWord("way", f"{letter}{values[letter]}", what)
-    if _LOGIC.search(line.code):
-        what = "takes bits in a Fanuc, and true and false in LinuxCNC: do without it"
-        yield OpenWord("logic", "AND, OR or XOR", what)
+    yield from _open_expressions(line)
+    yield from _open_lathe(codes, values, force)
+    if force.feed and _is_bare(values.get("F", "")):
+        unit = f"{force.unit or ' mm'} per {'turn' if force.per_turn else 'minute'}"
+        what = f"is {int(values['F'])}{unit} for LinuxCNC, and may be in least increments for a Fanuc: write the point"
+        yield OpenWord("feed", f"F{values['F']}", f"{what} (F{values['F']}.)")
     if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(_TAKES_AXES):
         yield from _open_cycle(codes, values, force)
     if 4.0 not in codes and not (force.whole or 19.0 in line.m):
         yield from _open_lengths(codes, values, force)
 
 
+def _open_dwell(values: dict[str, str]) -> Iterator[OpenWord]:
+    if _counts(values.get("P")):
+        yield OpenWord("dwell", f"G4 P{values['P']}", _seconds(values["P"]))
+    if beside := [letter for letter in _AXES if letter in values]:
+        what = "moves in LinuxCNC, and a Fanuc takes X or U for the time: write the move on a line of its own"
+        yield OpenWord("dwell and move", f"{beside[0]}{values[beside[0]]} beside G4", what)
+
+
+def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
+    if line.computed:
+        what = "is a code that only the run tells, and it may be one that is read in two ways: write its number"
+        yield OpenWord("computed", line.computed, what)
+    if _LOGIC.search(line.code):
+        what = "takes bits in a Fanuc, and true and false in LinuxCNC: do without it"
+        yield OpenWord("logic", "AND, OR or XOR", what)
+    if _ROUNDING.search(line.code):
+        what = "rounds other numbers in a Fanuc than in LinuxCNC (below zero, or ROUND within a word): do without it"
+        yield OpenWord("rounding", "FIX, FUP, MOD or ROUND", what)
+    if variable := _VARIABLE.search("".join(line.code.split())):
+        what = "from #1000 on has other meanings in LinuxCNC than in a Fanuc: use #1 to #999, by their number"
+        yield OpenWord("variable", variable[0].replace("[", "[..]"), what)
+
+
+def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
+    """Yield what a Fanuc's lathe reads in another way; the whole program shows whether it is one (`DOUBTS`)."""
+    if 99.0 in codes or (98.0 in codes and force.per_turn):
+        code = "G99" if 99.0 in codes else "G98"
+        what = "without cycles is feed per turn (G99) or minute (G98) on a Fanuc's lathe: write G95 or G94 instead"
+        yield OpenWord("feed mode", code, what)
+    if _picks_offset(values.get("T", "")):
+        what = "without M6 changes the tool on a Fanuc's lathe, and only picks it in LinuxCNC: write M6"
+        yield OpenWord("tool", f"T{values['T']}", what)
+    cycle = next((f"G{n:g}" for n in (90.0, 94.0) if n in codes), None)
+    if cycle and codes.isdisjoint((*_MOTIONS, *_TAKES_AXES)) and {"X", "Z"} <= values.keys() and "Y" not in values:
+        what = "with X and Z is a turning cycle on a Fanuc's lathe: write it on a line of its own"
+        yield OpenWord("turning", cycle, what)
+
+
+#: kinds of open words that are none after all if the whole program shows this
+DOUBTS: Final = {"feed mode": "drilled", "tool": "changed", "turning": "mill"}
+
+
+def _picks_offset(value: str) -> bool:
+    """Return whether a T may name a tool and its offset, as on a Fanuc's lathe."""
+    return value.isdigit() and len(value) in (3, 4)
+
+
+def _is_bare(value: str) -> bool:
+    """Return whether a word has a number without a point, other than 0."""
+    return _BARE(value) is not None
+
+
 def _sets_origin(values: dict[str, str], force: InForce) -> bool:
     """Return whether G10 sets the origin of G54 to G59, as it does in both."""
-    return read_number(values.get("L", "")) == 2.0 and 1.0 <= read_number(values.get("P", "")) <= 6.0 and force.absolute
+    return (
+        read_number(values.get("L", "")) == 2.0
+        and 1.0 <= read_number(values.get("P", "")) <= 6.0
+        and "R" not in values
+        and force.absolute
+    )
 
 
 def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
@@ -172,7 +266,7 @@ def _open_cycle(codes: set[float], values: dict[str, str], force: InForce) -> It
 def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
     """Yield the first length without a point, and count the arcs that show what such lengths are."""
     drills = force.motion in DRILLS
-    bare = {letter: value for letter, value in values.items() if value.lstrip("-+").strip("0").isdigit()}
+    bare = {letter: value for letter, value in values.items() if _is_bare(value)}
     if force.motion in _ARCS and not bare.keys().isdisjoint(_ARC_WORDS):
         force.mixed += any("." in values.get(letter, "") for letter in _ARC_WORDS)
     for letter in _LENGTHS:

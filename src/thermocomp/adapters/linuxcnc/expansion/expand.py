@@ -23,6 +23,8 @@ _NO_CODE = re.compile(r"\([^)]*\)|<[^>]*>|;.*|\s")
 _ORIENTS = re.compile(r"M0*19(?:\.0*)?(?![0-9.])")
 #: diameters or radii for X: the interpreter makes no call of them, and plain lines are in radii
 _DIAMETERS = re.compile(r"G0*[78](?:\.0*)?(?![0-9.])")
+#: ends the main program as M2 does where it is read here, and begins it again at the machine
+_REPEATS = re.compile(r"M(?:0*99(?:\.0*)?(?![0-9.])|[-+]*[#\[])")
 #: seeds of the controllers that a program is written from, and that it is proved in
 _WRITTEN, _PROVED = (1, 2), (3, 4)
 #: lines after which it is told how many are written
@@ -211,6 +213,8 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
             if first is None or second is None:
                 raise writer.refuse(f"where it ends {DEPENDS}")
+            if first.kind == "end" and not first.file and _REPEATS.search(_code(writer.source(first.line))):
+                raise ProgramError(first.line, "M99 in a main program repeats it without end: end it with M2 or M30")
             yield from writer.write(first, second)
     for file in sorted(opened):
         _refuse_lost(file, path, around.block_delete, radii=radii)
@@ -253,9 +257,14 @@ def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterat
     """Yield the numbers of the lines with a code."""
     with file.open(encoding="latin-1") as lines:
         for number, text in enumerate(lines, 1):
-            words = _NO_CODE.sub("", text).upper()
+            words = _code(text)
             if code.search(words) and not (block_delete and words.startswith("/")):
                 yield number
+
+
+def _code(text: str) -> str:
+    """Return a line without comments and blanks, in upper case."""
+    return _NO_CODE.sub("", text).upper()
 
 
 def _first(path: Path) -> str:
