@@ -1,5 +1,6 @@
 """Dates that a file holds and that the time which was read does not know."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import Remedy, TwoReadingsError
-from thermocomp.files.cellkinds import plain_dates
+from thermocomp.files.cellkinds import find_kind, plain_dates
 from thermocomp.files.columns import ColumnPlan
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.stamps import read_days
@@ -20,6 +21,42 @@ FloatArray = NDArray[np.float64]
 _DAY = 86_400.0
 #: clocks are set, for summer time too [s]
 _SET = 5400.0
+
+#: a date somewhere in a line, whatever stands around it
+_SOME_DATE = re.compile(
+    r"(?<!\d)(?:\d{1,2}|\d{4}) ?([./-]) ?\d{1,2} ?\1 ?(?:\d{4}|\d{1,2})(?!\d)"
+    r"|(?<!\d)(?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])(?!\d)"
+    r"|(?<!\d)\d{1,2}[.-]? ?[^\s\d.,;:]{3,10}[.,-]? ?'?(?:\d{4}|\d\d)(?!\d)"
+    r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}(?!\d)"
+    r"|\b(?:day|tag|jour|giorno) *\d"
+    r"|\b(?:mon|tues|wednes|thurs|fri|satur|sun)day\b|\b(?:mon|diens|donners|frei|sams|sonn)tag\b|\bmittwoch\b",
+    re.IGNORECASE,
+)
+
+
+def holds_date(text: str) -> bool:
+    """Return whether a text holds a date, or a day, among other words.
+
+    Parameters
+    ----------
+    text : str
+    """
+    return _SOME_DATE.search(text) is not None
+
+
+def holds_own_date(table: FileTable, number: int) -> bool:
+    """Return whether a row holds a date where other rows hold none, as one between the tests of several days.
+
+    Parameters
+    ----------
+    table : FileTable
+    number : int
+        Of the row in the file, as `FileTable.place` tells it.
+    """
+    columns = [k for k in range(len(table.headings)) if find_kind(table.head(k)) not in ("date", "stamp")]
+    cells = table.load([], columns)[0]
+    row = next((k for k in range(len(cells)) if int(table.place(k).split()[-1]) == number), None)
+    return row is not None and any(map(holds_date, cells.iloc[row].dropna().astype(str)))
 
 
 def check_dates(
