@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.files.dayforms import find_day_columns
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.tables import FileTable
 from thermocomp.files.times import find_likely_units
@@ -85,6 +86,8 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
         if heading and known.isdisjoint((heading, k + 1)) and heading.casefold() != "cycle"
         if understand_or_none(heading) is None and table.is_number(k, empty=False)
     ]
+    days = set(find_day_columns(table, unknown[:MOST_GUESSES]))  # nobody may leave these out unasked
+    unknown = [k for k in unknown if k not in days]
     found = []
     for k, values in _numbers(table, unknown[:MOST_GUESSES]).items():
         heading = table.headings[k]
