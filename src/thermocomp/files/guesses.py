@@ -53,16 +53,16 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     Returns
     -------
     tuple of Remedy
-        One, with everything that can be guessed; empty if there is nothing.
+        With everything that can be guessed, one for each unit the time may have; empty if there is nothing.
     """
     columns: dict[str, Any] = {}
     for _, options in guess_columns(table, mapping):
         columns.update(options[0]["columns"])
-    time = _guess_time(table, mapping)
-    for name in [n for n, keys in columns.items() if time and keys.get("column", n) == time["column"]]:
-        del columns[name]
-    found: dict[str, Any] = {**({"time": time} if time else {}), **({"columns": columns} if columns else {})}
-    return (found,) if found else ()
+    found = []
+    for time in _guess_times(table, mapping) or [{}]:
+        others = {n: keys for n, keys in columns.items() if not time or keys.get("column", n) != time["column"]}
+        found.append({**({"time": time} if time else {}), **({"columns": others} if others else {})})
+    return tuple(way for way in found if way)
 
 
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
@@ -164,10 +164,10 @@ def _role(heading: str, values: FloatArray) -> tuple[str, str]:
     return "", ""
 
 
-def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
-    """Return the first column that rises all the time, or holds dates, unless the mapping names one."""
+def _guess_times(table: FileTable, mapping: Mapping) -> list[dict[str, Any]]:
+    """Return the first column that rises all the time, in its likely units, or holds dates, unless one is named."""
     if mapping.time.column or any(_names_time(h) for h in table.headings):
-        return {}
+        return []
     for k, heading in enumerate(table.headings):
         if not heading:
             continue
@@ -175,13 +175,13 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
             values = _numbers(table, [k]).get(k)
             if values is None or understand_or_none(heading) is not None or _role(heading, values)[0]:
                 continue
-            if len(units := find_likely_units(values)) == 1:  # of several nobody may guess
-                return {"column": heading, "unit": units[0]}
+            if units := find_likely_units(values):
+                return [{"column": heading, "unit": unit} for unit in units]
         else:
             cells = table.load([], [k])[0][k].dropna().astype(str)
             if len(cells) and pd.to_datetime(cells.iloc[:1], format="ISO8601", utc=True, errors="coerce").notna().all():
-                return {"column": heading, "unit": "timestamp"}
-    return {}
+                return [{"column": heading, "unit": "timestamp"}]
+    return []
 
 
 def _names_time(heading: str) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from thermocomp.core.draft import draft
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.core.headings import understand
 from thermocomp.files.cellkinds import find_kind
 from thermocomp.files.columns import Column, ColumnPlan, plan
@@ -347,6 +347,8 @@ def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
         yield
     except RecordingError as e:
         e.remedies = e.remedies or guess(table, mapping)
+        if len(e.remedies) > 1:  # units of time: nobody may guess which
+            raise TwoReadingsError(str(e), e.remedies) from e
         raise
 
 
