@@ -58,10 +58,18 @@ def test_rows_that_go_on_over_midnight_tell_the_order(form: str, clock: str, tmp
 
 @pytest.mark.parametrize("form", SLASHES)
 def test_days_in_a_row_tell_the_order(form: str, tmp_path: Path) -> None:
-    recording = read(written(tmp_path / "days.csv", DAYS, f"{form} %H:%M"))
-    as_it_was(recording, DAYS)
     daily = series(datetime(2024, 2, 1, 7), timedelta(days=1), 12)
     as_it_was(read(written(tmp_path / "daily.csv", daily, f"{form} %H:%M")), daily)
+
+
+@pytest.mark.parametrize("form", SLASHES)
+def test_several_rows_on_each_of_some_days_do_not(form: str, tmp_path: Path) -> None:
+    """Tests on the same day of several months look alike."""
+    path = written(tmp_path / "days.csv", DAYS, f"{form} %H:%M")
+    with pytest.raises(TwoReadingsError, match="no row tells which"):
+        read(path)
+    assert run(["map", str(path), "--yes"]) == 2
+    as_it_was(read(path, Mapping(time=TimeColumn("Timestamp", format=f"{form} %H:%M"))), DAYS)
 
 
 @pytest.mark.parametrize("form", ["%d/%m/%Y", "%m/%d/%y"])

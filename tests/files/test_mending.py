@@ -10,7 +10,7 @@ import pytest
 from smallmachine import small_machine
 
 from thermocomp.cli.app import run
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.files.mapping import Mapping, read_mapping
 from thermocomp.files.mending import Draft, Question, mend, read_or_offer, take_best, to_toml
 from thermocomp.files.recordings import read
@@ -175,8 +175,6 @@ def offered(error: InputError) -> tuple[str, str]:
         ("time_s,T1 [C],T1 [C],Z [um]\n0,20.1,20.2,0.1\n10,20.3,20.3,0.2\n", "are both named", 2),
         ("time_s,T1 [C],Z [um]\n0,20.1,0.1\n10,20.3\n20,20.3,0.2\n", "line 3 has 2 cells", 2),
         ("time_s,T1 [C],Z [um]\n0,20.1,0.1\n10,warm,0.1\n20,20.3,0.2\n", "'warm' is not a number", 2),
-        ("elapsed,T1 [C],Z [um]\n0,20.1,0.1\n10,20.4,0.1\n20,20.3,0.2\n", "says no unit: seconds", 3),
-        ("nr,T1 [C],Z [um]\n0,20.1,0.1\n10,20.4,0.1\n20,20.3,0.2\n", "no time column", 3),
         ("time_s,T1 [C],T1 (C),Z [um]\n0,20.1,20.0,0.1\n10,20.4,20.0,0.1\n", "would both become channel", 2),
         ("time_s,T1 [C],cycle\n0,20.1,a\n10,20.4,\n20,20.4,a\n", "cycle's label is missing", 2),
     ],
@@ -191,6 +189,24 @@ def test_an_error_offers_a_mapping_that_reads_the_file(content: str, message: st
     mapping = tmp_path / "my_file_1_.toml"
     mapping.write_text(toml, encoding="utf-8")
     assert len(read_or_offer(path, read_mapping(mapping))) == rows
+
+
+@pytest.mark.parametrize(
+    ("heading", "message"), [("elapsed", "says no unit: seconds"), ("nr", "no time column"), ("time", "says no unit")]
+)
+def test_units_of_time_are_offered_to_choose_from_and_never_taken(heading: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "drift.csv"
+    path.write_text(f"{heading},T1 [C],Z [um]\n0,20.1,0.1\n10,20.4,0.1\n20,20.3,0.2\n", encoding="utf-8")
+    with pytest.raises(TwoReadingsError, match=message) as caught:
+        read_or_offer(path)
+    words, toml = offered(caught.value)
+    assert words.startswith("choose one, save it as drift.toml")
+    assert all(f'# unit = "{unit}"' in toml for unit in ("s", "min"))
+    assert run(["map", str(path), "--yes"]) == 2
+    seconds = mend(path, "", lambda q: q.options[0] if q.severity == "error" else None).recording.time.tolist()
+    assert seconds == [0, 10, 20]
+    minutes = mend(path, "", lambda q: q.options[1] if q.severity == "error" else None).recording.time.tolist()
+    assert minutes == [0, 600, 1200]
 
 
 def test_an_offer_goes_on_from_the_mapping_that_was_given(tmp_path: Path) -> None:

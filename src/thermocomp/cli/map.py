@@ -39,7 +39,7 @@ def map(
         TOML file to write; without it the mapping is printed.
     yes : bool
         Ask nothing: take the best guess, and mend what `check` calls trouble. What changes how long a recording
-        took, as the order of day and month may, is not guessed but refused.
+        took, as the unit of time or the order of day and month may, is not guessed but refused.
     overwrite : bool
         Write over an existing file.
     json : bool

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.headings import HOUSE_SUFFIX, Meaning, understand
 from thermocomp.core.units import HOUSE_UNITS
+from thermocomp.files.dayforms import find_day_columns
 from thermocomp.files.mapping import Mapping
 from thermocomp.files.tables import FileTable
 from thermocomp.files.times import find_likely_units
@@ -52,16 +53,16 @@ def guess(table: FileTable, mapping: Mapping) -> tuple[Remedy, ...]:
     Returns
     -------
     tuple of Remedy
-        One, with everything that can be guessed; empty if there is nothing.
+        With everything that can be guessed, one for each unit the time may have; empty if there is nothing.
     """
     columns: dict[str, Any] = {}
     for _, options in guess_columns(table, mapping):
         columns.update(options[0]["columns"])
-    time = _guess_time(table, mapping)
-    for name in [n for n, keys in columns.items() if time and keys.get("column", n) == time["column"]]:
-        del columns[name]
-    found: dict[str, Any] = {**({"time": time} if time else {}), **({"columns": columns} if columns else {})}
-    return (found,) if found else ()
+    found = []
+    for time in _guess_times(table, mapping) or [{}]:
+        others = {n: keys for n, keys in columns.items() if not time or keys.get("column", n) != time["column"]}
+        found.append({**({"time": time} if time else {}), **({"columns": others} if others else {})})
+    return tuple(way for way in found if way)
 
 
 def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Remedy]]]:
@@ -85,6 +86,8 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
         if heading and known.isdisjoint((heading, k + 1)) and heading.casefold() != "cycle"
         if understand_or_none(heading) is None and table.is_number(k, empty=False)
     ]
+    days = set(find_day_columns(table, unknown[:MOST_GUESSES]))  # nobody may leave these out unasked
+    unknown = [k for k in unknown if k not in days]
     found = []
     for k, values in _numbers(table, unknown[:MOST_GUESSES]).items():
         heading = table.headings[k]
@@ -161,10 +164,10 @@ def _role(heading: str, values: FloatArray) -> tuple[str, str]:
     return "", ""
 
 
-def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
-    """Return the first column that rises all the time, or holds dates, unless the mapping names one."""
+def _guess_times(table: FileTable, mapping: Mapping) -> list[dict[str, Any]]:
+    """Return the first column that rises all the time, in its likely units, or holds dates, unless one is named."""
     if mapping.time.column or any(_names_time(h) for h in table.headings):
-        return {}
+        return []
     for k, heading in enumerate(table.headings):
         if not heading:
             continue
@@ -172,13 +175,13 @@ def _guess_time(table: FileTable, mapping: Mapping) -> dict[str, Any]:
             values = _numbers(table, [k]).get(k)
             if values is None or understand_or_none(heading) is not None or _role(heading, values)[0]:
                 continue
-            if len(units := find_likely_units(values)) == 1:  # of several nobody may guess
-                return {"column": heading, "unit": units[0]}
+            if units := find_likely_units(values):
+                return [{"column": heading, "unit": unit} for unit in units]
         else:
             cells = table.load([], [k])[0][k].dropna().astype(str)
             if len(cells) and pd.to_datetime(cells.iloc[:1], format="ISO8601", utc=True, errors="coerce").notna().all():
-                return {"column": heading, "unit": "timestamp"}
-    return {}
+                return [{"column": heading, "unit": "timestamp"}]
+    return []
 
 
 def _names_time(heading: str) -> bool:

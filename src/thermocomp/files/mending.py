@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from thermocomp.core.exceptions import InputError, RecordingError, Remedy, TwoReadingsError, UnitError
+from thermocomp.files.datecheck import holds_date, holds_own_date
 from thermocomp.files.guesses import guess_columns, understand_or_none
 from thermocomp.files.mapping import ADAPTER, ColumnMap, Mapping, check_content
 from thermocomp.files.recordings import open_table, read
@@ -166,7 +167,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
         The file cannot be read, and no mapping helps.
     """
     owner = str(path)
-    dialogue = _Dialogue(Draft(text), decide)
+    dialogue = _Dialogue(Draft(text), decide, path)
     table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
@@ -269,11 +270,14 @@ class _Dialogue:
     ----------
     draft : Draft
     decide : callable
+    path : str or Path
+        The file.
     """
 
-    def __init__(self, draft: Draft, decide: Decide) -> None:
+    def __init__(self, draft: Draft, decide: Decide, path: str | Path) -> None:
         self.draft = draft
         self.decide = decide
+        self.path = path
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
@@ -287,6 +291,16 @@ class _Dialogue:
     def _skipped(self) -> int:
         return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))
 
+    def _skips_date(self, error: InputError) -> bool:
+        """Return whether the likeliest remedy passes over a row that says on which day the next ones were taken."""
+        if not _skips(error.remedies[0]):
+            return False
+        try:
+            table = open_table(self.path, self.draft.mapping(str(self.path)))
+        except InputError:  # a row of too many cells or too few, which the message holds
+            return holds_date(str(error).removeprefix(str(self.path)))
+        return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])
+
     def until(self, action: Callable[[], _T]) -> _T:
         """Do something; what stands in the way is asked about, one after the other."""
         for _ in range(MOST_QUESTIONS):
@@ -295,7 +309,7 @@ class _Dialogue:
             except (RecordingError, UnitError) as e:
                 if not e.remedies or (_skips(e.remedies[0]) and self._skipped() >= MOST_SKIPPED):
                     raise
-                may_guess = not isinstance(e, TwoReadingsError)
+                may_guess = not (isinstance(e, TwoReadingsError) or self._skips_date(e))
                 if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
                     raise
         return action()
@@ -311,7 +325,7 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
     if not error.remedies or path.stat().st_size > _LARGE:
         return ""
     begun = tomlkit.dumps(ADAPTER.dump_python(mapping, mode="json", exclude_defaults=True))
-    dialogue, name = _Dialogue(Draft(begun), take_best), _file_name(path)
+    dialogue, name = _Dialogue(Draft(begun), take_best, path), _file_name(path)
     try:
         dialogue.until(lambda: read(path, dialogue.draft.mapping(str(path))))
         how = "by this mapping it is read; look it over"

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from thermocomp.core.draft import draft
-from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.core.headings import understand
 from thermocomp.files.cellkinds import find_kind
 from thermocomp.files.columns import Column, ColumnPlan, plan
 from thermocomp.files.datecheck import check_dates
+from thermocomp.files.dayforms import find_day_columns
 from thermocomp.files.guesses import guess
 from thermocomp.files.leftout import refuse_nameless, why_left_out
 from thermocomp.files.limits import Limits, check_file
@@ -123,15 +124,17 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     if is_stamp and columns.fraction is not None:
         numbers.append(columns.fraction)
     times = [columns.time, *columns.beside]
+    known = {*numbers, *times, columns.date, columns.fraction, *columns.unused}
+    others = find_day_columns(table, [k for k, h in enumerate(table.headings) if h and k not in known])
     numbers += [] if is_stamp else times
-    maybe = (*(times if is_stamp else ()), columns.date, *columns.unused, columns.cycle, *more.values())
+    maybe = (*(times if is_stamp else ()), columns.date, *columns.unused, *others, columns.cycle, *more.values())
     texts = [k for k in maybe if k is not None]
     cells, told = table.load(list(dict.fromkeys(numbers)), list(dict.fromkeys(t for t in texts if t not in numbers)))
     notes.extend(told)
     time, start, told = _times(cells, columns, mapping, table, source, is_stamp=is_stamp, rising=rising)
     notes.extend(told)
     if not start or columns.date is not None:
-        notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp))
+        notes.extend(check_dates(time, cells, columns, mapping, table, source, is_stamp=is_stamp, others=others))
     data, changed = {}, list[str]()
     for column in columns.columns:
         raw = cells[column.index].to_numpy(dtype=np.float64)
@@ -344,6 +347,8 @@ def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
         yield
     except RecordingError as e:
         e.remedies = e.remedies or guess(table, mapping)
+        if len(e.remedies) > 1:  # units of time: nobody may guess which
+            raise TwoReadingsError(str(e), e.remedies) from e
         raise
 
 

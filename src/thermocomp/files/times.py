@@ -246,9 +246,9 @@ def _read_numbers(
             (f"{heading!r} is taken as days since 1899-12-30, as Excel counts",),
         )
     ways: list[dict[str, str]] = [{"unit": unit} for unit in find_likely_units(raw)]
-    if raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
+    if compact := raw.min() > 19e12 and raw.max() < 21e12:  # written without signs: 20240305080010
         ways = [{"format": "%Y%m%d%H%M%S"}]
-    raise TwoReadingsError(
+    raise (RecordingError if compact else TwoReadingsError)(
         f"{source}: column {heading!r} holds numbers from {raw[0]:.14g} to {raw[-1]:.14g} and says no unit: seconds, "
         f'minutes, hours or milliseconds? Put it behind the name, such as "{heading} [s]", or write a mapping: [time] '
         f'column = "{heading}" and unit = "s"',
