@@ -347,7 +347,8 @@ def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
         yield
     except RecordingError as e:
         e.remedies = e.remedies or guess(table, mapping)
-        if len(e.remedies) > 1:  # units of time: nobody may guess which
+        # a unit of time says how long the recording took: nobody may guess which
+        if any(r.get("time", {}).get("unit") in ("ms", "s", "min", "h") for r in e.remedies):
             raise TwoReadingsError(str(e), e.remedies) from e
         raise
 
