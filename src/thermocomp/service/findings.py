@@ -43,6 +43,8 @@ def find_faults(settings: Settings) -> Iterator[str]:
             if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
                 yield f"{path}: may be a part of the journal {journal}, and would be written over; name another file"
     for name in dict.fromkeys(written):
+        if name in locks and not (folder / name).parent.is_dir():  # said of the file itself
+            continue
         if why := _unwritable(folder / name):
             yield f"{folder / name}: {why}"
         if names[(folder / name).resolve()] > 1:
