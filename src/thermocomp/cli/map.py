@@ -118,7 +118,7 @@ def _ask(question: "Question") -> Remedy | None:
     more = ', or keys of your own, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""
     best = "0" if question.severity in ("warning", "info") else "1" if question.may_guess else ""
     while True:
-        _stderr.print(f"  number{more}{best and f' [{best}]'}: ", end="", markup=False, soft_wrap=True)
+        _stderr.print(f"  number{more}{f' [{best}]' if best else ''}: ", end="", markup=False, soft_wrap=True)
         try:
             said = input().strip()
         except EOFError as e:
