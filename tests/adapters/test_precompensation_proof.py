@@ -29,6 +29,7 @@ def ledger(
     rows: Sequence[tuple[Vector, Vector]],
     *,
     inverse: Sequence[int] = (),
+    machine: Sequence[int] = (),
     header: int = 0,
     texts: Mapping[int, int] | None = None,
     knots: Mapping[int, tuple[Vector, ...]] | None = None,
@@ -42,7 +43,7 @@ def ledger(
     for number, (after, inner) in enumerate(rows, start=1):
         modal = Modal(feed_mode=93 if number in inverse else 94)
         written = ("",) * (texts or {}).get(number, 1)
-        block = Block(Line(number, ""), modal)
+        block = Block(Line(number, ""), modal, kind="machine" if number in machine else "none")
         inside = (knots or {}).get(number, ())
         other = (others or {}).get(number)
         made.take(

@@ -94,6 +94,18 @@ def test_a_move_takes_as_long(tmp_path: Path) -> None:
     assert proof.slower == pytest.approx(1.0)
 
 
+def test_what_is_given_back_takes_the_time_of_its_feed(tmp_path: Path) -> None:
+    original = HEAD + "G49 G0 X0 Y0 Z0\nG1 Z-1 F60\nG53 G1 Z-2 F60\nM2\n"
+    revised = original.replace("Z0", "Z0.05").replace("Z-1", "Z-0.95")
+    rows: Rows = [shift(), shift(0, 0, 50), shift(0, 0, 50), shift()]
+    here = replace(PLAIN, offsets={1: NONE})
+    judge(tmp_path, original, revised, rows, here, machine=[4])
+    with pytest.raises(ProgramError, match=r"line 4: .* it takes 1\.05 s for a move of 1 s"):
+        judge(tmp_path, original, revised, rows, here)
+    with pytest.raises(ProgramError, match=r"line 4: .*gives 'feedrate' 59 59 instead"):
+        judge(tmp_path, original, revised.replace("Z-2 F60", "Z-2 F59"), rows, machine=[4])
+
+
 def test_a_short_move_takes_as_long(tmp_path: Path) -> None:
     original = HEAD + "G0 X0 Y0 Z0\nG1 X0.1 F60\nM2\n"
     with pytest.raises(ProgramError, match=r"line 3: .* it takes 0\.11 s for a move of 0\.1 s"):

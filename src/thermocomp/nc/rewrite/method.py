@@ -199,6 +199,13 @@ class CorrectionMethod(ABC):
                 raise ProgramError(
                     block.line.number, "a move in machine coordinates of X or Y alone while the coordinates are rotated"
                 )
+        fed = any(not m.rapid for m in block.moves)
+        if fed and not ROTARY.isdisjoint(block.words) and any(self.carried[i] or self.doubtful[i] for i in axes):
+            raise ProgramError(
+                block.line.number,
+                "turns a rotary axis by the feed on the way to machine coordinates, where X, Y and Z give back the "
+                "correction: if they stand, F would no longer count degrees; write G53 G0, or a line for each",
+            )
         after = list(self.carried)
         for i in axes:
             after[i], self.fixed[i], self.doubtful[i] = 0.0, True, False

@@ -168,7 +168,7 @@ class _Comparison:
             *self._numbers(was, now, moving),
             *self._places(was, now, moving, shifts),
             *self._arcs(was, now, joined, shifts, moving),
-            *self._times(was, now, moving),
+            *self._times(was, now, moving, shifts),
         ]
         if pieces is not None:
             checks += self._divided(was, pieces)
@@ -299,7 +299,7 @@ class _Comparison:
 
     # -- when --------------------------------------------------------------------------------------------------------
 
-    def _times(self, was: Calls, now: Calls, moving: Mask) -> Iterator[_Check]:
+    def _times(self, was: Calls, now: Calls, moving: Mask, shifts: Shifts) -> Iterator[_Check]:
         change = np.abs(now.seconds - was.seconds)
         way = np.abs(was.end - was.start) > STILL
         linear = way[:, [0, 1, 2, 6, 7, 8]].any(axis=1) | (was.plane > 0)
@@ -307,6 +307,12 @@ class _Comparison:
         turning_alone = way[:, 3:6].any(axis=1) & ~linear
         exact, near = _EXACT * np.maximum(was.seconds, 1.0), np.maximum(SLOWER * was.seconds, PAUSE)
         allowed = np.where(turning_alone, exact, near)
+        # on the way to machine coordinates what the axes give back takes the time that it needs at the same feed
+        goes, went = ((c.end - c.start)[:, :3] for c in (now, was))
+        far = np.linalg.norm(goes, axis=1)
+        pace = now.seconds / np.where(far > STILL, far, np.inf)
+        given_back = np.where(shifts.machine & ~turning_alone, np.linalg.norm(goes - went, axis=1), 0.0)
+        allowed = np.maximum(allowed, given_back * pace * (1.0 + SLOWER))
         if moving.any():
             self.slower = max(self.slower, float((change / np.maximum(was.seconds, PAUSE / SLOWER))[moving].max()))
         yield _Check(
