@@ -29,7 +29,8 @@ SETUPS = (
 )
 EVENTS = (
     "M1", "M1", "M0", "G4 P5", "G4 P60", "M5\nS8000 M3", "T6 M6\nS9000 M3", "G0 Z5", "G0 Z20", "G53 G0 Z0",
-    "G53 G1 Z-2.5 F500", "G53 G1 Z-2.5 F20", "G53 G1 Z-1 A3 F50", "G30 Z5", "G91 G28 Z0\nG90", "G28 X0 Y0", "G98 G81 X1 Y2 Z-4 R-1 F100\nX2\nG80",
+    "G53 G1 Z-2.5 F500", "G53 G1 Z-2.5 F20", "G53 G1 Z-1 A3 F50", "G30 Z5",
+    "G91 G28 Z0\nG90", "G28 X0 Y0", "G98 G81 X1 Y2 Z-4 R-1 F100\nX2\nG80",
 )  # fmt: skip
 ODD = (
     "G91\nG1 X0.2 Z-0.1\nG90", "G1 Z-3.1\nG3 I0.5 J0", "G93\nG1 X1 F20\nG94 F100", "G95 F0.1\nG1 Y3\nG94 F100",
@@ -86,7 +87,7 @@ def test_a_short_cut_behind_a_stop_is_revised(text: str, rate: tuple[float, floa
     assert abs(trial.rows[-1].carried[2] + trial.rows[-1].deviation[2]) <= 1.0
 
 
-#: a long cut, in which the correction grows, then machine coordinates by the feed; with origins the tool is there already
+#: a long cut, in which the correction grows, then machine coordinates by the feed
 LONG = HEAD + "G1 Z-1 F200\nG1 X300 F30\n{}\nG0 Z50\nM30\n"
 
 
